@@ -1,0 +1,1 @@
+//! What a processed scan leaves behind: CAD file, pictures, report, manifest.

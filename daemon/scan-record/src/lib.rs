@@ -1,0 +1,1 @@
+//! A kept scan: the append-only journal of raw columns, and its calibration to millimetres.

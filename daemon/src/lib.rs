@@ -1,0 +1,1 @@
+//! The Relief service: acquisition, job queue, spool and HTTP API.

@@ -1,0 +1,1 @@
+//! The driver of the slide-table scanner: session, retries, column stream, transports.

@@ -1,0 +1,1 @@
+//! CAD files: IGES written and read.

@@ -1,0 +1,1 @@
+//! The whole road from a range image to a model, stage by stage.

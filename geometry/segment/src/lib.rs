@@ -1,0 +1,1 @@
+//! Range images to regions of one surface each.

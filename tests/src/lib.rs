@@ -1,0 +1,1 @@
+//! End-to-end tests: the daemon driven through its API against the simulated scanner.
