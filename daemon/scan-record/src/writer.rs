@@ -1,0 +1,224 @@
+//! Appending a scan to disk while it is measured.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write};
+use std::path::Path;
+
+use crate::column::RawColumn;
+use crate::format::{
+    KIND_COLUMN, KIND_END, KIND_HEADER, MAGIC, MAX_HEADER_BYTES, MAX_REASON_BYTES, MAX_SAMPLES,
+    PREAMBLE_BYTES, VERSION, checksum, record_head,
+};
+use crate::header::Header;
+
+/// Where a journal goes. A file in service; tests put a failing or forgetful medium here.
+pub trait Storage: Write {
+    /// Returns once everything written so far would survive a power failure.
+    ///
+    /// # Errors
+    /// When the medium could not promise that.
+    fn sync_data(&mut self) -> io::Result<()>;
+}
+
+impl Storage for File {
+    fn sync_data(&mut self) -> io::Result<()> {
+        File::sync_data(self)
+    }
+}
+
+/// Why a scan ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum EndCause {
+    /// Every planned column was taken.
+    Complete,
+    /// Somebody, named in the text, asked for the end.
+    Aborted(String),
+    /// Something, named in the text, went wrong.
+    Fault(String),
+}
+
+/// A journal could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The medium refused.
+    #[error("cannot write the scan journal: {0}")]
+    Io(#[from] io::Error),
+    /// The header's byte strings are larger than a reader would accept.
+    #[error("the scan's header has {bytes} bytes, at most {MAX_HEADER_BYTES} are allowed")]
+    HeaderTooLarge {
+        /// Size of the header's payload.
+        bytes: usize,
+    },
+    /// A column is larger than a reader would accept.
+    #[error("column {index} has {samples} samples, at most {MAX_SAMPLES} are allowed")]
+    ColumnTooLarge {
+        /// The column's number.
+        index: u32,
+        /// How many samples it has.
+        samples: usize,
+    },
+    /// Columns must come in ascending order.
+    #[error("column {index} cannot follow column {last}: columns are kept in ascending order")]
+    OutOfOrder {
+        /// The column that was refused.
+        index: u32,
+        /// The last one that was kept.
+        last: u32,
+    },
+    /// An earlier write failed, so what follows it could not be read again.
+    #[error("the scan journal takes no more columns after an earlier write failed")]
+    Failed,
+}
+
+/// Writes one journal.
+#[derive(Debug)]
+pub struct JournalWriter<S: Storage = File> {
+    storage: S,
+    record: Vec<u8>,
+    payload: Vec<u8>,
+    last_index: Option<u32>,
+    columns: u32,
+    bytes: u64,
+    failed: bool,
+}
+
+impl JournalWriter<File> {
+    /// Makes the file, which must not exist yet, and syncs the header and the folder's
+    /// entry, so that even a scan cut short at once can be found.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`], among others when the file exists.
+    pub fn create(path: &Path, header: &Header) -> Result<Self, WriteError> {
+        let file = OpenOptions::new().write(true).create_new(true).open(path)?;
+        let writer = Self::new(file, header)?;
+        if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
+            File::open(folder)?.sync_all()?;
+        }
+        Ok(writer)
+    }
+}
+
+impl<S: Storage> JournalWriter<S> {
+    /// Writes and syncs the header.
+    ///
+    /// # Errors
+    /// [`WriteError::HeaderTooLarge`] and [`WriteError::Io`].
+    pub fn new(storage: S, header: &Header) -> Result<Self, WriteError> {
+        let payload = header.encode();
+        if payload.len() > MAX_HEADER_BYTES {
+            return Err(WriteError::HeaderTooLarge {
+                bytes: payload.len(),
+            });
+        }
+        let mut writer = Self {
+            storage,
+            record: Vec::new(),
+            payload,
+            last_index: None,
+            columns: 0,
+            bytes: PREAMBLE_BYTES as u64,
+            failed: false,
+        };
+        let [low, high] = VERSION.to_le_bytes();
+        writer.storage.write_all(&MAGIC)?;
+        writer.storage.write_all(&[low, high, 0, 0])?;
+        writer.write_record(KIND_HEADER)?;
+        writer.sync()?;
+        Ok(writer)
+    }
+
+    /// Adds a column. It is safe once [`Self::sync`] has returned after this.
+    ///
+    /// # Errors
+    /// [`WriteError::ColumnTooLarge`] and [`WriteError::OutOfOrder`] leave the journal as
+    /// it was; after [`WriteError::Io`] it takes no more columns.
+    pub fn append(&mut self, column: &RawColumn) -> Result<(), WriteError> {
+        if column.samples.len() > MAX_SAMPLES {
+            return Err(WriteError::ColumnTooLarge {
+                index: column.index,
+                samples: column.samples.len(),
+            });
+        }
+        if let Some(last) = self.last_index.filter(|&last| column.index <= last) {
+            return Err(WriteError::OutOfOrder {
+                index: column.index,
+                last,
+            });
+        }
+        self.payload.clear();
+        column.encode(&mut self.payload);
+        self.write_record(KIND_COLUMN)?;
+        self.last_index = Some(column.index);
+        self.columns += 1;
+        Ok(())
+    }
+
+    /// Returns once all columns appended so far would survive a power failure.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`]; which columns are safe is then unknown, and no more are taken.
+    pub fn sync(&mut self) -> Result<(), WriteError> {
+        if self.failed {
+            return Err(WriteError::Failed);
+        }
+        // A sync that failed once may report success the next time without having
+        // written the lost pages, so there is no second try.
+        self.storage
+            .sync_data()
+            .inspect_err(|_| self.failed = true)?;
+        Ok(())
+    }
+
+    /// Writes the end record, syncs, and gives the storage back.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`]; the columns synced before are safe all the same.
+    pub fn finish(mut self, cause: &EndCause) -> Result<S, WriteError> {
+        let (code, reason) = match cause {
+            EndCause::Complete => (0, ""),
+            EndCause::Aborted(reason) => (1, reason.as_str()),
+            EndCause::Fault(reason) => (2, reason.as_str()),
+        };
+        let mut cut = MAX_REASON_BYTES.min(reason.len());
+        while !reason.is_char_boundary(cut) {
+            cut -= 1;
+        }
+        self.payload.clear();
+        self.payload.push(code);
+        self.payload.extend_from_slice(&self.columns.to_le_bytes());
+        self.payload.extend_from_slice(&reason.as_bytes()[..cut]);
+        self.write_record(KIND_END)?;
+        self.sync()?;
+        Ok(self.storage)
+    }
+
+    /// Columns appended so far.
+    #[must_use]
+    pub fn columns(&self) -> u32 {
+        self.columns
+    }
+
+    /// Bytes written so far.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// One `write` for a record, so that a full disk tears one record and not two.
+    fn write_record(&mut self, kind: u8) -> Result<(), WriteError> {
+        if self.failed {
+            return Err(WriteError::Failed);
+        }
+        let head = record_head(kind, self.payload.len());
+        self.record.clear();
+        self.record.extend_from_slice(&head);
+        self.record.extend_from_slice(&self.payload);
+        self.record
+            .extend_from_slice(&checksum(&head, &self.payload).to_le_bytes());
+        self.storage
+            .write_all(&self.record)
+            .inspect_err(|_| self.failed = true)?;
+        self.bytes += self.record.len() as u64;
+        Ok(())
+    }
+}
