@@ -4,6 +4,12 @@
 //! polynomials in power form, in which Shim & Lee 1995 (section V) write them to IGES
 //! as entities 112 and 114.
 
+pub mod curve;
+pub mod knots;
 pub mod piecewise;
+pub mod surface;
 
-pub use piecewise::{PatchSurface, PiecewiseCubic};
+pub use curve::{BSplineCurve, ControlCountError};
+pub use knots::{Basis, KnotError, KnotVector, MAX_DEGREE};
+pub use piecewise::{PatchSurface, PiecewiseCubic, PiecewiseError, cubic_through_thirds};
+pub use surface::BSplineSurface;
