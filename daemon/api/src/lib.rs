@@ -1,1 +1,39 @@
 //! The HTTP types of the Relief service, shared by server and clients.
+//!
+//! The service speaks HTTP/1.1 on a Unix socket, and on a loopback address if configured.
+//! Bodies are JSON; errors are [`Problem`] (`application/problem+json`); events are
+//! server-sent events whose data is one [`Event`] each.
+//!
+//! | method and path | request | reply |
+//! | --- | --- | --- |
+//! | `GET /v1/status` | | [`Status`] |
+//! | `GET /v1/scans` | | [`ScanList`], newest first |
+//! | `POST /v1/scans` | [`StartScan`] | 202 [`Scan`] |
+//! | `GET /v1/scans/{scan}` | | [`Scan`] |
+//! | `POST /v1/scans/{scan}/abort` | | [`Scan`] |
+//! | `POST /v1/scans/{scan}/rerun` | [`Rerun`] | 202 [`Job`] |
+//! | `GET /v1/scans/{scan}/journal` | | the kept raw columns, a `.scan` file |
+//! | `POST /v1/abort` | | the scan that was running: [`Scan`] |
+//! | `GET /v1/jobs` | | [`JobList`], newest first |
+//! | `GET /v1/jobs/{job}` | | [`Job`] |
+//! | `POST /v1/jobs/{job}/retry` | | 202 [`Job`] |
+//! | `POST /v1/jobs/{job}/cancel` | | [`Job`] |
+//! | `GET /v1/spool/{result}` | | [`SpoolEntry`] |
+//! | `GET /v1/spool/{result}/{file}` | | the file |
+//! | `GET /v1/events` | | server-sent [`Event`]s, first [`Event::Status`] |
+//!
+//! Within `/v1`, fields and event kinds are only ever added; clients ignore those they do
+//! not know.
+
+mod event;
+mod job;
+pub mod path;
+mod problem;
+mod scan;
+mod status;
+
+pub use event::{Event, LiveColumn};
+pub use job::{Job, JobId, JobList, JobState, Rerun, SpoolEntry, SpoolFile, StageTiming};
+pub use problem::Problem;
+pub use scan::{PlanRequest, Scan, ScanList, ScanState, SettingOverrides, StartScan};
+pub use status::{ScannerLink, ScannerStatus, Status};

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use range_image::{Calibration, calibration::Head};
 use scan_record::{EndCause, Header, JournalWriter, RawColumn, RawSample, Storage};
 
-pub fn header() -> Header {
+pub(crate) fn header() -> Header {
     Header {
         calibration: Calibration {
             table_origin_mm: -60.0,
@@ -27,7 +27,7 @@ pub fn header() -> Header {
     }
 }
 
-pub fn column(index: u32, samples: i32) -> RawColumn {
+pub(crate) fn column(index: u32, samples: i32) -> RawColumn {
     RawColumn {
         index,
         table_counts: index as i32 * 50 - 7,
@@ -43,20 +43,24 @@ pub fn column(index: u32, samples: i32) -> RawColumn {
     }
 }
 
-pub fn journal(columns: &[RawColumn], cause: &EndCause) -> Vec<u8> {
-    let mut writer = JournalWriter::new(Medium::default(), &header()).unwrap();
+pub(crate) fn journal(columns: &[RawColumn], cause: &EndCause) -> Vec<u8> {
+    let mut writer =
+        JournalWriter::new(Medium::default(), &header()).expect("this medium takes everything");
     for column in columns {
-        writer.append(column).unwrap();
+        writer.append(column).expect("this medium takes everything");
     }
-    writer.finish(cause).unwrap().written
+    writer
+        .finish(cause)
+        .expect("this medium takes everything")
+        .written
 }
 
 /// Keeps what was written and how much of it was synced; full after `room` bytes.
 #[derive(Debug)]
-pub struct Medium {
-    pub written: Vec<u8>,
-    pub synced: usize,
-    pub room: usize,
+pub(crate) struct Medium {
+    pub(crate) written: Vec<u8>,
+    pub(crate) synced: usize,
+    pub(crate) room: usize,
 }
 
 impl Default for Medium {

@@ -1,0 +1,136 @@
+//! Jobs: the processing of a kept scan, and what it leaves in the spool.
+
+use serde::{Deserialize, Serialize};
+
+use crate::scan::SettingOverrides;
+
+/// Number of a job, ascending in the order in which they were made.
+pub type JobId = u64;
+
+/// Where a job stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JobState {
+    /// Waits for a worker.
+    Queued,
+    /// A worker has it.
+    Running,
+    /// Its deliverables are in the spool.
+    Done,
+    /// It gave up; `retry` queues it again.
+    Failed,
+    /// Given up on request; `retry` queues it again.
+    Cancelled,
+}
+
+impl JobState {
+    /// True once nothing more will come unless it is retried.
+    #[must_use]
+    pub fn is_over(self) -> bool {
+        !matches!(self, Self::Queued | Self::Running)
+    }
+
+    /// As it is spelt in JSON.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Queued => "queued",
+            Self::Running => "running",
+            Self::Done => "done",
+            Self::Failed => "failed",
+            Self::Cancelled => "cancelled",
+        }
+    }
+}
+
+/// A job.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Job {
+    /// Its number.
+    pub id: JobId,
+    /// The scan it processes.
+    pub scan: String,
+    /// The folder in the spool it publishes; the scan's id, or an own one for a rerun.
+    pub result: String,
+    /// Names the deliverables.
+    pub name: String,
+    /// Where it stands.
+    pub state: JobState,
+    /// Why it failed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+    /// What to do about it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hint: Option<String>,
+    /// How often it was begun.
+    #[serde(default)]
+    pub attempts: u32,
+    /// When it was made, RFC 3339 in UTC.
+    pub queued_at: String,
+    /// When the last attempt began.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub started_at: Option<String>,
+    /// When the last attempt ended.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ended_at: Option<String>,
+    /// What the worker is at; `None` unless running.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stage: Option<String>,
+    /// Stages that are finished, in order.
+    #[serde(default)]
+    pub timings: Vec<StageTiming>,
+    /// The published folder on the service's machine, once done.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub directory: Option<String>,
+    /// Settings that differ from the configuration.
+    #[serde(default, skip_serializing_if = "SettingOverrides::is_empty")]
+    pub settings: SettingOverrides,
+}
+
+/// How long a stage took.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StageTiming {
+    /// The stage.
+    pub stage: String,
+    /// Wall-clock time.
+    pub seconds: f64,
+}
+
+/// The jobs.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct JobList {
+    /// Newest first.
+    pub jobs: Vec<Job>,
+}
+
+/// Asks for a kept scan to be processed again.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Rerun {
+    /// Names the deliverables; the scan's name if empty.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub name: String,
+    /// Settings that differ from those of the scan.
+    #[serde(skip_serializing_if = "SettingOverrides::is_empty")]
+    pub settings: SettingOverrides,
+}
+
+/// A folder of the spool.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SpoolEntry {
+    /// The folder's name.
+    pub result: String,
+    /// Where it is on the service's machine.
+    pub directory: String,
+    /// Its files by name.
+    pub files: Vec<SpoolFile>,
+}
+
+/// A file of the spool.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SpoolFile {
+    /// Its name.
+    pub name: String,
+    /// Its size.
+    pub bytes: u64,
+}

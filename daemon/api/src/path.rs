@@ -1,0 +1,116 @@
+//! Where things are. Patterns are for the server's router, functions for clients.
+
+/// [`crate::Status`].
+pub const STATUS: &str = "/v1/status";
+/// The scans; a new one is posted here.
+pub const SCANS: &str = "/v1/scans";
+/// Pattern of one scan.
+pub const SCAN: &str = "/v1/scans/{scan}";
+/// Pattern of the abort of one scan.
+pub const SCAN_ABORT: &str = "/v1/scans/{scan}/abort";
+/// Pattern of a scan's rerun.
+pub const SCAN_RERUN: &str = "/v1/scans/{scan}/rerun";
+/// Pattern of a scan's journal.
+pub const SCAN_JOURNAL: &str = "/v1/scans/{scan}/journal";
+/// Aborts whatever scan is running.
+pub const ABORT: &str = "/v1/abort";
+/// The jobs.
+pub const JOBS: &str = "/v1/jobs";
+/// Pattern of one job.
+pub const JOB: &str = "/v1/jobs/{job}";
+/// Pattern of a job's retry.
+pub const JOB_RETRY: &str = "/v1/jobs/{job}/retry";
+/// Pattern of a job's cancellation.
+pub const JOB_CANCEL: &str = "/v1/jobs/{job}/cancel";
+/// Pattern of one folder of the spool.
+pub const SPOOL: &str = "/v1/spool/{result}";
+/// Pattern of one file of the spool.
+pub const SPOOL_FILE: &str = "/v1/spool/{result}/{file}";
+/// The event stream.
+pub const EVENTS: &str = "/v1/events";
+
+/// One scan.
+#[must_use]
+pub fn scan(id: &str) -> String {
+    format!("{SCANS}/{}", segment(id))
+}
+
+/// Abort of one scan.
+#[must_use]
+pub fn scan_abort(id: &str) -> String {
+    scan(id) + "/abort"
+}
+
+/// Rerun of one scan.
+#[must_use]
+pub fn scan_rerun(id: &str) -> String {
+    scan(id) + "/rerun"
+}
+
+/// Journal of one scan.
+#[must_use]
+pub fn scan_journal(id: &str) -> String {
+    scan(id) + "/journal"
+}
+
+/// One job.
+#[must_use]
+pub fn job(id: crate::JobId) -> String {
+    format!("{JOBS}/{id}")
+}
+
+/// Retry of one job.
+#[must_use]
+pub fn job_retry(id: crate::JobId) -> String {
+    job(id) + "/retry"
+}
+
+/// Cancellation of one job.
+#[must_use]
+pub fn job_cancel(id: crate::JobId) -> String {
+    job(id) + "/cancel"
+}
+
+/// One folder of the spool.
+#[must_use]
+pub fn spool(result: &str) -> String {
+    format!("/v1/spool/{}", segment(result))
+}
+
+/// One file of the spool.
+#[must_use]
+pub fn spool_file(result: &str, file: &str) -> String {
+    format!("{}/{}", spool(result), segment(file))
+}
+
+/// One segment of a path, escaped (RFC 3986, section 2.3).
+fn segment(text: &str) -> String {
+    use core::fmt::Write;
+    text.bytes().fold(String::new(), |mut out, byte| {
+        if byte.is_ascii_alphanumeric() || b"-._~".contains(&byte) {
+            out.push(char::from(byte));
+        } else {
+            // Writing to a string cannot fail.
+            let _ = write!(out, "%{byte:02X}");
+        }
+        out
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_fit_their_patterns_and_are_escaped() {
+        assert_eq!(
+            scan_abort("20261121T110830.123Z-house"),
+            "/v1/scans/20261121T110830.123Z-house/abort"
+        );
+        assert_eq!(job_retry(7), "/v1/jobs/7/retry");
+        assert_eq!(
+            spool_file("a/../b", "x y.igs"),
+            "/v1/spool/a%2F..%2Fb/x%20y.igs"
+        );
+    }
+}

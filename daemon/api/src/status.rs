@@ -1,0 +1,60 @@
+//! The service at a glance.
+
+use serde::{Deserialize, Serialize};
+
+use crate::scan::Scan;
+
+/// The service at a glance.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Status {
+    /// Version of the service.
+    pub version: String,
+    /// Since when it runs, RFC 3339 in UTC.
+    pub started_at: String,
+    /// The scanner.
+    pub scanner: ScannerStatus,
+    /// The scan under way.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scan: Option<Scan>,
+    /// Jobs that wait.
+    pub jobs_queued: usize,
+    /// Jobs that workers have.
+    pub jobs_running: usize,
+    /// Where results appear on the service's machine.
+    pub spool: String,
+}
+
+/// How the service stands with its scanner.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ScannerLink {
+    /// Not spoken to yet.
+    Unknown,
+    /// Answered last time.
+    Ready,
+    /// Taking a scan.
+    Scanning,
+    /// Could not be reached, or reports a fault.
+    Trouble,
+}
+
+/// What is known of the scanner.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ScannerStatus {
+    /// How the service stands with it.
+    pub link: ScannerLink,
+    /// Where it is attached, such as a serial port.
+    pub endpoint: String,
+    /// Model, once it has answered.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<String>,
+    /// Serial number, once it has answered.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub serial: Option<String>,
+    /// Firmware, once it has answered.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub firmware: Option<String>,
+    /// What is wrong, when something is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub problem: Option<String>,
+}
