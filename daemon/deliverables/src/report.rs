@@ -1,0 +1,149 @@
+//! `report.json`: what was measured, how it was processed, what came of it.
+//!
+//! Units are part of the key names. Keys are only ever added; a number that does not
+//! exist (the PSNR of an exact fit, say) is `null`.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// Everything that is known about one processed scan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// Name of the part or scan; the CAD file carries it.
+    pub name: String,
+    /// When the scan was taken (or the moment its owner gave for it), RFC 3339.
+    pub timestamp: String,
+    /// Where the samples came from.
+    pub scan: ScanReport,
+    /// The settings that can change the result.
+    pub settings: SettingsReport,
+    /// The uniform range image.
+    pub range_image: RangeImageReport,
+    /// The surface regions found in it.
+    pub regions: RegionsReport,
+    /// The trimmed faces made of them.
+    pub model: ModelReport,
+    /// Signal-to-noise ratio of the whole restored image against the range image,
+    /// decibels, as in Shim & Lee 1995: R in 0.1 mm, 7000 to 8000; a node that one has
+    /// and the other lacks counts with its full value. Larger is nearer; `null` where
+    /// both are equal.
+    pub snr_db: Option<f64>,
+    /// Nodes of the range image that lie outside every trimmed face.
+    pub lost_nodes: usize,
+    /// Nodes inside a trimmed face that the range image does not have.
+    pub invented_nodes: usize,
+    /// Duration of each stage, seconds.
+    pub timings_s: BTreeMap<String, f64>,
+    /// What the user should know, in plain sentences.
+    pub warnings: Vec<String>,
+    /// Versions of the programs that took part, by name.
+    pub versions: BTreeMap<String, String>,
+}
+
+/// Where the samples came from.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ScanReport {
+    /// Identity of the scan in the service; absent for converted files.
+    pub id: Option<String>,
+    /// The scanner (model and serial number) or the file.
+    pub source: String,
+    /// Who took the scan.
+    pub operator: Option<String>,
+    /// What was scanned: part or serial number.
+    pub part: Option<String>,
+    /// Anything else worth keeping.
+    pub note: Option<String>,
+    /// Columns measured.
+    pub columns: u64,
+    /// Samples measured.
+    pub samples: u64,
+    /// Rays that brought no sample, where the source counts them.
+    pub dropouts: Option<u64>,
+}
+
+/// The settings that can change the result.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SettingsReport {
+    /// `relief` or `shim-lee`.
+    pub method: String,
+    /// Seed of every random draw.
+    pub seed: u64,
+    /// Distance of neighbouring grid nodes.
+    pub pitch_mm: f64,
+    /// Samples looked at for a grid node.
+    pub neighbours: usize,
+    /// Planes tried for a grid node.
+    pub draws: usize,
+    /// Columns on either side in which the neighbours are sought.
+    pub reach_columns: usize,
+    /// How z at a node is estimated: `least-median` or `least-squares`.
+    pub estimator: String,
+    /// Clusters the segmentation begins with.
+    pub clusters: usize,
+    /// How far a fitted surface may lie from the nodes.
+    pub tolerance_mm: f64,
+    /// IGES entities of the surfaces: 114 or 128.
+    pub iges_entities: u16,
+}
+
+/// The uniform range image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RangeImageReport {
+    /// Distance of neighbouring nodes.
+    pub pitch_mm: f64,
+    /// Grid columns.
+    pub columns: usize,
+    /// Nodes in a column.
+    pub rows: usize,
+    /// Nodes that have a value.
+    pub nodes: usize,
+    /// Least z, `null` for an empty image.
+    pub z_min_mm: Option<f64>,
+    /// Greatest z, `null` for an empty image.
+    pub z_max_mm: Option<f64>,
+}
+
+/// The surface regions.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RegionsReport {
+    /// How many there are.
+    pub count: usize,
+    /// One entry for each, in the order of their labels.
+    pub list: Vec<RegionReport>,
+}
+
+/// One surface region and how well its face fits.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RegionReport {
+    /// Its label, from 1.
+    pub label: u16,
+    /// Name of its face in the CAD file; `null` where no face could be made of it.
+    pub face: Option<String>,
+    /// What its surface is.
+    pub kind: String,
+    /// Its nodes in the range image.
+    pub nodes: usize,
+    /// Root mean square distance of the nodes from the surface, along z.
+    pub rms_mm: Option<f64>,
+    /// Largest distance of a node from the surface, along z.
+    pub max_mm: Option<f64>,
+    /// Peak signal-to-noise ratio of the surface at the region's nodes.
+    pub psnr_db: Option<f64>,
+}
+
+/// The trimmed faces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ModelReport {
+    /// Trimmed faces.
+    pub faces: usize,
+    /// Edges that two faces (or two loops of one) share.
+    pub edges_shared: usize,
+    /// Edges that bound one face only.
+    pub free_edges: usize,
+}
+
+/// The number, if it is one that JSON can carry.
+pub(crate) fn finite(number: f64) -> Option<f64> {
+    number.is_finite().then_some(number)
+}
