@@ -1,0 +1,189 @@
+//! What can be wrong with a scan file.
+
+use std::fmt;
+use std::io;
+
+/// Where in a file something is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// A line, counted from 1.
+    Line(u64),
+    /// A vertex of a PLY file, counted from 1.
+    Vertex(u64),
+    /// A point handed over by another reader, counted from 1.
+    Point(u64),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(number) => write!(f, "line {number}"),
+            Self::Vertex(number) => write!(f, "vertex {number}"),
+            Self::Point(number) => write!(f, "point {number}"),
+        }
+    }
+}
+
+/// Why a scan file could not be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ScanFileError {
+    /// The file could not be opened.
+    #[error("{file}: cannot be opened: {source}")]
+    Open {
+        /// The file.
+        file: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Reading or decompressing failed part of the way.
+    #[error("{file}: reading failed after {after}: {source}; is the file complete?")]
+    Read {
+        /// The file.
+        file: String,
+        /// How far reading got.
+        after: String,
+        /// What the system or the decompressor said.
+        source: io::Error,
+    },
+    /// Neither PLY nor text.
+    #[error(
+        "{file}: byte {byte} (value {value:#04x}) cannot be part of a text file; \
+         expected PLY or lines of `x y z`, plain or gzip-compressed"
+    )]
+    NotText {
+        /// The file.
+        file: String,
+        /// Offset of the offending byte in the decompressed data, from 0.
+        byte: u64,
+        /// The byte.
+        value: u8,
+    },
+    /// A line longer than any line of numbers.
+    #[error("{file}, line {line}: longer than {limit} bytes; a line holds one point")]
+    LongLine {
+        /// The file.
+        file: String,
+        /// The line, from 1.
+        line: u64,
+        /// The limit.
+        limit: usize,
+    },
+    /// A field that should be a number is not.
+    #[error("{file}, line {line}: `{text}` is not a number; expected `x y z`")]
+    NotANumber {
+        /// The file.
+        file: String,
+        /// The line, from 1.
+        line: u64,
+        /// The field.
+        text: String,
+    },
+    /// Numbers with decimal commas where the comma may also separate.
+    #[error(
+        "{file}, line {line}: `{text}` looks like numbers with decimal commas; \
+         write decimal points, or separate the numbers by semicolons"
+    )]
+    DecimalComma {
+        /// The file.
+        file: String,
+        /// The line, from 1.
+        line: u64,
+        /// The text.
+        text: String,
+    },
+    /// Fewer than three numbers.
+    #[error("{file}, line {line}: {found} value(s); a point needs x, y and z")]
+    TooFewValues {
+        /// The file.
+        file: String,
+        /// The line, from 1.
+        line: u64,
+        /// Values found.
+        found: usize,
+    },
+    /// A coordinate is NaN or infinite.
+    #[error("{file}, {place}: a coordinate is {value}; remove points without a measurement")]
+    NotFinite {
+        /// The file.
+        file: String,
+        /// Where.
+        place: Place,
+        /// The value.
+        value: f64,
+    },
+    /// A coordinate beyond what the 10 nm lattice reaches.
+    #[error(
+        "{file}, {place}: a coordinate of {value_mm} mm is beyond the limit of 21474 mm; \
+         check the units, or move the part to the origin"
+    )]
+    TooFar {
+        /// The file.
+        file: String,
+        /// Where.
+        place: Place,
+        /// The coordinate.
+        value_mm: f64,
+    },
+    /// The header of a PLY file is wrong.
+    #[error("{file}, line {line}: {detail}")]
+    PlyHeader {
+        /// The file.
+        file: String,
+        /// The line, from 1.
+        line: u64,
+        /// What is wrong and what was expected.
+        detail: String,
+    },
+    /// The data of a PLY file contradict its header.
+    #[error("{file}, {place}: {detail}")]
+    PlyData {
+        /// The file.
+        file: String,
+        /// Where.
+        place: Place,
+        /// What is wrong.
+        detail: String,
+    },
+    /// The file ends before the points that its header announces.
+    #[error(
+        "{file}: ends before the {announced} {element} entries that its header announces; \
+         the file is cut off"
+    )]
+    PlyTruncated {
+        /// The file.
+        file: String,
+        /// Kind of entry.
+        element: String,
+        /// Number announced.
+        announced: u64,
+    },
+    /// Nothing to work on.
+    #[error("{file}: holds no points")]
+    NoPoints {
+        /// The file.
+        file: String,
+    },
+    /// All points lie on one line of sight.
+    #[error("{file}: its {points} point(s) all share one x and y; there is no surface")]
+    NoExtent {
+        /// The file.
+        file: String,
+        /// Number of distinct points.
+        points: usize,
+    },
+    /// More points than the caller allows.
+    #[error("{file}: more than {limit} points; thin the file, or raise the limit")]
+    TooManyPoints {
+        /// The file.
+        file: String,
+        /// The limit.
+        limit: usize,
+    },
+    /// The prescribed column pitch cannot be used.
+    #[error("column pitch {pitch_mm} mm: must be finite and at least 0.0001 mm")]
+    ColumnPitch {
+        /// The pitch.
+        pitch_mm: f64,
+    },
+}

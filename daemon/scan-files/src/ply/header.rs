@@ -1,0 +1,130 @@
+//! The raw header: bounded, and rid of lines that the PLY format does not know.
+
+use std::io::{self, BufRead, Read};
+
+use crate::error::ScanFileError;
+use crate::gather::Gather;
+
+/// Longest accepted header, bytes; real ones hold a few hundred.
+const HEADER_LIMIT: usize = 256 * 1024;
+/// Longest stretch of data without a line end, bytes, where lines are expected.
+const LINE_LIMIT: usize = 1 << 20;
+const KEYWORDS: [&str; 7] = [
+    "ply",
+    "format",
+    "comment",
+    "obj_info",
+    "element",
+    "property",
+    "end_header",
+];
+
+/// Takes the header from the reader, `end_header` included. Lines that begin with no
+/// known keyword become comments, so that line numbers stay true: scanners' programs
+/// have left words of their own there (the Stanford range scans hold three lines `bye`).
+pub(super) fn read_cleaned(
+    reader: &mut impl BufRead,
+    gather: &mut Gather<'_>,
+) -> Result<Vec<u8>, ScanFileError> {
+    let file = gather.file.to_owned();
+    let refuse = |line: u64, detail: &str| ScanFileError::PlyHeader {
+        file: file.clone(),
+        line,
+        detail: detail.to_owned(),
+    };
+    let mut header = Vec::new();
+    let mut strays = Vec::new();
+    for number in 1_u64.. {
+        let start = header.len();
+        let room = (HEADER_LIMIT - start) as u64;
+        reader
+            .by_ref()
+            .take(room)
+            .read_until(b'\n', &mut header)
+            .map_err(|source| ScanFileError::Read {
+                file: file.clone(),
+                after: format!("line {}", number - 1),
+                source,
+            })?;
+        let line = &header[start..];
+        if line.is_empty() {
+            return Err(refuse(number, "the file ends before `end_header`"));
+        }
+        if !line.ends_with(b"\n") && header.len() >= HEADER_LIMIT {
+            return Err(refuse(number, "no `end_header` within the first 256 KiB"));
+        }
+        let Ok(text) = std::str::from_utf8(line) else {
+            // Free text in an 8-bit encoding; what matters in a header is ASCII.
+            replace_by_comment(&mut header, start);
+            continue;
+        };
+        let keyword = text.split_whitespace().next().unwrap_or_default();
+        if keyword == "end_header" {
+            break;
+        }
+        if !KEYWORDS.contains(&keyword) {
+            if !keyword.is_empty() {
+                strays.push(format!("line {number} `{}`", text.trim()));
+            }
+            replace_by_comment(&mut header, start);
+        }
+    }
+    if let Some(first) = strays.first() {
+        gather.note(format!(
+            "{} header line(s) that PLY does not know were ignored, the first: {first}",
+            strays.len()
+        ));
+    }
+    Ok(header)
+}
+
+fn replace_by_comment(header: &mut Vec<u8>, start: usize) {
+    header.truncate(start);
+    header.extend_from_slice(b"comment\n");
+}
+
+/// A reader that fails, rather than filling memory, when someone asks it for lines and
+/// none ends. Binary readers, which take exact numbers of bytes, are not bounded.
+pub(super) struct BoundedLines<R> {
+    inner: R,
+    since_line_end: usize,
+}
+
+impl<R> BoundedLines<R> {
+    pub(super) fn new(inner: R) -> Self {
+        Self {
+            inner,
+            since_line_end: 0,
+        }
+    }
+}
+
+impl<R: BufRead> Read for BoundedLines<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.since_line_end = 0;
+        self.inner.read(buffer)
+    }
+}
+
+impl<R: BufRead> BufRead for BoundedLines<R> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        if self.since_line_end > LINE_LIMIT {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidData,
+                "a line of more than 1 MiB; a line holds one entry",
+            ));
+        }
+        self.inner.fill_buf()
+    }
+
+    fn consume(&mut self, amount: usize) {
+        if let Ok(piece) = self.inner.fill_buf() {
+            let taken = &piece[..amount.min(piece.len())];
+            match taken.iter().rposition(|b| *b == b'\n') {
+                Some(end) => self.since_line_end = taken.len() - end - 1,
+                None => self.since_line_end += taken.len(),
+            }
+        }
+        self.inner.consume(amount);
+    }
+}

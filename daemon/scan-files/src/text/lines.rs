@@ -1,0 +1,104 @@
+//! Lines of a text file, with any of the three line ends, and never of unbounded length.
+
+use std::io::BufRead;
+
+use crate::error::ScanFileError;
+
+/// Longest accepted line, bytes: a point with dozens of further columns fits.
+const LINE_LIMIT: usize = 16 * 1024;
+const BYTE_ORDER_MARK: &str = "\u{feff}";
+/// Ctrl-Z, the end-of-file mark that some DOS programs leave behind.
+const END_MARK: char = '\u{1a}';
+
+pub(super) struct Lines<'a, R> {
+    reader: R,
+    file: &'a str,
+    line: Vec<u8>,
+    /// Number of the current line, from 1.
+    number: u64,
+    /// Offset of the current line's first byte.
+    start: u64,
+    /// Bytes taken from the reader.
+    consumed: u64,
+    skip_line_feed: bool,
+}
+
+impl<'a, R: BufRead> Lines<'a, R> {
+    pub(super) fn new(reader: R, file: &'a str) -> Self {
+        Self {
+            reader,
+            file,
+            line: Vec::new(),
+            number: 0,
+            start: 0,
+            consumed: 0,
+            skip_line_feed: false,
+        }
+    }
+
+    /// The next line with its number, without its end and without a comment that is not
+    /// UTF-8.
+    pub(super) fn next(&mut self) -> Result<Option<(u64, &str)>, ScanFileError> {
+        self.line.clear();
+        self.start = self.consumed;
+        loop {
+            let piece = self
+                .reader
+                .fill_buf()
+                .map_err(|source| ScanFileError::Read {
+                    file: self.file.to_owned(),
+                    after: format!("line {}", self.number),
+                    source,
+                })?;
+            let Some(&first) = piece.first() else {
+                if self.line.is_empty() {
+                    return Ok(None);
+                }
+                break;
+            };
+            if std::mem::take(&mut self.skip_line_feed) && first == b'\n' {
+                self.reader.consume(1);
+                self.consumed += 1;
+                self.start = self.consumed;
+                continue;
+            }
+            let end = piece.iter().position(|b| matches!(b, b'\n' | b'\r'));
+            let content = &piece[..end.unwrap_or(piece.len())];
+            self.line.extend_from_slice(content);
+            self.skip_line_feed = end.is_some_and(|end| piece[end] == b'\r');
+            let used = content.len() + usize::from(end.is_some());
+            self.reader.consume(used);
+            self.consumed += used as u64;
+            if self.line.len() > LINE_LIMIT {
+                return Err(ScanFileError::LongLine {
+                    file: self.file.to_owned(),
+                    line: self.number + 1,
+                    limit: LINE_LIMIT,
+                });
+            }
+            if end.is_some() {
+                break;
+            }
+        }
+        self.number += 1;
+        self.decoded().map(|line| Some((self.number, line)))
+    }
+
+    fn decoded(&self) -> Result<&str, ScanFileError> {
+        let not_text = |at: usize| ScanFileError::NotText {
+            file: self.file.to_owned(),
+            byte: self.start + at as u64,
+            value: self.line.get(at).copied().unwrap_or_default(),
+        };
+        let control = |b: &u8| *b < 0x20 && !matches!(b, b'\t' | 0x0b | 0x0c | 0x1a);
+        if let Some(at) = self.line.iter().position(control) {
+            return Err(not_text(at));
+        }
+        // Comments may be in any 8-bit encoding.
+        let comment = self.line.iter().position(|b| *b == b'#');
+        let content = &self.line[..comment.unwrap_or(self.line.len())];
+        let text = std::str::from_utf8(content).map_err(|e| not_text(e.valid_up_to()))?;
+        let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
+        Ok(text.trim_end_matches(END_MARK))
+    }
+}

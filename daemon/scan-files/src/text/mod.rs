@@ -1,0 +1,67 @@
+//! Text files: `x y z` and perhaps an intensity on each line.
+
+mod fields;
+mod lines;
+
+use std::io::BufRead;
+
+use crate::error::{Place, ScanFileError};
+use crate::gather::Gather;
+use crate::units::Units;
+
+use fields::{Layout, Problem};
+use lines::Lines;
+
+pub(crate) fn parse(reader: impl BufRead, gather: &mut Gather<'_>) -> Result<(), ScanFileError> {
+    let units = gather.options.units.unwrap_or(Units::Millimetre);
+    let mut lines = Lines::new(reader, gather.file);
+    let mut layout: Option<Layout> = None;
+    let mut surplus = 0_usize;
+    while let Some((number, line)) = lines.next()? {
+        let content = line.trim();
+        if content.is_empty() {
+            continue;
+        }
+        let layout = match &mut layout {
+            Some(layout) => layout,
+            slot @ None => {
+                let header = Layout::from_header(content);
+                let is_header = header.is_some();
+                let layout = slot.insert(header.unwrap_or_default());
+                if is_header {
+                    continue;
+                }
+                layout
+            }
+        };
+        match layout.point(content) {
+            Ok(point) => {
+                surplus = surplus.max(point.surplus);
+                gather.push(point.xyz, point.intensity, units, Place::Line(number))?;
+            }
+            Err(problem) => return Err(problem.at(gather.file, number)),
+        }
+    }
+    if surplus > 0 {
+        gather.note(format!(
+            "up to {surplus} further value(s) on a line were ignored; only x, y, z{} were read",
+            if layout.is_some_and(|l| l.names_intensity()) {
+                " and the intensity"
+            } else {
+                ""
+            }
+        ));
+    }
+    Ok(())
+}
+
+impl Problem {
+    fn at(self, file: &str, line: u64) -> ScanFileError {
+        let file = file.to_owned();
+        match self {
+            Self::NotANumber(text) => ScanFileError::NotANumber { file, line, text },
+            Self::DecimalComma(text) => ScanFileError::DecimalComma { file, line, text },
+            Self::TooFew(found) => ScanFileError::TooFewValues { file, line, found },
+        }
+    }
+}
