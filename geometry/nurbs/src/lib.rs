@@ -4,12 +4,16 @@
 //! polynomials in power form, in which Shim & Lee 1995 (section V) write them to IGES
 //! as entities 112 and 114.
 
+pub mod banded;
 pub mod curve;
+pub mod fit;
 pub mod knots;
 pub mod piecewise;
 pub mod surface;
 
+pub use banded::{BandedCholesky, BandedMatrix, Singular};
 pub use curve::{BSplineCurve, ControlCountError};
+pub use fit::{Observation, TensorSpline, thirds};
 pub use knots::{Basis, KnotError, KnotVector, MAX_DEGREE};
 pub use piecewise::{PatchSurface, PiecewiseCubic, PiecewiseError, cubic_through_thirds};
 pub use surface::BSplineSurface;
