@@ -1,1 +1,6 @@
 //! CAD files: IGES written and read.
+//!
+//! Writers take any [`std::io::Write`], readers any [`std::io::Read`]; author and
+//! timestamp are arguments, so that the same model gives the same bytes.
+
+pub mod iges;

@@ -1,0 +1,224 @@
+//! A part made by hand whose areas are known in closed form: a parabolic cylinder with a
+//! round hole, and an inclined plane with a curved side, meeting at a crease.
+//!
+//! ```text
+//!   y
+//!  30 +-----------+---------\        Barrel: z = x^2 / 40
+//!     |    ___    |          \       Ramp:   z = 10 - (x - 20) / 2
+//!     |   /   \   |  Ramp     |
+//!     |   \___/   |           |      crease at x = 20
+//!     |  Barrel   |            \
+//!   0 +-----------+-------------+  x
+//!     0           20          40..45
+//! ```
+
+use nurbs::{PatchSurface, PiecewiseCubic};
+use reconstruct::{Coedge, Edge, EdgeId, EdgeKind, Face, Loop, Model, Surface, Vertex, VertexId};
+
+/// Centre and radius of the hole; its border is four cubics, round to 3e-4 of the radius.
+const HOLE: ([f64; 2], f64) = ([10.0, 15.0], 5.0);
+/// Parts into which a path is cut before it is lifted onto a curved surface.
+const LIFT_PARTS: usize = 16;
+
+/// The part.
+pub(crate) fn model() -> Model {
+    let vertices = [
+        [0.0, 0.0],
+        [20.0, 0.0],
+        [20.0, 30.0],
+        [0.0, 30.0],
+        [15.0, 15.0],
+        [45.0, 0.0],
+        [40.0, 30.0],
+    ];
+    let straight = |a: usize, b: usize, kind| {
+        let (p, q): ([f64; 2], [f64; 2]) = (vertices[a], vertices[b]);
+        let length = ((q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2)).sqrt();
+        edge(a, b, kind, PiecewiseCubic::line(p, q, length).unwrap())
+    };
+    let edges = vec![
+        straight(0, 1, EdgeKind::Silhouette),
+        straight(1, 2, EdgeKind::Crease),
+        straight(2, 3, EdgeKind::Silhouette),
+        straight(3, 0, EdgeKind::Silhouette),
+        edge(4, 4, EdgeKind::Silhouette, hole()),
+        straight(1, 5, EdgeKind::Silhouette),
+        edge(5, 6, EdgeKind::Step, side()),
+        straight(6, 2, EdgeKind::Silhouette),
+    ];
+    let barrel = patches(&[0.0, 10.0, 20.0], &[0.0, 8.0, 20.0, 30.0], |x, _| {
+        x * x / 40.0
+    });
+    let ramp = patches(&[20.0, 33.0, 46.0], &[0.0, 15.0, 30.0], |x, _| {
+        10.0 - (x - 20.0) / 2.0
+    });
+    let border = |surface: &PatchSurface, uses: &[(usize, bool)]| Loop {
+        coedges: uses
+            .iter()
+            .map(|&(id, reversed)| coedge(surface, &edges, id, reversed))
+            .collect(),
+    };
+    let faces = vec![
+        Face {
+            name: "Barrel".to_owned(),
+            region: 1,
+            outer: border(&barrel, &[(0, false), (1, false), (2, false), (3, false)]),
+            inner: vec![border(&barrel, &[(4, true)])],
+            surface: Surface::Patches(barrel),
+        },
+        Face {
+            name: "Ramp".to_owned(),
+            region: 2,
+            outer: border(&ramp, &[(5, false), (6, false), (7, false), (1, true)]),
+            inner: Vec::new(),
+            surface: Surface::Patches(ramp),
+        },
+    ];
+    let vertices = vertices
+        .iter()
+        .map(|&[x_mm, y_mm]| Vertex { x_mm, y_mm })
+        .collect();
+    Model {
+        vertices,
+        edges,
+        faces,
+    }
+}
+
+/// Areas of the faces in the order of [`model`], square millimetres: by Green's theorem,
+/// over the antiderivative in x of the surface element.
+pub(crate) fn areas_mm2() -> [f64; 2] {
+    let element = |x: f64| {
+        let slope = x / 20.0;
+        0.5 * (x * (1.0 + slope * slope).sqrt() + 20.0 * slope.asinh())
+    };
+    let border = hole();
+    let steps = 4000;
+    let (_, length) = border.domain();
+    let hole_area: f64 = (0..steps)
+        .map(|k| {
+            let t = length * (f64::from(k) + 0.5) / f64::from(steps);
+            element(border.evaluate(t)[0]) * border.derivative(t, 1)[1] * length / f64::from(steps)
+        })
+        .sum();
+    // Between x = 20 and 45 - 5 (3 t^2 - 2 t^3), t = y / 30.
+    let ramp_plan = 30.0 * 25.0 - 5.0 * 30.0 * 0.5;
+    [
+        30.0 * element(20.0) - hole_area,
+        ramp_plan * 1.25_f64.sqrt(),
+    ]
+}
+
+fn edge(start: usize, end: usize, kind: EdgeKind, path: PiecewiseCubic<2>) -> Edge {
+    Edge {
+        start: VertexId(start),
+        end: VertexId(end),
+        kind,
+        path,
+    }
+}
+
+/// The hole's border, counter-clockwise from its right-most point.
+fn hole() -> PiecewiseCubic<2> {
+    let ([x, y], r) = HOLE;
+    let kappa = 4.0 / 3.0 * (2.0_f64.sqrt() - 1.0) * r;
+    let width = r * std::f64::consts::FRAC_PI_2;
+    let mut breaks = vec![0.0];
+    let mut pieces = Vec::new();
+    for quarter in [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]] {
+        let [c, s]: [f64; 2] = quarter;
+        let turned = |a: f64, b: f64| [x + c * a - s * b, y + s * a + c * b];
+        let p = [
+            turned(r, 0.0),
+            turned(r, kappa),
+            turned(kappa, r),
+            turned(0.0, r),
+        ];
+        pieces.push([0, 1].map(|d| {
+            [
+                p[0][d],
+                3.0 * (p[1][d] - p[0][d]) / width,
+                3.0 * (p[0][d] - 2.0 * p[1][d] + p[2][d]) / (width * width),
+                (p[3][d] - 3.0 * p[2][d] + 3.0 * p[1][d] - p[0][d]) / (width * width * width),
+            ]
+        }));
+        breaks.push(width * pieces.len() as f64);
+    }
+    PiecewiseCubic::new(breaks, pieces).unwrap()
+}
+
+/// The right side of the ramp, in two pieces of one cubic.
+fn side() -> PiecewiseCubic<2> {
+    let whole = PiecewiseCubic::new(
+        vec![0.0, 30.0],
+        vec![[
+            [45.0, 0.0, -15.0 / 900.0, 10.0 / 27_000.0],
+            [0.0, 1.0, 0.0, 0.0],
+        ]],
+    )
+    .unwrap();
+    let (lower, upper) = whole.split(12.0).unwrap();
+    PiecewiseCubic::new(vec![0.0, 12.0, 30.0], [lower.pieces, upper.pieces].concat()).unwrap()
+}
+
+fn patches(u: &[f64], v: &[f64], z: impl Fn(f64, f64) -> f64) -> PatchSurface {
+    let third = |breaks: &[f64], k: usize| {
+        let piece = (k / 3).min(breaks.len() - 2);
+        let part = (k - 3 * piece) as f64 / 3.0;
+        breaks[piece] + part * (breaks[piece + 1] - breaks[piece])
+    };
+    PatchSurface::through_thirds(u.to_vec(), v.to_vec(), |i, j| z(third(u, i), third(v, j)))
+        .unwrap()
+}
+
+fn coedge(surface: &PatchSurface, edges: &[Edge], id: usize, reversed: bool) -> Coedge {
+    let path = &edges[id].path;
+    let parameter_curve = if reversed {
+        path.reversed()
+    } else {
+        path.clone()
+    };
+    let space_curve = lifted(surface, &parameter_curve);
+    Coedge {
+        edge: EdgeId(id),
+        reversed,
+        parameter_curve,
+        space_curve,
+    }
+}
+
+/// The path on the surface: x and y as they are, z by Hermite cubics.
+fn lifted(surface: &PatchSurface, path: &PiecewiseCubic<2>) -> PiecewiseCubic<3> {
+    let mut breaks = vec![path.breaks[0]];
+    let mut pieces = Vec::new();
+    for piece in path.breaks.windows(2) {
+        for part in 0..LIFT_PARTS {
+            let at = |k: usize| match k {
+                0 => piece[0],
+                LIFT_PARTS => piece[1],
+                _ => piece[0] + (piece[1] - piece[0]) * k as f64 / LIFT_PARTS as f64,
+            };
+            let (from, to) = (at(part), at(part + 1));
+            let flat = path.restricted(from, to).unwrap();
+            let [x, y] = flat.pieces[0];
+            let h = to - from;
+            let height = |s: f64| {
+                let ([px, py], [dx, dy]) = (flat.piece_value(0, s, 0), flat.piece_value(0, s, 1));
+                let slope =
+                    surface.z_partial(px, py, 1, 0) * dx + surface.z_partial(px, py, 0, 1) * dy;
+                (surface.z(px, py), slope)
+            };
+            let ((z0, d0), (z1, d1)) = (height(0.0), height(h));
+            let rise = (z1 - z0) / h;
+            let z = [
+                z0,
+                d0,
+                (3.0 * rise - 2.0 * d0 - d1) / h,
+                (d0 + d1 - 2.0 * rise) / (h * h),
+            ];
+            pieces.push([x, y, z]);
+            breaks.push(to);
+        }
+    }
+    PiecewiseCubic::new(breaks, pieces).unwrap()
+}

@@ -1,0 +1,12 @@
+//! IGES 5.3 in fixed 80-column ASCII.
+//!
+//! [`write`] turns a [`reconstruct::Model`] into trimmed surfaces (entity 144 on 142 on
+//! 114 and 112, or on 128 and 126), one per face, with name, colour and level.
+//!
+//! A file is sections of 80-column lines: Start, Global, Directory entry, Parameter
+//! data, Terminate. Column 73 tells the section, columns 74 to 80 number its lines.
+//! Every entity has two lines in the directory, which point to its parameters.
+
+mod write;
+
+pub use write::{DEFAULT_PALETTE, Entities, FaceDefect, Summary, WriteError, WriteOptions, write};

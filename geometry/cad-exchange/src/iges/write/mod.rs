@@ -1,0 +1,260 @@
+//! The writer: a model in, five sections out.
+//!
+//! Each face becomes, in this order: its surface (114 or 128); for each loop the curves
+//! of its edges in the parameter plane and in space (112 or 126), a composite of each
+//! (102) where there are several, and the curve on the surface that pairs them (142);
+//! its name (406 form 15); and the trimmed surface (144) over all of these. Colours (314)
+//! come first. So every pointer points back, and one pass numbers everything.
+
+mod check;
+mod colour;
+mod error;
+mod fields;
+mod options;
+mod shapes;
+mod sheet;
+
+use std::io;
+
+use reconstruct::{Face, Loop, Model, Surface};
+
+pub use error::{FaceDefect, WriteError};
+pub use options::{DEFAULT_PALETTE, Entities, WriteOptions};
+
+use colour::Colours;
+use shapes::{Joined, curve_status, plain_entry};
+use sheet::{ColourField, Entry, Pointer, Sheet, Status};
+
+/// Preference of 142 for the curve in space. Neighbours share it, and readers that take
+/// one curve only (Autodesk Alias among them) take this one.
+const PREFER_SPACE_CURVE: usize = 2;
+
+/// What was written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Summary {
+    /// Trimmed surfaces.
+    pub faces: usize,
+    /// Entities of all kinds.
+    pub entities: usize,
+    /// Size of the file.
+    pub bytes: usize,
+    /// The resolution in the global section, millimetres: that of the options, or the
+    /// largest gap in the model where that is larger.
+    pub resolution_mm: f64,
+}
+
+/// Writes a model as an IGES 5.3 file of trimmed surfaces.
+///
+/// The same model and options give the same bytes. Nothing is written unless the whole
+/// model can be.
+///
+/// # Errors
+/// [`WriteError::Option`] for an option that cannot stand in a file; [`WriteError::Face`]
+/// for a face that breaks a promise of [`Model`], such as an open loop or a number that
+/// is not finite; [`WriteError::Io`] when `out` fails.
+pub fn write(
+    model: &Model,
+    options: &WriteOptions,
+    out: &mut impl io::Write,
+) -> Result<Summary, WriteError> {
+    options.validate()?;
+    let resolution_mm = check::check(model, options.resolution_mm)?.max(options.resolution_mm);
+    let mut sheet = Sheet::default();
+    let colours = Colours::define(&mut sheet, model, options)?;
+    for (index, face) in model.faces.iter().enumerate() {
+        let colour = colours.of(face.region, options);
+        write_face(&mut sheet, options.entities, face, index + 1, colour)?;
+    }
+    let start = format!("{}: trimmed surfaces from a range scan", options.system);
+    let global = global_fields(model, options, resolution_mm);
+    let bytes = sheet.write(&start, &global, out)?;
+    Ok(Summary {
+        faces: model.faces.len(),
+        entities: sheet.entities(),
+        bytes,
+        resolution_mm,
+    })
+}
+
+fn write_face(
+    sheet: &mut Sheet,
+    entities: Entities,
+    face: &Face,
+    number: usize,
+    colour: ColourField,
+) -> Result<(), WriteError> {
+    let level = face.region;
+    let Surface::Patches(patches) = &face.surface;
+    let surface = shapes::surface(sheet, entities, level, patches)?;
+    let outer = write_loop(sheet, entities, level, surface, &face.outer)?;
+    let inner = face
+        .inner
+        .iter()
+        .map(|border| write_loop(sheet, entities, level, surface, border))
+        .collect::<Result<Vec<_>, _>>()?;
+
+    let mut name = sheet.begin(Entry {
+        form: 15,
+        line_font: 0,
+        ..plain_entry(406, level, Status::Dependent)
+    });
+    name.integer(1);
+    name.text(&face.name);
+    let name = name.finish()?;
+
+    let mut trimmed = sheet.begin(Entry {
+        colour,
+        label: "FACE",
+        subscript: number,
+        ..plain_entry(144, level, Status::Independent)
+    });
+    trimmed.pointer(surface);
+    // The outer border is given, not that of the surface.
+    trimmed.integer(1);
+    trimmed.integer(inner.len());
+    trimmed.pointer(outer);
+    for border in inner {
+        trimmed.pointer(border);
+    }
+    // No associativities, one property.
+    trimmed.integer(0);
+    trimmed.integer(1);
+    trimmed.pointer(name);
+    trimmed.finish()?;
+    Ok(())
+}
+
+/// Entity 142 and the curves below it.
+fn write_loop(
+    sheet: &mut Sheet,
+    entities: Entities,
+    level: u16,
+    surface: Pointer,
+    border: &Loop,
+) -> Result<Pointer, WriteError> {
+    let coedges = &border.coedges;
+    let closed = coedges.len() == 1;
+    let following = || coedges.iter().cycle().skip(1);
+    let flat = coedges
+        .iter()
+        .zip(following())
+        .map(|(coedge, next)| {
+            let end = next.parameter_curve.start();
+            let joined = Joined {
+                curve: &coedge.parameter_curve,
+                end,
+                closed,
+            };
+            shapes::curve(sheet, entities, level, &joined)
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let flat = composite(sheet, level, curve_status(2), &flat)?;
+    let spatial = coedges
+        .iter()
+        .zip(following())
+        .map(|(coedge, next)| {
+            let end = next.space_curve.start();
+            let joined = Joined {
+                curve: &coedge.space_curve,
+                end,
+                closed,
+            };
+            shapes::curve(sheet, entities, level, &joined)
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let spatial = composite(sheet, level, curve_status(3), &spatial)?;
+
+    let mut record = sheet.begin(plain_entry(142, level, Status::DependentInParameterPlane));
+    // How the curve came about is left open.
+    record.integer(0);
+    record.pointer(surface);
+    record.pointer(flat);
+    record.pointer(spatial);
+    record.integer(PREFER_SPACE_CURVE);
+    record.finish()
+}
+
+/// Entity 102 over several curves; a single one needs none.
+fn composite(
+    sheet: &mut Sheet,
+    level: u16,
+    status: Status,
+    curves: &[Pointer],
+) -> Result<Pointer, WriteError> {
+    if let &[single] = curves {
+        return Ok(single);
+    }
+    let mut record = sheet.begin(plain_entry(102, level, status));
+    record.integer(curves.len());
+    for &curve in curves {
+        record.pointer(curve);
+    }
+    record.finish()
+}
+
+/// The 26 fields of the Global section.
+fn global_fields(model: &Model, options: &WriteOptions, resolution_mm: f64) -> Vec<String> {
+    let text = |value: &str| {
+        let mut out = String::new();
+        fields::text(&mut out, value);
+        out
+    };
+    let real = |value: f64| {
+        let mut out = String::new();
+        fields::real(&mut out, value);
+        out
+    };
+    let changed = options
+        .model_timestamp
+        .as_ref()
+        .unwrap_or(&options.timestamp);
+    vec![
+        text(","),
+        text(";"),
+        text(&options.product),
+        text(&options.file_name),
+        text(&options.system),
+        text(&options.system),
+        // Bits of an integer; powers of ten and digits of single and double precision.
+        "32".to_owned(),
+        "38".to_owned(),
+        "6".to_owned(),
+        "308".to_owned(),
+        "15".to_owned(),
+        text(&options.product),
+        // Scale 1, millimetres by flag and by name.
+        real(1.0),
+        "2".to_owned(),
+        text("MM"),
+        // One line weight, of no width.
+        "1".to_owned(),
+        real(0.0),
+        text(&options.timestamp),
+        real(resolution_mm),
+        real(largest_coordinate(model)),
+        text(&options.author),
+        text(&options.organization),
+        // Version 5.3, no drafting standard.
+        "11".to_owned(),
+        "0".to_owned(),
+        text(changed),
+        // No application protocol.
+        String::new(),
+    ]
+}
+
+/// Largest absolute coordinate at the corners of all patches, millimetres.
+fn largest_coordinate(model: &Model) -> f64 {
+    let mut largest = 0.0_f64;
+    for face in &model.faces {
+        let Surface::Patches(patches) = &face.surface;
+        for &u in &patches.u_breaks {
+            for &v in &patches.v_breaks {
+                for coordinate in patches.evaluate(u, v) {
+                    largest = largest.max(coordinate.abs());
+                }
+            }
+        }
+    }
+    largest
+}

@@ -1,0 +1,251 @@
+//! Curves and surfaces as entities: 112 and 114, or 126 and 128.
+
+use nurbs::{BSplineCurve, KnotVector, PatchSurface, PiecewiseCubic};
+
+use super::error::WriteError;
+use super::options::Entities;
+use super::sheet::{ColourField, Entry, Pointer, Record, Sheet, Status};
+
+/// Joints whose derivatives differ by less than this, in millimetres, count as smooth.
+const SMOOTH_MM: f64 = 1e-9;
+
+/// Spline type "cubic" of 112 and boundary type of 114.
+const CUBIC: usize = 3;
+
+/// Coefficients of a patch by coordinate: three times sixteen.
+const PATCH_COEFFICIENTS: usize = 48;
+
+/// A curve and where it is to end: the start of the next one in the loop, so that the two
+/// agree to the last bit where the entity lists its end.
+pub(super) struct Joined<'a, const D: usize> {
+    pub(super) curve: &'a PiecewiseCubic<D>,
+    pub(super) end: [f64; D],
+    /// The curve is a loop by itself.
+    pub(super) closed: bool,
+}
+
+/// A surface that others depend on.
+pub(super) fn surface(
+    sheet: &mut Sheet,
+    entities: Entities,
+    level: u16,
+    surface: &PatchSurface,
+) -> Result<Pointer, WriteError> {
+    match entities {
+        Entities::Parametric114 => parametric_surface(sheet, level, surface),
+        Entities::Rational128 => bspline_surface(sheet, level, surface),
+    }
+}
+
+/// A curve that others depend on: in the parameter plane for two dimensions, in space for
+/// three.
+pub(super) fn curve<const D: usize>(
+    sheet: &mut Sheet,
+    entities: Entities,
+    level: u16,
+    joined: &Joined<'_, D>,
+) -> Result<Pointer, WriteError> {
+    match entities {
+        Entities::Parametric114 => parametric_curve(sheet, level, joined),
+        Entities::Rational128 => bspline_curve(sheet, level, joined),
+    }
+}
+
+/// Status of a curve below a 142.
+pub(super) fn curve_status(dimensions: usize) -> Status {
+    if dimensions == 2 {
+        Status::DependentInParameterPlane
+    } else {
+        Status::Dependent
+    }
+}
+
+pub(super) fn plain_entry(entity: u16, level: u16, status: Status) -> Entry<'static> {
+    Entry {
+        entity,
+        form: 0,
+        line_font: 1,
+        level,
+        status,
+        colour: ColourField::Number(0),
+        label: "",
+        subscript: 0,
+    }
+}
+
+/// Entity 114.
+fn parametric_surface(
+    sheet: &mut Sheet,
+    level: u16,
+    surface: &PatchSurface,
+) -> Result<Pointer, WriteError> {
+    let (columns, rows) = (surface.u_breaks.len() - 1, surface.v_breaks.len() - 1);
+    let mut record = sheet.begin(plain_entry(114, level, Status::Dependent));
+    record.integer(CUBIC);
+    // Patches of the full sixteen coefficients.
+    record.integer(1);
+    record.integer(columns);
+    record.integer(rows);
+    record.reals(&surface.u_breaks);
+    record.reals(&surface.v_breaks);
+    for (i, column) in surface.patches.chunks(rows).enumerate() {
+        for (j, z) in column.iter().enumerate() {
+            // x = u and y = v: a constant and a 1 at the power concerned.
+            coordinate(&mut record, surface.u_breaks[i], 1);
+            coordinate(&mut record, surface.v_breaks[j], 4);
+            for row in z {
+                record.reals(row);
+            }
+        }
+        unused_patch(&mut record);
+    }
+    // The standard reserves patches for the last breaks too, with values of no meaning.
+    for _ in 0..=rows {
+        unused_patch(&mut record);
+    }
+    record.finish()
+}
+
+/// Sixteen coefficients of a coordinate that equals one parameter.
+fn coordinate(record: &mut Record<'_>, start: f64, linear_at: usize) {
+    for k in 0..16 {
+        record.real(if k == 0 {
+            start
+        } else if k == linear_at {
+            1.0
+        } else {
+            0.0
+        });
+    }
+}
+
+fn unused_patch(record: &mut Record<'_>) {
+    for _ in 0..PATCH_COEFFICIENTS {
+        record.real(0.0);
+    }
+}
+
+/// Entity 128.
+fn bspline_surface(
+    sheet: &mut Sheet,
+    level: u16,
+    surface: &PatchSurface,
+) -> Result<Pointer, WriteError> {
+    let spline = surface.to_bspline(SMOOTH_MM);
+    let (u, v) = (spline.u_knots(), spline.v_knots());
+    let (columns, rows) = (u.control_count(), v.control_count());
+    let mut record = sheet.begin(plain_entry(128, level, Status::Dependent));
+    record.integer(columns - 1);
+    record.integer(rows - 1);
+    record.integer(u.degree());
+    record.integer(v.degree());
+    // Not closed in u nor in v, polynomial, not periodic in u nor in v.
+    for flag in [0, 0, 1, 0, 0] {
+        record.integer(flag);
+    }
+    record.reals(u.knots());
+    record.reals(v.knots());
+    for _ in 0..columns * rows {
+        record.real(1.0);
+    }
+    // The standard has u fastest, ours v.
+    for j in 0..rows {
+        for column in spline.points().chunks(rows) {
+            record.reals(&column[j]);
+        }
+    }
+    for domain in [u.domain(), v.domain()] {
+        record.reals(&[domain.0, domain.1]);
+    }
+    record.finish()
+}
+
+/// Entity 112.
+fn parametric_curve<const D: usize>(
+    sheet: &mut Sheet,
+    level: u16,
+    joined: &Joined<'_, D>,
+) -> Result<Pointer, WriteError> {
+    let Joined { curve, end, .. } = joined;
+    let mut record = sheet.begin(plain_entry(112, level, curve_status(D)));
+    record.integer(CUBIC);
+    record.integer(continuity(curve.to_bspline(SMOOTH_MM).knots()));
+    record.integer(D);
+    record.integer(curve.pieces.len());
+    record.reals(&curve.breaks);
+    for piece in &curve.pieces {
+        for coordinate in piece {
+            record.reals(coordinate);
+        }
+        // A plane curve lies in z = 0.
+        for _ in D..3 {
+            record.reals(&[0.0; 4]);
+        }
+    }
+    // The end point and its derivatives, divided by the factorials of their orders.
+    let last = curve.pieces.len() - 1;
+    let width = curve.breaks[last + 1] - curve.breaks[last];
+    let [first, second, third] = [1, 2, 3].map(|order| curve.piece_value(last, width, order));
+    for d in 0..3 {
+        if d < D {
+            record.reals(&[end[d], first[d], second[d] / 2.0, third[d] / 6.0]);
+        } else {
+            record.reals(&[0.0; 4]);
+        }
+    }
+    record.finish()
+}
+
+/// 0, 1 or 2: what the joints of a cubic spline with these knots keep.
+fn continuity(knots: &KnotVector) -> usize {
+    let inner = knots
+        .knots()
+        .get(knots.degree() + 1..knots.control_count())
+        .unwrap_or_default();
+    let repeated = inner
+        .chunk_by(|a, b| a == b)
+        .map(<[f64]>::len)
+        .max()
+        .unwrap_or(1);
+    knots.degree().saturating_sub(repeated)
+}
+
+/// Entity 126.
+fn bspline_curve<const D: usize>(
+    sheet: &mut Sheet,
+    level: u16,
+    joined: &Joined<'_, D>,
+) -> Result<Pointer, WriteError> {
+    let spline: BSplineCurve<D> = joined.curve.to_bspline(SMOOTH_MM);
+    let knots = spline.knots();
+    let count = knots.control_count();
+    let planar = D == 2;
+    let mut record = sheet.begin(plain_entry(126, level, curve_status(D)));
+    record.integer(count - 1);
+    record.integer(knots.degree());
+    record.integer(usize::from(planar));
+    record.integer(usize::from(joined.closed));
+    // Polynomial, not periodic.
+    record.integer(1);
+    record.integer(0);
+    record.reals(knots.knots());
+    for _ in 0..count {
+        record.real(1.0);
+    }
+    for (index, point) in spline.points().iter().enumerate() {
+        let point = if index + 1 == count {
+            &joined.end
+        } else {
+            point
+        };
+        record.reals(point);
+        for _ in D..3 {
+            record.real(0.0);
+        }
+    }
+    let (first, last) = knots.domain();
+    record.reals(&[first, last]);
+    // Normal of the plane, zero where there is none.
+    record.reals(&[0.0, 0.0, if planar { 1.0 } else { 0.0 }]);
+    record.finish()
+}
