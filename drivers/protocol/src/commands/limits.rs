@@ -1,5 +1,6 @@
 //! Asking what the device can do.
 
+use crate::commands::ScanPlan;
 use crate::message::Request;
 use crate::wire::message;
 
@@ -36,6 +37,9 @@ message! {
         min_dead_man_ms: u16,
         /// Longest dead-man time, milliseconds.
         max_dead_man_ms: u16,
+        /// A scan of all that the device has in view, at its own pace and pitch: what a host
+        /// asks for that has no wishes.
+        proposed: ScanPlan,
     }
 }
 
