@@ -1,0 +1,56 @@
+//! `relief jobs`.
+
+use relief_api::{Job, JobList, path};
+
+use crate::failure::Failure;
+use crate::output;
+use crate::service::{Client, EndpointArgs};
+
+/// List the jobs, newest first
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    endpoint: EndpointArgs,
+}
+
+pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
+    let client = Client::new(args.endpoint.endpoint());
+    let jobs: JobList = client.get(path::JOBS).await?;
+    output::either(json, &jobs, told)
+}
+
+fn told(list: &JobList) -> String {
+    if list.jobs.is_empty() {
+        return "no jobs yet".into();
+    }
+    let lines = list.jobs.iter().map(|job| {
+        vec![
+            job.id.to_string(),
+            job.scan.clone(),
+            job.name.clone(),
+            seconds(job),
+            state(job),
+        ]
+    });
+    output::table(&["JOB", "SCAN", "NAME", "SECONDS", "STATE"], &[0, 3], lines)
+}
+
+fn seconds(job: &Job) -> String {
+    if job.timings.is_empty() {
+        return String::new();
+    }
+    format!(
+        "{:.2}",
+        job.timings.iter().map(|timing| timing.seconds).sum::<f64>()
+    )
+}
+
+fn state(job: &Job) -> String {
+    let state = job.state.as_str();
+    match (&job.error, &job.hint, &job.stage) {
+        (Some(error), Some(hint), _) => format!("{state}: {error}; {hint}"),
+        (Some(error), None, _) => format!("{state}: {error}"),
+        (None, _, Some(stage)) => format!("{state}: {stage}"),
+        (None, _, None) => state.to_owned(),
+    }
+}

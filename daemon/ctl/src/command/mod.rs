@@ -1,0 +1,44 @@
+//! The commands, one small file each.
+
+pub(crate) mod abort;
+pub(crate) mod cancel;
+pub(crate) mod fetch;
+pub(crate) mod jobs;
+pub(crate) mod rerun;
+pub(crate) mod retry;
+pub(crate) mod scan;
+pub(crate) mod scans;
+mod setting;
+pub(crate) mod status;
+pub(crate) mod watch;
+
+use std::future::Future;
+
+use crate::cli::{Command, Invocation};
+use crate::failure::Failure;
+
+/// Runs what the user asked for.
+pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
+    let json = invocation.json;
+    match invocation.command {
+        Command::Scan(args) => block_on(scan::run(args, json)),
+        Command::Abort(args) => block_on(abort::run(args, json)),
+        Command::Status(args) => block_on(status::run(args, json)),
+        Command::Scans(args) => block_on(scans::run(args, json)),
+        Command::Jobs(args) => block_on(jobs::run(args, json)),
+        Command::Retry(args) => block_on(retry::run(args, json)),
+        Command::Cancel(args) => block_on(cancel::run(args, json)),
+        Command::Rerun(args) => block_on(rerun::run(args, json)),
+        Command::Watch(args) => block_on(watch::run(args, json)),
+        Command::Fetch(args) => block_on(fetch::run(args, json)),
+    }
+}
+
+/// Runs a client; one thread is plenty for it.
+fn block_on(work: impl Future<Output = Result<(), Failure>>) -> Result<(), Failure> {
+    tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|error| Failure::at("cannot start the runtime", &error))?
+        .block_on(work)
+}

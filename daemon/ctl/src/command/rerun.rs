@@ -1,0 +1,60 @@
+//! `relief rerun`.
+
+use relief_api::{Job, Rerun, path};
+
+use super::setting::{self, Setting};
+use crate::failure::Failure;
+use crate::follow;
+use crate::output;
+use crate::service::{Client, EndpointArgs};
+
+/// Process a kept scan again, with other settings if wanted
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// The scan, as `relief scans` lists it
+    #[arg(value_name = "SCAN")]
+    scan: String,
+    /// A setting that differs, keyed as in the configuration, such as regrid.neighbours=25;
+    /// may be given several times
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = setting::parse)]
+    settings: Vec<Setting>,
+    /// Name of the new deliverables, instead of the scan's name
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "",
+        hide_default_value = true
+    )]
+    name: String,
+    /// Stay until the deliverables are published
+    #[arg(long)]
+    wait: bool,
+    #[command(flatten)]
+    endpoint: EndpointArgs,
+}
+
+pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
+    let client = Client::new(args.endpoint.endpoint());
+    let events = if args.wait {
+        Some(client.events().await?)
+    } else {
+        None
+    };
+    let request = Rerun {
+        name: args.name,
+        settings: setting::overrides(args.settings),
+    };
+    let mut job: Job = client.post(&path::scan_rerun(&args.scan), &request).await?;
+    if let Some(events) = events {
+        job = follow::job(&client, events, job.id).await?;
+    }
+    output::either(json, &job, |job| match &job.directory {
+        Some(directory) => directory.clone(),
+        None => format!(
+            "job {} of scan {}: {}",
+            job.id,
+            job.scan,
+            job.state.as_str()
+        ),
+    })
+}

@@ -1,0 +1,141 @@
+//! `relief scan`.
+
+use relief_api::{Job, PlanRequest, Scan, StartScan, path};
+use serde::Serialize;
+
+use super::setting::{self, Setting};
+use crate::failure::Failure;
+use crate::follow;
+use crate::output;
+use crate::service::{Client, EndpointArgs};
+
+/// Start a scan
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Names the deliverables
+    #[arg(long, value_name = "NAME", default_value = "scan")]
+    name: String,
+    /// Who measures; carried into the report
+    #[arg(
+        long,
+        value_name = "TEXT",
+        default_value = "",
+        hide_default_value = true
+    )]
+    operator: String,
+    /// The part measured, such as its number; carried into the report
+    #[arg(
+        long,
+        value_name = "TEXT",
+        default_value = "",
+        hide_default_value = true
+    )]
+    part: String,
+    /// Anything else; carried into the report
+    #[arg(
+        long,
+        value_name = "TEXT",
+        default_value = "",
+        hide_default_value = true
+    )]
+    note: String,
+    /// Stay until the deliverables are published
+    #[arg(long)]
+    wait: bool,
+    /// A processing setting that differs, keyed as in the configuration, such as
+    /// regrid.neighbours=25; may be given several times
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = setting::parse)]
+    settings: Vec<Setting>,
+    #[command(flatten)]
+    plan: PlanArgs,
+    #[command(flatten)]
+    endpoint: EndpointArgs,
+}
+
+/// What to measure, where it differs from the configured plan.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "What to measure, if not as configured")]
+struct PlanArgs {
+    /// x of the first column, millimetres
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    x_first_mm: Option<f64>,
+    /// x beyond which no column lies, millimetres
+    #[arg(
+        long,
+        value_name = "MM",
+        allow_negative_numbers = true,
+        conflicts_with = "columns"
+    )]
+    x_last_mm: Option<f64>,
+    /// Distance of neighbouring columns, millimetres
+    #[arg(long, value_name = "MM")]
+    column_pitch_mm: Option<f64>,
+    /// Number of columns
+    #[arg(long, value_name = "N")]
+    columns: Option<u32>,
+    /// Angle of the lowest ray, degrees
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    angle_first_deg: Option<f64>,
+    /// Angle of the highest ray, degrees
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    angle_last_deg: Option<f64>,
+    /// Rays in a column
+    #[arg(long, value_name = "N")]
+    samples: Option<u16>,
+    /// Exposure of a sample, microseconds
+    #[arg(long, value_name = "US")]
+    exposure_us: Option<u32>,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Told {
+    scan: Scan,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    job: Option<Job>,
+}
+
+pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
+    let client = Client::new(args.endpoint.endpoint());
+    // Listening begins before the scan, so that none of its events is missed.
+    let events = if args.wait {
+        Some(client.events().await?)
+    } else {
+        None
+    };
+    let plan = args.plan;
+    let request = StartScan {
+        name: args.name,
+        part: args.part,
+        operator: args.operator,
+        note: args.note,
+        plan: PlanRequest {
+            x_first_mm: plan.x_first_mm,
+            x_last_mm: plan.x_last_mm,
+            pitch_mm: plan.column_pitch_mm,
+            columns: plan.columns,
+            angle_first_deg: plan.angle_first_deg,
+            angle_last_deg: plan.angle_last_deg,
+            samples: plan.samples,
+            exposure_us: plan.exposure_us,
+        },
+        settings: setting::overrides(args.settings),
+    };
+    let scan: Scan = client.post(path::SCANS, &request).await?;
+    let told = match events {
+        None => Told { scan, job: None },
+        Some(events) => {
+            let followed = follow::scan(&client, events, &scan.id).await?;
+            Told {
+                scan: followed.scan,
+                job: Some(followed.job),
+            }
+        }
+    };
+    output::either(json, &told, |told| {
+        match told.job.as_ref().and_then(|job| job.directory.as_ref()) {
+            Some(directory) => directory.clone(),
+            None => told.scan.id.clone(),
+        }
+    })
+}

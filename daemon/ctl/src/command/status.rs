@@ -1,0 +1,59 @@
+//! `relief status`.
+
+use relief_api::{ScannerLink, Status, path};
+
+use crate::failure::Failure;
+use crate::output::{self, counted};
+use crate::service::{Client, EndpointArgs};
+
+/// Show the service, its scanner and what is under way
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    endpoint: EndpointArgs,
+}
+
+pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
+    let client = Client::new(args.endpoint.endpoint());
+    let status: Status = client.get(path::STATUS).await?;
+    output::either(json, &status, told)
+}
+
+fn told(status: &Status) -> String {
+    let scanner = &status.scanner;
+    let link = match scanner.link {
+        ScannerLink::Unknown => "not spoken to yet",
+        ScannerLink::Ready => "ready",
+        ScannerLink::Scanning => "scanning",
+        ScannerLink::Trouble => "in trouble",
+    };
+    let model = scanner.model.as_deref().unwrap_or("unknown model");
+    let serial = scanner
+        .serial
+        .as_ref()
+        .map_or(String::new(), |serial| format!(" {serial}"));
+    let mut lines = vec![
+        format!(
+            "service   reliefd {}, since {}",
+            status.version, status.started_at
+        ),
+        format!("scanner   {link}: {model}{serial} at {}", scanner.endpoint),
+    ];
+    if let Some(problem) = &scanner.problem {
+        lines.push(format!("          {problem}"));
+    }
+    lines.push(match &status.scan {
+        Some(scan) => format!(
+            "scan      {} ({}): {} of {} columns",
+            scan.id, scan.name, scan.columns, scan.columns_planned
+        ),
+        None => "scan      none".into(),
+    });
+    lines.push(format!(
+        "jobs      {} running, {} waiting",
+        status.jobs_running,
+        counted(status.jobs_queued, "job")
+    ));
+    lines.push(format!("spool     {}", status.spool));
+    lines.join("\n")
+}

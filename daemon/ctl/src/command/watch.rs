@@ -1,0 +1,118 @@
+//! `relief watch`.
+
+use std::io::Write;
+
+use relief_api::Event;
+
+use crate::failure::Failure;
+use crate::output;
+use crate::service::{Client, EndpointArgs};
+
+/// Show what the service does, as it happens, until Ctrl-C
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// End after this many events
+    #[arg(long, value_name = "N")]
+    count: Option<u64>,
+    #[command(flatten)]
+    endpoint: EndpointArgs,
+}
+
+pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
+    let client = Client::new(args.endpoint.endpoint());
+    let mut events = client.events().await?;
+    let mut told = 0;
+    let ended = loop {
+        if args.count.is_some_and(|count| told >= count) {
+            break Ok(());
+        }
+        let event = tokio::select! {
+            event = events.next() => event?,
+            _ = tokio::signal::ctrl_c() => break Ok(()),
+        };
+        match event {
+            Some(event) if json => element(&event, told == 0)?,
+            Some(event) => output::text(&line(&event))?,
+            None => break Err(Failure::Failed("the service has ended".into())),
+        }
+        told += 1;
+    };
+    if json {
+        output::text(if told == 0 { "[]" } else { "\n]" })?;
+    }
+    ended
+}
+
+/// One element of the array that the whole watch prints, on a line of its own.
+fn element(event: &Event, first: bool) -> Result<(), Failure> {
+    let rendered = serde_json::to_string(event).map_err(std::io::Error::other);
+    let mut out = std::io::stdout().lock();
+    rendered
+        .and_then(|text| write!(out, "{}{text}", if first { "[\n" } else { ",\n" }))
+        .and_then(|()| out.flush())
+        .map_err(Failure::Output)
+}
+
+fn line(event: &Event) -> String {
+    match event {
+        Event::Status(status) => format!(
+            "reliefd {}, scanner at {}, {} running and {} waiting jobs",
+            status.version, status.scanner.endpoint, status.jobs_running, status.jobs_queued
+        ),
+        Event::Scan(scan) => {
+            let reason = scan
+                .reason
+                .as_ref()
+                .map_or(String::new(), |reason| format!(": {reason}"));
+            format!(
+                "scan {} ({}): {}{reason}",
+                scan.id,
+                scan.name,
+                scan.state.as_str()
+            )
+        }
+        Event::Column {
+            scan,
+            columns,
+            columns_planned,
+            samples,
+            x_mm,
+            ..
+        } => {
+            format!(
+                "scan {scan}: column {columns}/{columns_planned} at x {x_mm:.3} mm, {samples} samples"
+            )
+        }
+        Event::Job(job) => {
+            let error = job
+                .error
+                .as_ref()
+                .map_or(String::new(), |error| format!(": {error}"));
+            format!(
+                "job {} of scan {}: {}{error}",
+                job.id,
+                job.scan,
+                job.state.as_str()
+            )
+        }
+        Event::Progress {
+            job,
+            stage,
+            fraction,
+            seconds,
+            ..
+        } => match seconds {
+            Some(seconds) => format!("job {job}: {stage} done in {seconds:.3} s"),
+            None => format!("job {job}: {stage} {:.0} %", fraction * 100.0),
+        },
+        Event::Published {
+            job,
+            directory,
+            files,
+            ..
+        } => {
+            format!("job {job}: published {directory} ({})", files.join(", "))
+        }
+        Event::Lagged { missed } => format!("({missed} events were lost: too slow a reader)"),
+    }
+}
