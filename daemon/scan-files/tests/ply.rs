@@ -112,7 +112,7 @@ fn decimal_text_is_not_rounded_to_single_precision() {
         text += &format!("1234.56789 {y} 0 98.76543\n");
     }
     let scan = read(text.as_bytes()).unwrap();
-    assert!((scan.columns[0].x_mm - 1234.567_89).abs() < 1e-9);
+    assert!((scan.columns[0].x_mm - 1_234.567_89).abs() < 1e-9);
     assert!((scan.columns[0].samples[3].z_mm - 98.765_43).abs() < 1e-9);
 }
 

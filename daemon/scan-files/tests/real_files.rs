@@ -10,7 +10,7 @@ fn scan(name: &str, units: Option<Units>) -> Option<PointScan> {
         units,
         ..ReadOptions::default()
     };
-    Some(read(&real(name)?, &options).unwrap())
+    Some(read(&real(name)?, &options).expect(name))
 }
 
 #[test]

@@ -12,8 +12,8 @@ pub(crate) fn read_text(text: &str) -> Result<PointScan, ScanFileError> {
 
 pub(crate) fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
-    encoder.write_all(bytes).unwrap();
-    encoder.finish().unwrap()
+    encoder.write_all(bytes).expect("a Vec takes any bytes");
+    encoder.finish().expect("a Vec takes any bytes")
 }
 
 /// The lines in another order, by a linear congruence keyed by the seed.
