@@ -1,1 +1,35 @@
-//! Range images to regions of one surface each.
+//! Range images to regions of one surface each: section II.2 of Shim & Lee 1995, *Conversion
+//! of the range data into the CAD format*.
+//!
+//! 1. A unit normal at each node from a plane through the 5 x 5 nodes around ([`normals`]).
+//! 2. Six features (x, y, z and the normal) of like variance; squared-error clustering.
+//! 3. Connected components within clusters; slivers go to the neighbour that explains them.
+//! 4. Neighbours whose common border is neither crease nor step become one region.
+//!
+//! A *crease* is a change of direction across a border, a *step* a jump of z. Both are
+//! measured between the two surfaces, each fitted a little inside its own region and carried
+//! on to the border, since what lies on the border itself mixes both sides.
+//!
+//! Faces narrower than about seven nodes cannot be told from the mixture of their neighbours
+//! and are given to these.
+
+mod cluster;
+mod components;
+mod crease;
+mod features;
+mod fill;
+mod grid;
+mod local_fit;
+mod merge;
+mod noise;
+mod normals;
+mod regrow;
+mod scene;
+mod segmentation;
+mod settings;
+
+pub use normals::{Normals, Window, normals};
+pub use segmentation::{
+    MAX_Z_MM, Report, SegmentError, Segmentation, segment, segment_with_report,
+};
+pub use settings::{Method, SegmentSettings, SettingsError};

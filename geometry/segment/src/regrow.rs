@@ -1,0 +1,177 @@
+//! Nodes without a region join the one whose surface, carried on, explains them best.
+
+use crate::components::depths;
+use crate::local_fit::{LocalFit, Sums};
+use crate::scene::{FIT_REACH, NONE, Scene};
+use range_image::{Cancelled, Monitor};
+
+/// So many links away from labelled nodes, surfaces are carried on before they are fitted anew.
+const LAYERS: u8 = 4;
+/// Width of the band on either side of a border that is decided anew, nodes.
+const BAND: u8 = 3;
+/// A region keeps its nodes when fewer than this lie deeper than the band.
+const LEAST_CORE: usize = 25;
+/// At most this many regions compete for a node.
+const RIVALS: usize = 4;
+
+/// The regions that may take a node, best first; [`NONE`] fills up.
+type Ranking = [u32; RIVALS];
+
+/// Takes all nodes near borders that are no steps from their regions and has them decided
+/// again by the surfaces behind the borders.
+pub(crate) fn redraw_borders(
+    scene: &Scene<'_>,
+    labels: &mut [u32],
+    monitor: &dyn Monitor,
+) -> Result<(), Cancelled> {
+    let depths = depths(&scene.grid, labels, BAND);
+    let most = labels.iter().copied().max().unwrap_or(NONE) as usize;
+    let mut cores = vec![0_usize; most + 1];
+    for (&label, &depth) in labels.iter().zip(&depths) {
+        cores[label as usize] += usize::from(depth >= BAND);
+    }
+    for (label, depth) in labels.iter_mut().zip(depths) {
+        if depth < BAND && cores[*label as usize] >= LEAST_CORE {
+            *label = NONE;
+        }
+    }
+    regrow(scene, labels, monitor)
+}
+
+/// Labels every node that links join to a labelled one.
+pub(crate) fn regrow(
+    scene: &Scene<'_>,
+    labels: &mut [u32],
+    monitor: &dyn Monitor,
+) -> Result<(), Cancelled> {
+    loop {
+        monitor.check()?;
+        let open = front(scene, labels);
+        if open.is_empty() {
+            return Ok(());
+        }
+        let mut rankings = vec![[NONE; RIVALS]; open.len()];
+        let mut sums = Vec::new();
+        for (ranking, &node) in rankings.iter_mut().zip(&open) {
+            scene.sums_around(labels, node, FIT_REACH, |_| true, &mut sums);
+            *ranking = rank(scene, &sums);
+        }
+        settle(scene, labels, &open, &rankings);
+    }
+}
+
+/// The unlabelled nodes within [`LAYERS`] links of labelled ones, in the order of nodes.
+fn front(scene: &Scene<'_>, labels: &[u32]) -> Vec<usize> {
+    let mut layer = vec![0_u8; labels.len()];
+    let mut reached: Vec<usize> = Vec::new();
+    for (node, &label) in labels.iter().enumerate() {
+        if label == NONE && scene.links.linked(node).any(|n| labels[n] != NONE) {
+            layer[node] = 1;
+            reached.push(node);
+        }
+    }
+    let mut next = 0;
+    while let Some(&node) = reached.get(next) {
+        next += 1;
+        if layer[node] == LAYERS {
+            continue;
+        }
+        for n in scene.links.linked(node) {
+            if labels[n] == NONE && layer[n] == 0 {
+                layer[n] = layer[node] + 1;
+                reached.push(n);
+            }
+        }
+    }
+    reached.sort_unstable();
+    reached
+}
+
+/// First lets every node join its best region, in as many layers as it takes; then one layer
+/// of the rest its next best within reach, and so on. At least one node is labelled.
+fn settle(scene: &Scene<'_>, labels: &mut [u32], open: &[usize], rankings: &[Ranking]) {
+    let mut waiting: Vec<usize> = (0..open.len()).collect();
+    let mut joins = Vec::new();
+    loop {
+        let mut choose = |labels: &mut [u32], waiting: &mut Vec<usize>, strict: bool| {
+            joins.clear();
+            waiting.retain(|&k| {
+                let node = open[k];
+                let beside = |label: u32| scene.links.linked(node).any(|n| labels[n] == label);
+                let ranking = &rankings[k];
+                let choice = if strict {
+                    Some(ranking[0]).filter(|&l| l != NONE && beside(l))
+                } else {
+                    ranking
+                        .iter()
+                        .copied()
+                        .find(|&l| l != NONE && beside(l))
+                        .or_else(|| nearest_in_z(scene, labels, node))
+                };
+                if let Some(label) = choice {
+                    joins.push((node, label));
+                }
+                choice.is_none()
+            });
+            for &(node, label) in &joins {
+                labels[node] = label;
+            }
+            !joins.is_empty()
+        };
+        while choose(labels, &mut waiting, true) {}
+        if !choose(labels, &mut waiting, false) {
+            return;
+        }
+    }
+}
+
+/// For nodes where no surface can be fitted.
+fn nearest_in_z(scene: &Scene<'_>, labels: &[u32], node: usize) -> Option<u32> {
+    let z = scene.grid.z_mm;
+    scene
+        .links
+        .linked(node)
+        .filter(|&n| labels[n] != NONE)
+        .min_by(|&a, &b| (z[a] - z[node]).abs().total_cmp(&(z[b] - z[node]).abs()))
+        .map(|n| labels[n])
+}
+
+/// Orders the regions around a node by how well they explain it; the node is the origin.
+fn rank(scene: &Scene<'_>, sums: &[Sums]) -> Ranking {
+    let mut rivals: Vec<(f64, u32, LocalFit)> = sums
+        .iter()
+        .filter_map(|sums| {
+            let fit = sums.fit()?;
+            Some((miss_mm(scene, &fit), sums.label, fit))
+        })
+        .collect();
+    rivals.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    if let [first, second, ..] = rivals.as_slice()
+        && second.0 < scene.step_mm
+        && beyond_intersection(&first.2, &second.2)
+    {
+        rivals.swap(0, 1);
+    }
+    let mut ranking = [NONE; RIVALS];
+    for (slot, rival) in ranking.iter_mut().zip(rivals) {
+        *slot = rival.1;
+    }
+    ranking
+}
+
+/// How far the node lies off the surface, millimetres square to it.
+fn miss_mm(scene: &Scene<'_>, fit: &LocalFit) -> f64 {
+    fit.z_mm(0.0, 0.0).abs() * fit.normal(scene.grid.pitch_mm, 0.0, 0.0)[2]
+}
+
+/// Whether the node lies on the second's side of the line where two surfaces meet.
+///
+/// The node's own noise has no say in this, so borders along creases come out straight.
+fn beyond_intersection(first: &LocalFit, second: &LocalFit) -> bool {
+    let lead = |u: f64, v: f64| first.z_mm(u, v) - second.z_mm(u, v);
+    // Halfway to where the nodes are: far enough to tell, near enough to trust.
+    let at_first = lead(0.5 * first.centroid[0], 0.5 * first.centroid[1]);
+    let at_second = lead(0.5 * second.centroid[0], 0.5 * second.centroid[1]);
+    let here = lead(0.0, 0.0);
+    at_first * at_second < 0.0 && here * at_second > 0.0
+}

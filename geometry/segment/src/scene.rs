@@ -1,0 +1,91 @@
+//! What all stages after the clustering share: the grid, its links and the local scale.
+
+use crate::grid::{Grid, Links};
+use crate::local_fit::Sums;
+
+/// Label of a node that belongs to no region (yet).
+pub(crate) const NONE: u32 = 0;
+
+/// Half the side of the window of local fits, pitches.
+pub(crate) const FIT_REACH: usize = 6;
+
+/// Weight of a node beside another label, where a misplaced border may have put it on the
+/// wrong side: enough to hold a fit that has no other nodes, little otherwise.
+const BORDER_WEIGHT: f64 = 0.05;
+
+#[derive(Debug)]
+pub(crate) struct Scene<'a> {
+    pub(crate) grid: Grid<'a>,
+    pub(crate) links: Links,
+    /// Measured noise of z.
+    pub(crate) noise_mm: f64,
+    /// Jump square to the surface that counts as a step.
+    pub(crate) step_mm: f64,
+    /// Change of direction that counts as a crease.
+    pub(crate) crease_rad: f64,
+}
+
+impl Scene<'_> {
+    /// Change of direction to expect from noise alone where two local fits of this reach
+    /// meet: with [`FIT_REACH`], slopes at the edge of half a window are some 0.3 noises per
+    /// pitch off, so by both together 0.4. It goes with the number of nodes and their spread.
+    pub(crate) fn turn_noise_rad(&self, reach: usize) -> f64 {
+        let scale = FIT_REACH as f64 / reach as f64;
+        0.4 * scale * scale * self.noise_mm / self.grid.pitch_mm
+    }
+
+    /// Sums of the labels in the window around a node, in the order they are met, those that
+    /// `wanted` lets through. z is counted from the middle node's.
+    pub(crate) fn sums_around(
+        &self,
+        labels: &[u32],
+        node: usize,
+        reach: usize,
+        wanted: impl Fn(u32) -> bool,
+        found: &mut Vec<Sums>,
+    ) {
+        found.clear();
+        let grid = &self.grid;
+        let (column, row) = grid.column_row(node);
+        let (columns, rows) = grid.window(node, reach);
+        let z0 = grid.z_mm[node];
+        for c in columns {
+            for r in rows.clone() {
+                let k = c * grid.rows + r;
+                let label = labels[k];
+                if label == NONE || !wanted(label) {
+                    continue;
+                }
+                let slot = match found.iter().position(|s| s.label == label) {
+                    Some(slot) => slot,
+                    None => {
+                        found.push(Sums::new(label));
+                        found.len() - 1
+                    }
+                };
+                let weight = if self.is_inside(labels, k) {
+                    1.0
+                } else {
+                    BORDER_WEIGHT
+                };
+                found[slot].add(
+                    c as f64 - column as f64,
+                    r as f64 - row as f64,
+                    grid.z_mm[k] - z0,
+                    weight,
+                );
+            }
+        }
+    }
+
+    /// Whether no 4-neighbour has another label.
+    fn is_inside(&self, labels: &[u32], node: usize) -> bool {
+        let own = labels[node];
+        let (column, row) = self.grid.column_row(node);
+        let same = |node: usize| labels[node] == own || labels[node] == NONE;
+        (row == 0 || same(node - 1))
+            && (row + 1 == self.grid.rows || same(node + 1))
+            && (column == 0 || same(node - self.grid.rows))
+            && (column + 1 == self.grid.columns || same(node + self.grid.rows))
+    }
+}
