@@ -1,1 +1,26 @@
 //! The driver of the slide-table scanner: session, retries, column stream, transports.
+//!
+//! [`Scanner`] is what the rest of the program sees. [`SerialScanner`] is a scanner on a
+//! serial line: a thread of its own owns the port, and [`session::Session`] decides what
+//! goes over it; the session knows neither ports nor clocks. [`LinkScanner`] does the same
+//! over any [`transport::Transport`].
+
+pub mod limits;
+pub mod session;
+pub mod transport;
+
+mod error;
+mod link;
+mod scanner;
+mod settings;
+
+pub use error::ScannerError;
+pub use link::{LinkScanner, SerialScanner};
+pub use scanner::{
+    Acknowledger, DeviceStatus, LineCounts, RawColumn, RawSample, ScanInfo, ScanStream, Scanner,
+    StreamControl, StreamItem,
+};
+pub use settings::LinkSettings;
+pub use transport::serial::SerialSettings;
+
+pub use scanner_protocol as protocol;

@@ -10,7 +10,7 @@ message! {
     ScanEnd = 0xc4 {
         /// The scan's number.
         scan_id: u16,
-        /// Columns measured: indices 0 to this less one.
+        /// Columns measured and sent: indices 0 to this less one.
         columns: u32,
         /// Why it ended.
         reason: ScanEndReason,

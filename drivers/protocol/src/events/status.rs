@@ -25,7 +25,7 @@ message! {
         temperature_cdegc: i16,
         /// The scan that runs, or that ran last and is not closed.
         scan_id: u16,
-        /// Columns of it measured so far.
+        /// Columns of it sent so far: how many column ends have left at least once.
         columns: u32,
     }
 }

@@ -1,0 +1,155 @@
+//! What can go wrong between the host and a scanner, in words for its user.
+
+use std::time::Duration;
+
+use scanner_protocol::{Faults, RejectReason};
+
+/// Why a scanner did not do what was asked.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ScannerError {
+    /// There is no such port.
+    #[error(
+        "there is no port {port}: is the scanner plugged in and switched on? \
+         `relief doctor` lists the ports there are"
+    )]
+    NoSuchPort {
+        /// The port's path.
+        port: String,
+    },
+    /// Another program has the port.
+    #[error("the port {port} is in use by {}", .holder.as_deref().unwrap_or("another program"))]
+    PortBusy {
+        /// The port's path.
+        port: String,
+        /// Name and process id of the program, where it could be found out.
+        holder: Option<String>,
+    },
+    /// The port may not be opened.
+    #[error(
+        "no permission to open {port}: it belongs to the group `{group}`; \
+         add the user of this program to that group and log in again"
+    )]
+    Permission {
+        /// The port's path.
+        port: String,
+        /// The group that may open it, by name or number.
+        group: String,
+    },
+    /// The path is not a serial port.
+    #[error("{port} is not a serial port")]
+    NotAPort {
+        /// The path.
+        port: String,
+    },
+    /// The operating system refused.
+    #[error("{port}: {message}")]
+    Port {
+        /// The port's path.
+        port: String,
+        /// What the operating system says.
+        message: String,
+    },
+    /// Something answers, but it is no scanner of ours.
+    #[error("{port} answers, but not as a scanner: {heard}")]
+    WrongDevice {
+        /// The port's path.
+        port: String,
+        /// What came instead.
+        heard: String,
+    },
+    /// The device speaks other versions of the protocol.
+    #[error(
+        "the scanner speaks versions {device_min} to {device_max} of the protocol, this program \
+         {host_min} to {host_max}: renew the older of the two"
+    )]
+    Version {
+        /// The device's oldest version.
+        device_min: u8,
+        /// The device's newest version.
+        device_max: u8,
+        /// This program's oldest version.
+        host_min: u8,
+        /// This program's newest version.
+        host_max: u8,
+    },
+    /// Nothing came in time.
+    #[error("{port}: no {awaited} from the scanner within {} s", .after.as_secs_f64())]
+    Timeout {
+        /// The port's path.
+        port: String,
+        /// What was awaited.
+        awaited: &'static str,
+        /// How long.
+        after: Duration,
+    },
+    /// The device refused a command.
+    #[error("the scanner refused to {command}: {reason}{}", detail_text(*.reason, *.detail))]
+    Refused {
+        /// What it was asked to do.
+        command: &'static str,
+        /// Why it refused.
+        reason: RejectReason,
+        /// More about the reason.
+        detail: u32,
+    },
+    /// The device reports faults.
+    #[error("the scanner reports: {0}")]
+    Fault(Faults),
+    /// The connection is gone.
+    #[error("lost the connection to the scanner on {port}: {why}")]
+    LostConnection {
+        /// The port's path.
+        port: String,
+        /// How it was noticed.
+        why: String,
+    },
+    /// The device started anew on its own: its position is not known any more.
+    #[error("the scanner has restarted ({cause}); its table must be homed again")]
+    Restarted {
+        /// Why, as far as the device said.
+        cause: String,
+    },
+    /// The device stopped because it did not hear from the host in time.
+    #[error("the scanner stopped by itself, since it did not hear from this computer in time")]
+    DeadMan,
+    /// Somebody pressed stop on the device.
+    #[error("the scan was stopped at the scanner")]
+    StoppedAtDevice,
+    /// A column did not arrive whole however often it was asked for.
+    #[error(
+        "column {column} did not arrive whole in {attempts} attempts: the line is too bad \
+         (cable, baud rate, interference)"
+    )]
+    ColumnLost {
+        /// Index of the column.
+        column: u32,
+        /// How often it was asked for.
+        attempts: u32,
+    },
+    /// The device breaks the rules of the protocol.
+    #[error("the scanner breaks the protocol: {0}")]
+    Protocol(String),
+    /// A scan runs already.
+    #[error("a scan is running already")]
+    ScanRunning,
+    /// Somebody called for an end.
+    #[error("aborted")]
+    Aborted,
+    /// The settings contradict themselves.
+    #[error("{0}")]
+    Settings(String),
+    /// The driver has been shut down.
+    #[error("the scanner's driver has been shut down")]
+    Closed,
+}
+
+/// What a reject's detail adds for the user.
+fn detail_text(reason: RejectReason, detail: u32) -> String {
+    match reason {
+        RejectReason::TooManyColumns | RejectReason::TooManySamples => {
+            format!(" (at most {detail})")
+        }
+        RejectReason::Faulted => format!(" ({})", Faults(detail)),
+        _ => String::new(),
+    }
+}

@@ -1,0 +1,378 @@
+//! The thread that owns the transport.
+//!
+//! It never blocks on anybody but the transport, and on that only for a few milliseconds at
+//! a time: an abort gets through whatever else goes on.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::sync::mpsc::{
+    Receiver, RecvTimeoutError, SyncSender, TryRecvError, TrySendError, sync_channel,
+};
+use std::time::{Duration, Instant};
+
+use scanner_protocol::Identity;
+
+use super::backoff::Backoff;
+use super::{Call, Outcome, ScanNumber};
+use crate::error::ScannerError;
+use crate::limits::MAX_OUTBOX;
+use crate::scanner::{ScanInfo, StreamItem};
+use crate::session::{Answer, Command, Event, Session, Ticket};
+use crate::settings::LinkSettings;
+use crate::transport::{Connector, Transport};
+
+/// Longest wait for bytes, and so for a call to be noticed, while a scan runs.
+const SCAN_SLICE: Duration = Duration::from_millis(4);
+
+/// The same while none runs.
+const IDLE_SLICE: Duration = Duration::from_millis(20);
+
+/// How long the line may hold up a write before the thread looks after other things.
+const WRITE_SLICE: Duration = Duration::from_millis(20);
+
+/// How long the last abort may take when the driver is dropped.
+const FAREWELL: Duration = Duration::from_millis(500);
+
+type Reply = SyncSender<Result<Outcome, ScannerError>>;
+
+/// The device's thread.
+pub(super) struct Worker {
+    connector: Box<dyn Connector>,
+    settings: LinkSettings,
+    calls: Receiver<Call>,
+    start: Instant,
+    line: Option<Line>,
+    backoff: Backoff,
+    retry_at: Duration,
+    last_attempt: Option<Duration>,
+    /// The last failure to connect, so that each is logged once.
+    logged: Option<ScannerError>,
+    /// Commands that came while there was no connection.
+    parked: Vec<(Ticket, Command)>,
+    /// Who waits for which outcome.
+    callers: BTreeMap<Ticket, Reply>,
+    next_ticket: u64,
+    /// Who waits for the identity.
+    identify: Vec<Reply>,
+    identity: Option<Box<Identity>>,
+    stream: Option<(ScanNumber, SyncSender<StreamItem>)>,
+    next_scan: u64,
+}
+
+/// An open transport and the session over it.
+struct Line {
+    transport: Box<dyn Transport>,
+    session: Session,
+    unsent: Vec<u8>,
+}
+
+impl Worker {
+    pub(super) fn new(
+        connector: Box<dyn Connector>,
+        settings: LinkSettings,
+        calls: Receiver<Call>,
+    ) -> Self {
+        Self {
+            connector,
+            backoff: Backoff::new(&settings),
+            settings,
+            calls,
+            start: Instant::now(),
+            line: None,
+            retry_at: Duration::ZERO,
+            last_attempt: None,
+            logged: None,
+            parked: Vec::new(),
+            callers: BTreeMap::new(),
+            next_ticket: 0,
+            identify: Vec::new(),
+            identity: None,
+            stream: None,
+            next_scan: 0,
+        }
+    }
+
+    fn now(&self) -> Duration {
+        self.start.elapsed()
+    }
+
+    pub(super) fn run(mut self) {
+        while self.take_calls() {
+            if self.line.is_some() {
+                self.exchange();
+            } else if self.now() >= self.retry_at {
+                self.connect();
+            }
+            self.take_events();
+        }
+        self.say_farewell();
+    }
+
+    /// Takes the calls that have come; without a connection it waits for them until the
+    /// next attempt to connect is due. `false` means shutdown.
+    fn take_calls(&mut self) -> bool {
+        if self.line.is_none() {
+            let pause = self.retry_at.saturating_sub(self.now());
+            match self.calls.recv_timeout(pause) {
+                Ok(call) => {
+                    if !self.take_call(call) {
+                        return false;
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return false,
+            }
+        }
+        loop {
+            match self.calls.try_recv() {
+                Ok(call) => {
+                    if !self.take_call(call) {
+                        return false;
+                    }
+                }
+                Err(TryRecvError::Empty) => return true,
+                Err(TryRecvError::Disconnected) => return false,
+            }
+        }
+    }
+
+    fn take_call(&mut self, call: Call) -> bool {
+        let now = self.now();
+        match call {
+            Call::Shutdown => return false,
+            Call::Identify(reply) => match &self.identity {
+                Some(identity) => {
+                    let _ = reply.send(Ok(Outcome::Identity(identity.clone())));
+                }
+                None => {
+                    self.identify.push(reply);
+                    self.hurry();
+                }
+            },
+            Call::Do(command, reply) => {
+                self.next_ticket += 1;
+                let ticket = Ticket(self.next_ticket);
+                self.callers.insert(ticket, reply);
+                match &mut self.line {
+                    Some(line) => line.session.command(ticket, command, now),
+                    None => {
+                        self.parked.push((ticket, command));
+                        self.hurry();
+                    }
+                }
+            }
+            Call::Acknowledge(number, column) => {
+                if self.is_current(number)
+                    && let Some(line) = &mut self.line
+                {
+                    line.session.acknowledge(column, now);
+                }
+            }
+            Call::CloseScan(number) => {
+                if self.is_current(number) {
+                    self.stream = None;
+                    if let Some(line) = &mut self.line {
+                        line.session.close_scan();
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    fn is_current(&self, number: ScanNumber) -> bool {
+        self.stream
+            .as_ref()
+            .is_some_and(|(current, _)| *current == number)
+    }
+
+    /// Somebody waits: tries to connect now, unless it has only just been tried.
+    fn hurry(&mut self) {
+        let earliest = self
+            .last_attempt
+            .map_or(Duration::ZERO, |last| last + self.settings.reconnect_first);
+        self.retry_at = self.retry_at.min(earliest);
+    }
+
+    fn connect(&mut self) {
+        let now = self.now();
+        self.last_attempt = Some(now);
+        match self.connector.connect() {
+            Ok(transport) => {
+                let name = self.connector.name();
+                let mut session = Session::new(&name, self.settings.clone(), self.now());
+                for (ticket, command) in self.parked.drain(..) {
+                    session.command(ticket, command, now);
+                }
+                self.line = Some(Line {
+                    transport,
+                    session,
+                    unsent: Vec::new(),
+                });
+            }
+            Err(error) => self.disconnected(&error),
+        }
+    }
+
+    /// Moves bytes both ways once.
+    fn exchange(&mut self) {
+        let now = self.now();
+        let scanning = self.stream.is_some();
+        let Some(line) = &mut self.line else { return };
+        line.session.poll(now);
+        let start = self.start;
+        if let Err(error) = line.exchange(scanning, || start.elapsed()) {
+            line.session.lose(ScannerError::LostConnection {
+                port: self.connector.name(),
+                why: hang_up(&error),
+            });
+        }
+    }
+
+    fn take_events(&mut self) {
+        while let Some(event) = self
+            .line
+            .as_mut()
+            .and_then(|line| line.session.next_event())
+        {
+            self.event(event);
+        }
+    }
+
+    fn event(&mut self, event: Event) {
+        match event {
+            Event::Ready(identity) => {
+                tracing::info!(
+                    port = self.connector.name(),
+                    model = identity.model.as_str(),
+                    serial = identity.serial.as_str(),
+                    "scanner connected"
+                );
+                self.backoff.reset();
+                self.logged = None;
+                for reply in self.identify.drain(..) {
+                    let _ = reply.send(Ok(Outcome::Identity(identity.clone())));
+                }
+                self.identity = Some(identity);
+            }
+            Event::Finished(ticket, Ok(Answer::Scan(info))) => self.begin_stream(ticket, info),
+            Event::Finished(ticket, result) => {
+                if let Some(reply) = self.callers.remove(&ticket) {
+                    // Whoever asked may have gone.
+                    let _ = reply.send(result.map(Outcome::from));
+                }
+            }
+            Event::Column(column) => self.stream_item(StreamItem::Column(column)),
+            Event::ScanOver(result) => self.stream_item(StreamItem::End(result)),
+            Event::Lost(error) => self.disconnected(&error),
+        }
+    }
+
+    fn begin_stream(&mut self, ticket: Ticket, info: ScanInfo) {
+        self.next_scan += 1;
+        let number = ScanNumber(self.next_scan);
+        // Every column in flight, and the end: a send never finds the channel full.
+        let (sender, items) = sync_channel(usize::from(self.settings.credits) + 1);
+        let taken = self
+            .callers
+            .remove(&ticket)
+            .is_some_and(|reply| reply.send(Ok(Outcome::Scan(info, number, items))).is_ok());
+        if taken {
+            self.stream = Some((number, sender));
+        } else if let Some(line) = &mut self.line {
+            line.session.close_scan();
+        }
+    }
+
+    fn stream_item(&mut self, item: StreamItem) {
+        let Some((_, sender)) = &self.stream else {
+            return;
+        };
+        if let Err(TrySendError::Full(_)) = sender.try_send(item) {
+            // Only possible if columns are acknowledged before they are taken.
+            tracing::error!("columns were acknowledged before they were taken; scan closed");
+            self.stream = None;
+            if let Some(line) = &mut self.line {
+                line.session.close_scan();
+            }
+        }
+    }
+
+    /// There is no connection, or no longer: tells all who wait, and plans the next attempt.
+    fn disconnected(&mut self, error: &ScannerError) {
+        if self.logged.as_ref() != Some(error) {
+            tracing::warn!(%error, "scanner not connected");
+            self.logged = Some(error.clone());
+        }
+        self.line = None;
+        self.identity = None;
+        for reply in self.identify.drain(..) {
+            let _ = reply.send(Err(error.clone()));
+        }
+        self.parked.clear();
+        for reply in std::mem::take(&mut self.callers).into_values() {
+            let _ = reply.send(Err(error.clone()));
+        }
+        self.stream_item(StreamItem::End(Err(error.clone())));
+        self.stream = None;
+        self.retry_at = self.now() + self.backoff.next();
+    }
+
+    /// Laser off and table stopped, as far as the device can still be reached.
+    fn say_farewell(&mut self) {
+        let until = self.now() + FAREWELL;
+        let ticket = Ticket(self.next_ticket + 1);
+        let now = self.now();
+        let Some(line) = &mut self.line else { return };
+        line.session.command(ticket, Command::Abort, now);
+        let start = self.start;
+        while start.elapsed() < until {
+            line.session.poll(start.elapsed());
+            if line.exchange(true, || start.elapsed()).is_err() {
+                return;
+            }
+            while let Some(event) = line.session.next_event() {
+                match event {
+                    Event::Finished(finished, _) if finished == ticket => return,
+                    Event::Lost(_) => return,
+                    _ => {}
+                }
+            }
+        }
+    }
+}
+
+impl Line {
+    /// Sends what is to be sent, then waits a little for bytes and takes them.
+    fn exchange(&mut self, scanning: bool, now: impl Fn() -> Duration) -> io::Result<()> {
+        // A device that does not read must not make the unsent bytes grow without end; the
+        // session stops by itself when its own are not taken.
+        if self.unsent.len() < MAX_OUTBOX {
+            self.unsent.append(&mut self.session.take_output());
+        }
+        if !self.unsent.is_empty() {
+            let sent = self.transport.write(&self.unsent, WRITE_SLICE)?;
+            self.unsent.drain(..sent.min(self.unsent.len()));
+        }
+        let slice = if scanning { SCAN_SLICE } else { IDLE_SLICE };
+        let due = self.session.deadline().unwrap_or(Duration::ZERO);
+        let wait = due.saturating_sub(now()).min(slice);
+        let mut buffer = [0; 4096];
+        let count = self.transport.read(&mut buffer, wait)?;
+        if count > 0 {
+            self.session
+                .receive(buffer.get(..count).unwrap_or(&buffer), now());
+        }
+        Ok(())
+    }
+}
+
+/// How a broken transport reads to the user.
+fn hang_up(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::BrokenPipe | io::ErrorKind::UnexpectedEof => {
+            "unplugged or switched off".to_owned()
+        }
+        _ => error.to_string(),
+    }
+}

@@ -1,0 +1,242 @@
+//! What a scanner is to the rest of the program.
+//!
+//! The trait knows neither ports nor frames, so that a scanner may also be two devices, a
+//! motor stage and a profile sensor, behind one implementation.
+
+use std::sync::Arc;
+use std::sync::mpsc::Receiver;
+use std::time::Duration;
+
+use scanner_protocol::{Activity, Faults, Identity, ScanPlan};
+
+use crate::error::ScannerError;
+
+/// A scanner: a table that carries the object past a measuring head.
+///
+/// All methods block until the device has answered or failed to; each may be called from
+/// any thread.
+pub trait Scanner: Send + Sync {
+    /// Who the device is, what its counts mean, and what it can do.
+    ///
+    /// # Errors
+    /// What keeps the device from being reached.
+    fn identify(&self) -> Result<Identity, ScannerError>;
+
+    /// Drives the table to its reference mark, and waits until it is there.
+    ///
+    /// # Errors
+    /// What the device refuses or reports.
+    fn home(&self) -> Result<(), ScannerError>;
+
+    /// How the device does now.
+    ///
+    /// # Errors
+    /// What keeps the device from being reached.
+    fn status(&self) -> Result<DeviceStatus, ScannerError>;
+
+    /// Starts a scan; its columns come through the stream.
+    ///
+    /// # Errors
+    /// What the device refuses, or [`ScannerError::ScanRunning`].
+    fn start_scan(&self, plan: &ScanPlan) -> Result<ScanStream, ScannerError>;
+
+    /// Turns the laser off and stops the table at once. A running scan's stream ends with
+    /// [`ScannerError::Aborted`], as does whatever else is waited for.
+    ///
+    /// # Errors
+    /// What keeps the device from being reached; it then stops by itself after its dead-man
+    /// time.
+    fn abort(&self) -> Result<(), ScannerError>;
+}
+
+/// How a device does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DeviceStatus {
+    /// What it is at.
+    pub activity: Activity,
+    /// Whether the table's position is known.
+    pub homed: bool,
+    /// Whether the laser is on.
+    pub laser_on: bool,
+    /// Its faults.
+    pub faults: Faults,
+    /// Where the table is, counts; `None` until homed.
+    pub table_counts: Option<i32>,
+    /// Temperature of the head, degrees Celsius, if it is measured.
+    pub temperature_c: Option<f64>,
+    /// Time since the device started (wraps after 49 days).
+    pub uptime: Duration,
+    /// How the line has been since the connection was made.
+    pub line: LineCounts,
+}
+
+/// How good a line has been.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct LineCounts {
+    /// Good frames received.
+    pub frames: u64,
+    /// Damaged frames, and stretches of garbage, received.
+    pub bad_frames: u64,
+    /// Requests that had to be repeated.
+    pub retries: u64,
+    /// Requests for missing fragments.
+    pub resends: u64,
+}
+
+/// What the device said when it accepted a scan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ScanInfo {
+    /// Columns that will come.
+    pub columns: u32,
+    /// Nominal distance between neighbouring samples of a column, micrometres.
+    pub spacing_um: u32,
+    /// Whether laterals within a column are evenly spaced.
+    pub uniform: bool,
+}
+
+/// One column as measured, in counts.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct RawColumn {
+    /// Index in the scan, from 0.
+    pub index: u32,
+    /// Where the table was, counts.
+    pub table_counts: i32,
+    /// The samples with a return, in the order measured.
+    pub samples: Vec<RawSample>,
+    /// Number of samples without a return; they are not among `samples`.
+    pub dropouts: u32,
+}
+
+/// One sample as measured, in counts.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct RawSample {
+    /// Angle of the ray, or y.
+    pub lateral_counts: i32,
+    /// Distance along the ray, or z.
+    pub range_counts: i32,
+    /// Brightness of the returned light.
+    pub intensity: u8,
+    /// The light was brighter than the head can measure: the range is doubtful.
+    pub saturated: bool,
+}
+
+/// What comes through a [`ScanStream`]'s channel; the end comes last.
+#[derive(Debug)]
+pub enum StreamItem {
+    /// The next column.
+    Column(RawColumn),
+    /// No column will come any more.
+    End(Result<(), ScannerError>),
+}
+
+/// What a [`ScanStream`] tells its scanner.
+pub trait StreamControl: Send + Sync {
+    /// The column is safe.
+    fn acknowledge(&self, column: u32);
+
+    /// Nobody wants the rest of the scan.
+    fn close(&self);
+}
+
+/// The columns of a running scan, in order, each once.
+///
+/// Columns must be acknowledged (see [`ScanStream::acknowledger`]), or the device stops for
+/// want of credit. Dropping the stream ends the scan and turns the laser off.
+pub struct ScanStream {
+    info: ScanInfo,
+    items: Receiver<StreamItem>,
+    control: Arc<dyn StreamControl>,
+    ended: Option<Result<(), ScannerError>>,
+}
+
+impl ScanStream {
+    /// A stream over the receiving end of a bounded channel. For implementations of
+    /// [`Scanner`].
+    #[must_use]
+    pub fn new(
+        info: ScanInfo,
+        items: Receiver<StreamItem>,
+        control: Arc<dyn StreamControl>,
+    ) -> Self {
+        Self {
+            info,
+            items,
+            control,
+            ended: None,
+        }
+    }
+
+    /// What the device said when it accepted the scan.
+    #[must_use]
+    pub fn info(&self) -> ScanInfo {
+        self.info
+    }
+
+    /// The next column; blocks until it is there. `None` is the regular end.
+    ///
+    /// # Errors
+    /// Why the scan ended early; the same again when called again. Every column that
+    /// arrived before comes first.
+    #[allow(clippy::should_implement_trait)] // A fallible stream reads better with `?`.
+    pub fn next(&mut self) -> Result<Option<RawColumn>, ScannerError> {
+        if let Some(end) = &self.ended {
+            return end.clone().map(|()| None);
+        }
+        match self.items.recv() {
+            Ok(StreamItem::Column(column)) => Ok(Some(column)),
+            Ok(StreamItem::End(end)) => {
+                self.ended = Some(end.clone());
+                end.map(|()| None)
+            }
+            Err(_) => {
+                self.ended = Some(Err(ScannerError::Closed));
+                Err(ScannerError::Closed)
+            }
+        }
+    }
+
+    /// A handle with which whoever stores the columns says that they are safe.
+    #[must_use]
+    pub fn acknowledger(&self) -> Acknowledger {
+        Acknowledger {
+            control: Arc::clone(&self.control),
+        }
+    }
+}
+
+impl Drop for ScanStream {
+    fn drop(&mut self) {
+        self.control.close();
+    }
+}
+
+impl std::fmt::Debug for ScanStream {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ScanStream")
+            .field("info", &self.info)
+            .field("ended", &self.ended)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Says that columns are safe. Cheap to clone; outlives its stream without harm.
+#[derive(Clone)]
+pub struct Acknowledger {
+    control: Arc<dyn StreamControl>,
+}
+
+impl Acknowledger {
+    /// The column with this index is on disk: the device may forget it.
+    ///
+    /// Columns may be acknowledged in any order; the device is told once all earlier ones
+    /// are safe as well.
+    pub fn acknowledge(&self, column_index: u32) {
+        self.control.acknowledge(column_index);
+    }
+}
+
+impl std::fmt::Debug for Acknowledger {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Acknowledger")
+    }
+}

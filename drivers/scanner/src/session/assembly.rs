@@ -1,0 +1,148 @@
+//! One column, put together from fragments that come in any order.
+
+use scanner_protocol::commands::Missing;
+use scanner_protocol::{ColumnEnd, ColumnFragment, Sample};
+
+use crate::scanner::{RawColumn, RawSample};
+
+/// The fragments of one column that have come so far.
+#[derive(Debug, Default)]
+pub(super) struct Assembly {
+    /// What every part of the column must agree on, once a part has come.
+    shape: Option<Shape>,
+    /// By fragment index; as long as the number of fragments.
+    parts: Vec<Option<Part>>,
+    have: usize,
+    /// The number of samples that the column's end told.
+    told_samples: Option<usize>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Shape {
+    table_counts: i32,
+    fragments: u16,
+}
+
+#[derive(Debug)]
+struct Part {
+    first_sample: usize,
+    samples: Box<[Sample]>,
+}
+
+/// The parts of a column contradict each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Contradiction(pub(super) &'static str);
+
+impl Assembly {
+    /// Takes a fragment; says whether it is new. At most `max_samples` fragments are
+    /// believed in, since each holds a sample.
+    pub(super) fn fragment(
+        &mut self,
+        fragment: &ColumnFragment,
+        max_samples: u16,
+    ) -> Result<bool, Contradiction> {
+        self.agree(
+            Shape {
+                table_counts: fragment.table_counts,
+                fragments: fragment.fragments,
+            },
+            max_samples,
+        )?;
+        let first_sample = usize::from(fragment.first_sample);
+        if first_sample + fragment.len() > usize::from(max_samples) {
+            return Err(Contradiction("more samples than planned"));
+        }
+        let Some(part) = self.parts.get_mut(usize::from(fragment.fragment)) else {
+            return Err(Contradiction("a fragment beyond the last"));
+        };
+        if part.is_some() {
+            return Ok(false);
+        }
+        *part = Some(Part {
+            first_sample,
+            samples: fragment.samples().collect(),
+        });
+        self.have += 1;
+        Ok(true)
+    }
+
+    /// Takes the column's end.
+    pub(super) fn end(&mut self, end: &ColumnEnd, max_samples: u16) -> Result<(), Contradiction> {
+        self.agree(
+            Shape {
+                table_counts: end.table_counts,
+                fragments: end.fragments,
+            },
+            max_samples,
+        )?;
+        self.told_samples = Some(usize::from(end.samples));
+        Ok(())
+    }
+
+    fn agree(&mut self, shape: Shape, max_samples: u16) -> Result<(), Contradiction> {
+        match self.shape {
+            None if shape.fragments > max_samples => {
+                Err(Contradiction("more fragments than samples"))
+            }
+            None => {
+                self.shape = Some(shape);
+                self.parts
+                    .resize_with(usize::from(shape.fragments), || None);
+                Ok(())
+            }
+            Some(known) if known == shape => Ok(()),
+            Some(_) => Err(Contradiction("its parts disagree")),
+        }
+    }
+
+    /// Whether every fragment is there.
+    pub(super) fn is_complete(&self) -> bool {
+        self.shape.is_some() && self.have == self.parts.len()
+    }
+
+    /// Which fragments are missing, as far as one request can say.
+    pub(super) fn missing(&self) -> Missing {
+        if self.have == 0 {
+            return Missing::whole();
+        }
+        Missing::of(
+            (0_u16..)
+                .zip(&self.parts)
+                .filter(|(_, part)| part.is_none())
+                .map(|(fragment, _)| fragment),
+        )
+    }
+
+    /// The column, once it is complete. Checks that the fragments join without gap or overlap.
+    pub(super) fn finish(self, index: u32) -> Result<RawColumn, Contradiction> {
+        let mut column = RawColumn {
+            index,
+            table_counts: self.shape.map_or(0, |shape| shape.table_counts),
+            ..RawColumn::default()
+        };
+        let mut count = 0;
+        for part in self.parts.iter().flatten() {
+            if part.first_sample != count {
+                return Err(Contradiction("its fragments do not join"));
+            }
+            count += part.samples.len();
+            for sample in &part.samples {
+                let reading = sample.reading;
+                if reading.no_return {
+                    column.dropouts += 1;
+                } else {
+                    column.samples.push(RawSample {
+                        lateral_counts: sample.lateral_counts,
+                        range_counts: reading.range_counts,
+                        intensity: reading.intensity,
+                        saturated: reading.saturated,
+                    });
+                }
+            }
+        }
+        if self.told_samples.is_some_and(|told| told != count) {
+            return Err(Contradiction("its end tells another number of samples"));
+        }
+        Ok(column)
+    }
+}

@@ -1,0 +1,127 @@
+//! What the session is asked to do.
+
+use std::time::Duration;
+
+use scanner_protocol::ScanPlan;
+use scanner_protocol::commands::{
+    Abort, ClearFaults, CloseScan, Heartbeat, Home, Move, Scan, SetLaser,
+};
+
+use super::request::Purpose;
+use super::scan::Flow;
+use super::{Command, Phase, Session, Ticket};
+use crate::error::ScannerError;
+
+impl Session {
+    /// Has a command carried out. Its outcome comes as [`super::Event::Finished`] with the
+    /// ticket. Commands given before the device is ready wait, except for an abort.
+    pub fn command(&mut self, ticket: Ticket, command: Command, now: Duration) {
+        match (self.phase, command) {
+            (Phase::Dead, _) => self.finish(ticket, Err(ScannerError::Closed)),
+            (_, Command::Abort) => self.abort(Some(ticket)),
+            (Phase::Opening, command) => self.waiting.push_back((ticket, command)),
+            (Phase::Ready, Command::Status) => {
+                self.status_asked = now;
+                self.requests.push(&Heartbeat {}, Purpose::Status(ticket));
+            }
+            (Phase::Ready, Command::Home) => self.requests.push(&Home {}, Purpose::Home(ticket)),
+            (Phase::Ready, Command::Move(table_counts)) => self
+                .requests
+                .push(&Move { table_counts }, Purpose::Move(ticket, table_counts)),
+            (Phase::Ready, Command::Laser(on)) => {
+                self.requests.push(&SetLaser { on }, Purpose::Laser(ticket));
+            }
+            (Phase::Ready, Command::ClearFaults) => self
+                .requests
+                .push(&ClearFaults {}, Purpose::ClearFaults(ticket)),
+            (Phase::Ready, Command::Scan(plan)) => self.start_scan(ticket, plan),
+        }
+        self.poll(now);
+    }
+
+    /// A column is safe with the host.
+    pub fn acknowledge(&mut self, column: u32, now: Duration) {
+        if let Some(scan) = &mut self.scan {
+            scan.acknowledge(column, now);
+        }
+    }
+
+    /// Ends the scan, if there is one, without an event: nobody wants the rest.
+    pub fn close_scan(&mut self) {
+        if let Some(scan) = self.scan.take() {
+            self.scan_over = false;
+            self.requests.push(
+                &CloseScan {
+                    scan_id: scan.scan_id(),
+                },
+                Purpose::CloseScan,
+            );
+        }
+    }
+
+    fn abort(&mut self, ticket: Option<Ticket>) {
+        // Whatever is open must not be repeated after the abort: a scan command that was
+        // lost would start the scan after all.
+        let opening: Vec<Purpose> = if self.phase == Phase::Opening {
+            Vec::new()
+        } else {
+            self.requests.clear()
+        };
+        for purpose in &opening {
+            self.fail(purpose, ScannerError::Aborted);
+        }
+        while let Some((waiting, _)) = self.waiting.pop_front() {
+            self.finish(waiting, Err(ScannerError::Aborted));
+        }
+        self.stop_waiting(&ScannerError::Aborted);
+        if let Some(earlier) = self.requests.clear_abort() {
+            self.fail(&earlier, ScannerError::Aborted);
+        }
+        self.requests.push(&Abort {}, Purpose::Abort(ticket));
+    }
+
+    fn start_scan(&mut self, ticket: Ticket, plan: ScanPlan) {
+        if self.scan.is_some() && !self.scan_over || self.requests.has_scan() {
+            return self.finish(ticket, Err(ScannerError::ScanRunning));
+        }
+        // The columns of the last scan are all here, though not all acknowledged.
+        self.close_scan();
+        self.next_scan_id = self.next_scan_id.wrapping_add(1);
+        let scan_id = self.next_scan_id;
+        let credits = self.flow(&plan).credits;
+        self.requests.push(
+            &Scan {
+                scan_id,
+                credits,
+                plan,
+            },
+            Purpose::Scan(ticket, scan_id, plan),
+        );
+    }
+
+    /// The bounds of a scan's flow: the stricter of the settings' and the device's.
+    pub(super) fn flow(&self, plan: &ScanPlan) -> Flow {
+        let limits = self.identity.as_ref().map(|identity| &identity.limits);
+        Flow {
+            credits: limits
+                .map_or(1, |limits| limits.max_credits)
+                .min(self.settings.credits),
+            // A device that plays a recording keeps to its own limit, not to the plan.
+            max_samples: limits.map_or(plan.samples, |limits| limits.max_samples),
+            resend_timeout: self.settings.resend_timeout,
+            resend_attempts: self.settings.resend_attempts,
+            column_timeout: self.settings.column_timeout,
+        }
+    }
+
+    /// Ends the scan with an event.
+    pub(super) fn end_scan(&mut self, result: Result<(), ScannerError>) {
+        let failed = result.is_err();
+        self.events.push_back(super::Event::ScanOver(result));
+        self.scan_over = true;
+        if failed {
+            // Laser off; what is still in the device is not wanted.
+            self.close_scan();
+        }
+    }
+}

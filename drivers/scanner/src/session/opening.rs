@@ -1,0 +1,128 @@
+//! The greeting: from the first byte to the device's identity.
+
+use std::time::Duration;
+
+use scanner_protocol::commands::{
+    GetCalibration, GetLimits, Hello, HelloReply, Identify, Nameplate,
+};
+use scanner_protocol::{Calibration, Identity, Limits, MAX_VERSION, MIN_VERSION};
+
+use super::request::Purpose;
+use super::{Event, Phase, Session};
+use crate::error::ScannerError;
+use crate::limits::HEARD_EXCERPT;
+
+impl Session {
+    /// Greets the device.
+    pub(super) fn open(&mut self, now: Duration) {
+        self.phase = Phase::Opening;
+        self.identity = None;
+        self.nameplate = None;
+        self.calibration = None;
+        let dead_man_ms = u16::try_from(self.settings.dead_man.as_millis()).unwrap_or(u16::MAX);
+        self.requests.push(
+            &Hello {
+                min_version: MIN_VERSION,
+                max_version: MAX_VERSION,
+                dead_man_ms,
+            },
+            Purpose::Hello,
+        );
+        self.poll_requests(now);
+    }
+
+    pub(super) fn on_hello(&mut self, reply: &HelloReply) {
+        if !(MIN_VERSION..=MAX_VERSION).contains(&reply.version) {
+            let error = self.version_error(reply.version, reply.version);
+            return self.lose(error);
+        }
+        // A device that insists on a shorter time must be fed in that time.
+        let dead_man = Duration::from_millis(u64::from(reply.dead_man_ms));
+        let interval = (dead_man / 4).max(Duration::from_millis(1));
+        self.settings.heartbeat_interval = self.settings.heartbeat_interval.min(interval);
+        self.settings.request_timeout = self.settings.request_timeout.min(interval);
+        self.boot_id = reply.boot_id;
+        self.requests.push(&Identify {}, Purpose::Nameplate);
+    }
+
+    pub(super) fn on_nameplate(&mut self, nameplate: Nameplate) {
+        self.nameplate = Some(nameplate);
+        self.requests.push(&GetCalibration {}, Purpose::Calibration);
+    }
+
+    pub(super) fn on_calibration(&mut self, calibration: Calibration) {
+        self.calibration = Some(calibration);
+        self.requests.push(&GetLimits {}, Purpose::Limits);
+    }
+
+    pub(super) fn on_limits(&mut self, limits: Limits, now: Duration) {
+        let (Some(nameplate), Some(calibration)) = (self.nameplate.take(), self.calibration.take())
+        else {
+            return;
+        };
+        if limits.max_credits == 0 || limits.max_samples == 0 {
+            return self.lose(ScannerError::Protocol(
+                "its limits allow no column or no sample".to_owned(),
+            ));
+        }
+        let identity = Identity::new(nameplate, calibration, limits);
+        self.identity = Some(identity.clone());
+        self.phase = Phase::Ready;
+        self.heard.clear();
+        self.last_heard = now;
+        self.status_asked = now;
+        self.events.push_back(Event::Ready(Box::new(identity)));
+        while let Some((ticket, command)) = self.waiting.pop_front() {
+            self.command(ticket, command, now);
+        }
+    }
+
+    pub(super) fn version_error(&self, device_min: u8, device_max: u8) -> ScannerError {
+        ScannerError::Version {
+            device_min,
+            device_max,
+            host_min: MIN_VERSION,
+            host_max: MAX_VERSION,
+        }
+    }
+
+    /// Keeps the first of what comes before the device is known, to show to the user.
+    pub(super) fn note_heard(&mut self, bytes: &[u8]) {
+        if self.phase == Phase::Opening {
+            let room = HEARD_EXCERPT.saturating_sub(self.heard.len());
+            self.heard.extend(bytes.iter().take(room));
+        }
+    }
+
+    /// Why the greeting failed.
+    pub(super) fn opening_failed(&self, purpose: &Purpose) -> ScannerError {
+        if self.heard.is_empty() || !matches!(purpose, Purpose::Hello) {
+            return ScannerError::Timeout {
+                port: self.port.clone(),
+                awaited: purpose.awaited(),
+                after: self.settings.request_timeout * self.settings.request_attempts,
+            };
+        }
+        let heard = if self.echoes > 0 {
+            "it sends back what is sent to it (an echoing terminal or a loop-back plug)".to_owned()
+        } else if self.unreadable > 0 {
+            "its frames hold messages of another kind".to_owned()
+        } else {
+            let printable = self
+                .heard
+                .iter()
+                .filter(|b| matches!(b, b' '..=b'~' | b'\r' | b'\n'))
+                .count();
+            let excerpt = self.heard.escape_ascii();
+            if printable * 4 < self.heard.len() * 3 {
+                format!("\"{excerpt}\" makes no sense (is the baud rate right?)")
+            } else {
+                format!("it says \"{excerpt}\"")
+            }
+        };
+        ScannerError::WrongDevice {
+            port: self.port.clone(),
+            heard,
+        }
+    }
+}

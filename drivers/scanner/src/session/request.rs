@@ -1,0 +1,211 @@
+//! Requests: one open at a time, repeated until it is answered.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use scanner_protocol::{Frame, Request, ScanPlan};
+
+use super::event::Ticket;
+
+/// What a request is for, and so what to do with its reply.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Purpose {
+    Hello,
+    Nameplate,
+    Calibration,
+    Limits,
+    Heartbeat,
+    Status(Ticket),
+    Home(Ticket),
+    Move(Ticket, i32),
+    Laser(Ticket),
+    ClearFaults(Ticket),
+    Scan(Ticket, u16, ScanPlan),
+    CloseScan,
+    Abort(Option<Ticket>),
+}
+
+impl Purpose {
+    /// What the device is asked to do, to follow "refused to".
+    pub(super) fn verb(&self) -> &'static str {
+        match self {
+            Self::Hello => "open a session",
+            Self::Nameplate | Self::Calibration | Self::Limits => "identify itself",
+            Self::Heartbeat | Self::Status(_) => "tell its status",
+            Self::Home(_) => "home the table",
+            Self::Move(..) => "move the table",
+            Self::Laser(_) => "switch the laser",
+            Self::ClearFaults(_) => "clear its faults",
+            Self::Scan(..) => "scan",
+            Self::CloseScan => "close the scan",
+            Self::Abort(_) => "abort",
+        }
+    }
+
+    /// What is awaited, to follow "no".
+    pub(super) fn awaited(&self) -> &'static str {
+        match self {
+            Self::Hello => "answer to the greeting",
+            Self::Nameplate | Self::Calibration | Self::Limits => "identification",
+            Self::Heartbeat | Self::Status(_) => "status",
+            Self::Home(_) => "answer to the homing command",
+            Self::Move(..) => "answer to the move command",
+            Self::Laser(_) => "answer to the laser command",
+            Self::ClearFaults(_) => "answer to the clearing of faults",
+            Self::Scan(..) => "answer to the scan command",
+            Self::CloseScan => "answer to the closing of the scan",
+            Self::Abort(_) => "answer to the abort command",
+        }
+    }
+
+    /// Who waits for the outcome.
+    pub(super) fn ticket(&self) -> Option<Ticket> {
+        match self {
+            Self::Status(ticket)
+            | Self::Home(ticket)
+            | Self::Move(ticket, _)
+            | Self::Laser(ticket)
+            | Self::ClearFaults(ticket)
+            | Self::Scan(ticket, ..) => Some(*ticket),
+            Self::Abort(ticket) => *ticket,
+            _ => None,
+        }
+    }
+
+    /// Whether it belongs to opening the session.
+    pub(super) fn is_opening(&self) -> bool {
+        matches!(
+            self,
+            Self::Hello | Self::Nameplate | Self::Calibration | Self::Limits
+        )
+    }
+}
+
+/// A request made and not yet answered.
+#[derive(Debug)]
+pub(super) struct Open {
+    pub(super) tag: u16,
+    pub(super) kind: u8,
+    pub(super) purpose: Purpose,
+    frame: Frame,
+    attempts: u32,
+    due: Duration,
+}
+
+/// The open request, those that wait for it, and an abort beside them.
+#[derive(Debug, Default)]
+pub(super) struct Requests {
+    next_tag: u16,
+    queue: VecDeque<Open>,
+    open: Option<Open>,
+    abort: Option<Open>,
+    retries: u64,
+}
+
+/// What is due at a time.
+#[derive(Debug)]
+pub(super) enum Due {
+    /// A frame is to be sent.
+    Send(Frame),
+    /// A request has been sent often enough without an answer.
+    GivenUp(Purpose),
+}
+
+impl Requests {
+    /// Queues a request. An abort overtakes all others.
+    pub(super) fn push<R: Request>(&mut self, request: &R, purpose: Purpose) {
+        self.next_tag = self.next_tag.wrapping_add(1);
+        let open = Open {
+            tag: self.next_tag,
+            kind: R::KIND,
+            frame: Frame::new(self.next_tag, request),
+            attempts: 0,
+            due: Duration::ZERO,
+            purpose,
+        };
+        if matches!(open.purpose, Purpose::Abort(_)) {
+            self.abort = Some(open);
+        } else {
+            self.queue.push_back(open);
+        }
+    }
+
+    /// Whether nothing is open or waiting.
+    pub(super) fn is_idle(&self) -> bool {
+        self.open.is_none() && self.queue.is_empty() && self.abort.is_none()
+    }
+
+    /// Whether a scan has been asked for and not yet answered.
+    pub(super) fn has_scan(&self) -> bool {
+        self.open
+            .iter()
+            .chain(&self.queue)
+            .any(|open| matches!(open.purpose, Purpose::Scan(..)))
+    }
+
+    pub(super) fn retries(&self) -> u64 {
+        self.retries
+    }
+
+    /// The next thing due now, if any. To be called until it says `None`.
+    pub(super) fn due(&mut self, now: Duration, timeout: Duration, attempts: u32) -> Option<Due> {
+        if self.open.is_none() {
+            self.open = self.queue.pop_front();
+        }
+        for slot in [&mut self.abort, &mut self.open] {
+            let Some(open) = slot else { continue };
+            if now < open.due {
+                continue;
+            }
+            if open.attempts >= attempts {
+                return slot.take().map(|open| Due::GivenUp(open.purpose));
+            }
+            self.retries += u64::from(open.attempts > 0);
+            open.attempts += 1;
+            open.due = now + timeout;
+            return Some(Due::Send(open.frame.clone()));
+        }
+        None
+    }
+
+    /// The request that a reply belongs to.
+    ///
+    /// `request_kind` is the kind of the request it answers.
+    pub(super) fn answered(&mut self, tag: u16, request_kind: u8) -> Option<Purpose> {
+        [&mut self.abort, &mut self.open]
+            .into_iter()
+            .find_map(|slot| {
+                slot.take_if(|open| {
+                    open.attempts > 0 && open.tag == tag && open.kind == request_kind
+                })
+            })
+            .map(|open| open.purpose)
+    }
+
+    /// Drops every request but an abort, and says what they were for.
+    pub(super) fn clear(&mut self) -> Vec<Purpose> {
+        self.open
+            .take()
+            .into_iter()
+            .chain(self.queue.drain(..))
+            .map(|open| open.purpose)
+            .collect()
+    }
+
+    /// Drops the abort, and says who waits for it.
+    pub(super) fn clear_abort(&mut self) -> Option<Purpose> {
+        self.abort.take().map(|open| open.purpose)
+    }
+
+    /// When something will be due, if nothing comes before.
+    pub(super) fn deadline(&self) -> Option<Duration> {
+        if self.open.is_none() && !self.queue.is_empty() {
+            return Some(Duration::ZERO);
+        }
+        [&self.open, &self.abort]
+            .into_iter()
+            .flatten()
+            .map(|open| open.due)
+            .min()
+    }
+}

@@ -1,0 +1,226 @@
+//! A serial port as a transport, and the list of ports there are.
+
+use std::io::{self, Read, Write};
+use std::os::fd::OwnedFd;
+use std::path::Path;
+use std::time::Duration;
+
+use rustix::fs::{FlockOperation, Mode, OFlags};
+use rustix::io::Errno;
+use rustix::termios::{ControlModes, OptionalActions};
+use serialport::{ClearBuffer, SerialPort, SerialPortType};
+
+use super::holder::{group_of, holder};
+use super::{Connector, Transport};
+use crate::error::ScannerError;
+use crate::settings::LinkSettings;
+
+/// Where a scanner on a serial line is, and how to talk to it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SerialSettings {
+    /// Path of the port, such as `/dev/serial/by-id/...`; a symbolic link will do.
+    pub path: String,
+    /// Bits per second. Pseudo-terminals and USB serial ports take any.
+    pub baud_rate: u32,
+    /// Times and attempts.
+    pub link: LinkSettings,
+}
+
+impl SerialSettings {
+    /// The port at this path, at 115,200 baud and with the usual times.
+    #[must_use]
+    pub fn new(path: impl Into<String>) -> Self {
+        Self {
+            path: path.into(),
+            baud_rate: 115_200,
+            link: LinkSettings::default(),
+        }
+    }
+}
+
+/// Opens one serial port.
+#[derive(Debug)]
+pub struct SerialConnector {
+    path: String,
+    baud_rate: u32,
+}
+
+impl SerialConnector {
+    /// For the port of these settings.
+    #[must_use]
+    pub fn new(settings: &SerialSettings) -> Self {
+        Self {
+            path: settings.path.clone(),
+            baud_rate: settings.baud_rate,
+        }
+    }
+
+    /// What a refusal by the operating system means for the user.
+    fn refused(&self, errno: Errno) -> ScannerError {
+        let port = self.path.clone();
+        match errno {
+            Errno::NOENT | Errno::NXIO | Errno::NODEV | Errno::IO => {
+                ScannerError::NoSuchPort { port }
+            }
+            Errno::ACCESS | Errno::PERM => ScannerError::Permission {
+                group: group_of(Path::new(&port)),
+                port,
+            },
+            Errno::BUSY | Errno::WOULDBLOCK => self.busy(),
+            Errno::ISDIR | Errno::NOTTY | Errno::NOTDIR => ScannerError::NotAPort { port },
+            errno => ScannerError::Port {
+                port,
+                message: errno.to_string(),
+            },
+        }
+    }
+
+    fn busy(&self) -> ScannerError {
+        ScannerError::PortBusy {
+            holder: holder(Path::new(&self.path)),
+            port: self.path.clone(),
+        }
+    }
+
+    /// Opens the port for a first look: says exactly what is wrong with it, if anything,
+    /// and keeps the modem lines from dropping whenever it is closed, since many boards
+    /// take that for a reset.
+    fn prepare(&self) -> Result<OwnedFd, Errno> {
+        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+        let port = rustix::fs::open(&self.path, flags, Mode::empty())?;
+        if !rustix::termios::isatty(&port) {
+            return Err(Errno::NOTTY);
+        }
+        rustix::fs::flock(&port, FlockOperation::NonBlockingLockExclusive)?;
+        let mut modes = rustix::termios::tcgetattr(&port)?;
+        modes.control_modes.remove(ControlModes::HUPCL);
+        rustix::termios::tcsetattr(&port, OptionalActions::Now, &modes)?;
+        rustix::fs::flock(&port, FlockOperation::NonBlockingUnlock)?;
+        Ok(port)
+    }
+}
+
+impl Connector for SerialConnector {
+    fn name(&self) -> String {
+        self.path.clone()
+    }
+
+    fn connect(&mut self) -> Result<Box<dyn Transport>, ScannerError> {
+        // Kept until the port is open for good, so that it is not closed in between.
+        let _first = self.prepare().map_err(|errno| self.refused(errno))?;
+        let port = serialport::new(&self.path, self.baud_rate)
+            .preserve_dtr_on_open()
+            .exclusive(true)
+            .open()
+            .map_err(|error| match error.kind() {
+                serialport::ErrorKind::NoDevice => self.busy(),
+                _ => ScannerError::Port {
+                    port: self.path.clone(),
+                    message: error.to_string(),
+                },
+            })?;
+        // What an earlier session left unread is of no use. Failing to drop it does no harm:
+        // late frames are told apart by their request ids.
+        let _ = port.clear(ClearBuffer::All);
+        Ok(Box::new(SerialTransport { port }))
+    }
+}
+
+struct SerialTransport {
+    port: Box<dyn SerialPort>,
+}
+
+/// `Ok(0)` for what only means that nothing could be done in time.
+fn in_time(result: io::Result<usize>) -> io::Result<usize> {
+    match result {
+        Err(error)
+            if matches!(
+                error.kind(),
+                io::ErrorKind::TimedOut | io::ErrorKind::Interrupted | io::ErrorKind::WouldBlock
+            ) =>
+        {
+            Ok(0)
+        }
+        other => other,
+    }
+}
+
+impl Transport for SerialTransport {
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        self.port.set_timeout(timeout)?;
+        match self.port.read(buffer) {
+            // Readable and yet empty: the other end has hung up.
+            Ok(0) if !buffer.is_empty() => Err(io::ErrorKind::UnexpectedEof.into()),
+            result => in_time(result),
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8], timeout: Duration) -> io::Result<usize> {
+        self.port.set_timeout(timeout)?;
+        in_time(self.port.write(bytes))
+    }
+}
+
+/// A serial port of this machine.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PortInfo {
+    /// Its path.
+    pub path: String,
+    /// The USB device behind it, if it is one.
+    pub usb: Option<UsbInfo>,
+}
+
+/// What a USB device says about itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UsbInfo {
+    /// Vendor number.
+    pub vendor_id: u16,
+    /// Product number.
+    pub product_id: u16,
+    /// Name of the maker.
+    pub manufacturer: Option<String>,
+    /// Name of the product.
+    pub product: Option<String>,
+    /// Serial number.
+    pub serial: Option<String>,
+}
+
+/// The serial ports of this machine, in the order of their paths. Pseudo-terminals are not
+/// among them.
+///
+/// # Errors
+/// [`ScannerError::Port`] if the list cannot be had.
+pub fn list_ports() -> Result<Vec<PortInfo>, ScannerError> {
+    // The library panics where there is no such folder, as in some containers.
+    if cfg!(target_os = "linux") && !Path::new("/sys/class/tty").is_dir() {
+        return Ok(Vec::new());
+    }
+    let ports = serialport::available_ports().map_err(|error| ScannerError::Port {
+        port: "list of serial ports".to_owned(),
+        message: error.to_string(),
+    })?;
+    let mut ports: Vec<PortInfo> = ports
+        .into_iter()
+        .map(|port| PortInfo {
+            path: port.port_name,
+            usb: match port.port_type {
+                SerialPortType::UsbPort(usb) => Some(UsbInfo {
+                    vendor_id: usb.vid,
+                    product_id: usb.pid,
+                    manufacturer: usb.manufacturer,
+                    product: usb.product,
+                    serial: usb.serial_number,
+                }),
+                _ => None,
+            },
+        })
+        .collect();
+    ports.sort_by(|a, b| a.path.cmp(&b.path));
+    Ok(ports)
+}
+
+/// Name and process id of the program that has this port open, as far as this user may see.
+#[must_use]
+pub fn port_holder(path: &str) -> Option<String> {
+    holder(Path::new(path))
+}
