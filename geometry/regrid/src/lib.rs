@@ -1,1 +1,35 @@
-//! Irregular scanner columns to a uniform range image by moving least median of squares (MLMS).
+//! Irregular scanner columns to a uniform range image by moving least median of squares
+//! (MLMS), after Shim & Lee 1995, section II.1.
+//!
+//! At each node of the lattice the M nearest samples are taken, nearest in x and y and
+//! within a hard reach in columns. N_s times three of them give a plane
+//! `z = a x + b y + c`; the plane whose median of squared residuals over the M samples is
+//! least gives z at the node (equation 2). Up to half of the samples may be wrong
+//! (outliers, the other side of a step edge) without harm.
+//!
+//! The paper leaves open where the object ends. Here a node gets a value only with
+//! support: samples that agree with its plane, near the node and around it
+//! ([`SupportSettings`]). All other nodes are masked.
+//!
+//! [`Regridder`] works while the scan runs and needs memory for a window of columns only;
+//! [`regrid`](fn@regrid) takes all columns at once and may use several threads. Both give
+//! the same bits, whatever the direction of the scan and the number of threads: nothing a
+//! node's value depends on is older than the reach, samples are ordered by position before
+//! any is drawn, and draws are keyed by the seed and the node.
+
+mod batch;
+mod draws;
+mod error;
+mod grid;
+mod neighbours;
+mod plane;
+mod regridder;
+mod settings;
+mod strip;
+mod support;
+mod window;
+
+pub use batch::regrid;
+pub use error::RegridError;
+pub use regridder::Regridder;
+pub use settings::{Estimator, RegridSettings, Roi, SettingsError, SupportSettings};

@@ -1,0 +1,153 @@
+//! Regridding of a scan that is there as a whole.
+
+use std::sync::Mutex;
+
+use range_image::{Cancelled, Column, GridColumn, Lattice, Monitor, RangeImage, RangeImageBuilder};
+use rayon::prelude::*;
+
+use crate::error::RegridError;
+use crate::grid::GridWorker;
+use crate::regridder::Travel;
+use crate::settings::RegridSettings;
+use crate::strip::Strip;
+
+/// Most nodes of an image: 2 GiB of values.
+const NODE_LIMIT: u64 = 1 << 28;
+
+/// The range image of a whole scan: equal, bit for bit, to what [`crate::Regridder`] gives
+/// column by column, for any number of threads ([`RegridSettings::threads`]).
+///
+/// # Errors
+/// [`RegridError`]: a setting out of range, columns that do not go one way, coordinates
+/// beyond 25 m, a grid of more than 2^28 nodes, no threads, cancellation.
+pub fn regrid(
+    columns: impl IntoIterator<Item = Column>,
+    settings: &RegridSettings,
+    monitor: &dyn Monitor,
+) -> Result<RangeImage, RegridError> {
+    settings.validate()?;
+    let strips = ascending(columns, settings)?;
+    let lattice = Lattice {
+        pitch_mm: settings.pitch_mm,
+    };
+    let mut builder = RangeImageBuilder::new(lattice);
+    if let [first, .., last] = strips.as_slice() {
+        let mut worker = GridWorker::default();
+        let mut margin = |x_mm: f64| {
+            worker
+                .margin_mm(around(&strips, x_mm, settings), x_mm, settings)
+                .unwrap_or(0.0)
+        };
+        let i_first = lattice.first_at_or_above(first.x_mm - margin(first.x_mm));
+        let i_last = lattice.last_at_or_below(last.x_mm + margin(last.x_mm));
+        let grid = with_threads(settings.threads, || {
+            grid_columns(&strips, i_first, i_last, settings, monitor)
+        })??;
+        check_size(&grid, settings)?;
+        for column in grid {
+            builder.push(column);
+        }
+    }
+    monitor.check()?;
+    monitor.progress(1.0);
+    Ok(builder.finish())
+}
+
+/// The strips in ascending x, from columns in either direction.
+fn ascending(
+    columns: impl IntoIterator<Item = Column>,
+    settings: &RegridSettings,
+) -> Result<Vec<Strip>, RegridError> {
+    let mut strips: Vec<Strip> = Vec::new();
+    let mut travel = None;
+    for (index, column) in columns.into_iter().enumerate() {
+        let strip = Strip::new(&column, &settings.roi, index)?;
+        if let Some(previous) = strips.last() {
+            travel = Some(Travel::check(travel, previous.x_mm, strip.x_mm, index)?);
+        }
+        strips.push(strip);
+    }
+    if travel == Some(Travel::Descending) {
+        strips.reverse();
+    }
+    Ok(strips)
+}
+
+/// The strips that the window at this x is cut from.
+fn around<'a>(
+    strips: &'a [Strip],
+    x_mm: f64,
+    settings: &RegridSettings,
+) -> impl Iterator<Item = &'a Strip> {
+    let left = strips.partition_point(|s| s.x_mm < x_mm);
+    let right = strips.partition_point(|s| s.x_mm <= x_mm);
+    let start = left.saturating_sub(settings.reach_columns);
+    let end = (right + settings.reach_columns).min(strips.len());
+    strips[start..end].iter()
+}
+
+fn grid_columns(
+    strips: &[Strip],
+    i_first: i64,
+    i_last: i64,
+    settings: &RegridSettings,
+    monitor: &dyn Monitor,
+) -> Result<Vec<GridColumn>, Cancelled> {
+    let number = (i_last - i_first + 1).max(0) as usize;
+    let lattice = Lattice {
+        pitch_mm: settings.pitch_mm,
+    };
+    // Held while reporting, so that the reported share never decreases.
+    let done = Mutex::new(0_usize);
+    (i_first..=i_last)
+        .into_par_iter()
+        .map_init(GridWorker::default, |worker, i| {
+            monitor.check()?;
+            let strips = around(strips, lattice.line_mm(i), settings);
+            let column = worker.column(strips, i, settings);
+            if let Ok(mut done) = done.lock() {
+                *done += 1;
+                monitor.progress(*done as f64 / number as f64);
+            }
+            Ok(column)
+        })
+        .filter_map(Result::transpose)
+        .collect()
+}
+
+fn check_size(grid: &[GridColumn], settings: &RegridSettings) -> Result<(), RegridError> {
+    let low_j = grid.iter().map(|c| c.j_first).min().unwrap_or(0);
+    let high_j = grid.iter().map(|c| c.j_first + c.z_mm.len() as i64).max();
+    let (Some(first), Some(last), Some(high_j)) = (grid.first(), grid.last(), high_j) else {
+        return Ok(());
+    };
+    let columns = (last.i - first.i).unsigned_abs() + 1;
+    let rows = (high_j - low_j).unsigned_abs();
+    if columns.saturating_mul(rows) > NODE_LIMIT {
+        return Err(RegridError::TooManyNodes {
+            columns,
+            rows,
+            pitch_mm: settings.pitch_mm,
+            limit: NODE_LIMIT,
+        });
+    }
+    Ok(())
+}
+
+/// Runs the work on this many threads; 0 for all processors.
+fn with_threads<T: Send>(
+    threads: usize,
+    work: impl FnOnce() -> T + Send,
+) -> Result<T, RegridError> {
+    if threads == 0 {
+        return Ok(work());
+    }
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| RegridError::Threads {
+            threads,
+            reason: e.to_string(),
+        })?;
+    Ok(pool.install(work))
+}

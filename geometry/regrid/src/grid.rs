@@ -1,0 +1,168 @@
+//! One column of grid nodes.
+
+use range_image::{GridColumn, Lattice};
+
+use crate::draws::Draws;
+use crate::neighbours::{Neighbour, Search};
+use crate::plane::{Fit, PlaneFinder};
+use crate::settings::{Estimator, LEAST_WINDOW, RegridSettings};
+use crate::strip::{Strip, lower_median};
+use crate::support::Surroundings;
+use crate::window::{Spacing, Window};
+
+/// Least number of samples of the smaller windows that are tried where the full one's
+/// plane belongs to another surface.
+const LEAST_RETRY: usize = 8;
+
+/// Computes grid columns; keeps its buffers from one to the next.
+#[derive(Debug, Default)]
+pub(crate) struct GridWorker {
+    search: Search,
+    finder: PlaneFinder,
+    surroundings: Surroundings,
+    lengths: Vec<f64>,
+}
+
+impl GridWorker {
+    /// Distance in x from the outermost column at which nodes may still have a value,
+    /// given the columns within reach of there, in ascending x.
+    pub(crate) fn margin_mm<'a>(
+        &mut self,
+        strips: impl Iterator<Item = &'a Strip>,
+        x_mm: f64,
+        settings: &RegridSettings,
+    ) -> Option<f64> {
+        let window = Window::new(strips, x_mm, settings, &mut self.lengths)?;
+        Some(settings.support.margin * window.greatest_spacing().x_mm)
+    }
+
+    /// The grid column with lattice index `i`, from columns in ascending x that include all
+    /// within reach. `None` when all its nodes are masked.
+    pub(crate) fn column<'a>(
+        &mut self,
+        strips: impl Iterator<Item = &'a Strip>,
+        i: i64,
+        settings: &RegridSettings,
+    ) -> Option<GridColumn> {
+        let lattice = Lattice {
+            pitch_mm: settings.pitch_mm,
+        };
+        let x_mm = lattice.line_mm(i);
+        if x_mm < settings.roi.x_mm.0 || x_mm > settings.roi.x_mm.1 {
+            return None;
+        }
+        let window = Window::new(strips, x_mm, settings, &mut self.lengths)?;
+        let greatest = window.greatest_spacing();
+        let near_x_mm = settings.support.radius * greatest.x_mm;
+        let near_y_mm = settings.support.radius * greatest.y_mm;
+        let mut column = GridColumn {
+            i,
+            j_first: 0,
+            z_mm: Vec::new(),
+        };
+        self.search.begin(&window);
+        self.search.advance(&window, f64::NEG_INFINITY);
+        let first_row = |y_mm: f64| {
+            let low = (y_mm - near_y_mm).max(settings.roi.y_mm.0);
+            lattice.first_at_or_above(low)
+        };
+        let mut next = self
+            .search
+            .next_above(&window, x_mm, near_x_mm)
+            .map(first_row);
+        while let Some(j) = next {
+            let y_mm = lattice.line_mm(j);
+            if y_mm > settings.roi.y_mm.1 {
+                break;
+            }
+            self.search.advance(&window, y_mm);
+            let above = self.search.next_above(&window, x_mm, near_x_mm);
+            let below = self.search.next_below(&window, x_mm, near_x_mm);
+            if below.is_none_or(|y| y_mm - y > near_y_mm)
+                && above.is_none_or(|y| y - y_mm > near_y_mm)
+            {
+                // Nothing near: on to where the next sample comes near, if there is one.
+                next = above.map(|y| first_row(y).max(j + 1));
+                continue;
+            }
+            if let Some(z_mm) = self.node(&window, x_mm, y_mm, (i, j), settings) {
+                append(&mut column, j, z_mm);
+            }
+            next = Some(j + 1);
+        }
+        (!column.z_mm.is_empty()).then_some(column)
+    }
+
+    /// z at a node, or `None` to mask it.
+    fn node(
+        &mut self,
+        window: &Window<'_>,
+        x_mm: f64,
+        y_mm: f64,
+        (i, j): (i64, i64),
+        settings: &RegridSettings,
+    ) -> Option<f64> {
+        let nearest = self.search.nearest(window, x_mm, y_mm, settings.neighbours);
+        if nearest.len() < LEAST_WINDOW {
+            return None;
+        }
+        let spacing = local_spacing(window, nearest, &mut self.lengths);
+        let support = &settings.support;
+        // Inliers are some of the samples: where those do not suffice, inliers will not.
+        if !self
+            .surroundings
+            .supported(nearest, spacing, support, |_| true)
+        {
+            return None;
+        }
+        let mut draws = Draws::new(settings.seed, i, j);
+        let mut number = nearest.len();
+        loop {
+            let samples = &nearest[..number];
+            let fit = match settings.estimator {
+                Estimator::LeastMedian => {
+                    self.finder
+                        .least_median(samples, settings.draws, &mut draws)
+                }
+                Estimator::LeastSquares => self.finder.least_squares(samples),
+            };
+            if let Some(Fit { plane, tolerance }) = fit {
+                let tolerance = tolerance.max(support.inlier_floor * spacing.mean_mm);
+                let agrees = |n: &Neighbour| plane.residual(n).abs() <= tolerance;
+                if self
+                    .surroundings
+                    .supported(samples, spacing, support, agrees)
+                {
+                    return Some(plane.c);
+                }
+            }
+            // Most of the window may lie on another surface than the node: a corner in
+            // front of a wall. The nearer half may have the node's own surface in majority.
+            if number / 2 < LEAST_RETRY.max(LEAST_WINDOW) {
+                return None;
+            }
+            number /= 2;
+        }
+    }
+}
+
+/// The spacing around a node: the median distance in y from the window's samples to the
+/// next ones in their columns.
+fn local_spacing(window: &Window<'_>, nearest: &[Neighbour], lengths: &mut Vec<f64>) -> Spacing {
+    lengths.clear();
+    for n in nearest {
+        lengths.extend(window.strips[n.strip].gaps(n.index));
+    }
+    let limit_mm = window.greatest_sample_spacing_mm;
+    window.spacing(lower_median(lengths).map_or(limit_mm, |gap| gap.min(limit_mm)))
+}
+
+/// Adds a node above all others of the column, masking those in between.
+fn append(column: &mut GridColumn, j: i64, z_mm: f64) {
+    if column.z_mm.is_empty() {
+        column.j_first = j;
+    }
+    let row = (j - column.j_first).unsigned_abs();
+    column.z_mm.resize(row as usize, f64::NAN);
+    column.z_mm.push(z_mm);
+}

@@ -1,0 +1,213 @@
+//! Settings of the regridder.
+
+/// How z at a node is estimated from its window of samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Estimator {
+    /// Least median of squared residuals (MLMS): stands up to almost half of the window
+    /// being wrong, and keeps step edges.
+    #[default]
+    LeastMedian,
+    /// The least-squares plane, for comparison: one outlier moves it, step edges smear.
+    LeastSquares,
+}
+
+/// The region of interest, millimetres in the part frame, limits included. Samples
+/// outside of it are ignored, nodes outside of it in x and y are masked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Roi {
+    /// Least and greatest x.
+    pub x_mm: (f64, f64),
+    /// Least and greatest y.
+    pub y_mm: (f64, f64),
+    /// Least and greatest z.
+    pub z_mm: (f64, f64),
+}
+
+impl Default for Roi {
+    /// Everything.
+    fn default() -> Self {
+        let all = (f64::NEG_INFINITY, f64::INFINITY);
+        Self {
+            x_mm: all,
+            y_mm: all,
+            z_mm: all,
+        }
+    }
+}
+
+/// When a node has samples enough around it to get a value.
+///
+/// Lengths are in local spacings: the square root of column spacing times sample spacing
+/// (the side of the square that holds one sample on average), but in x at least the column
+/// spacing and in y at least half the sample spacing, so that stretched patterns count as
+/// closed too. Both spacings are medians over the node's surroundings, so they follow the
+/// scan.
+///
+/// A node is supported when its plane's inliers within `radius` number at least
+/// `least_samples`, and the node lies in their convex hull or no farther than `margin`
+/// from it. The hull makes a lone dropout or outlier harmless, since its neighbours
+/// surround it; the margin undoes that the outermost samples lie inside the true outline,
+/// by half a spacing or less.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SupportSettings {
+    /// Radius in which inliers count. Larger closes larger gaps, and fills concave corners
+    /// of the outline by about `radius² / 2R` spacings at a radius of curvature of R
+    /// spacings. Default 2.
+    pub radius: f64,
+    /// How far outside the hull of its inliers a node may lie. Default 0.4.
+    pub margin: f64,
+    /// Least number of inliers within the radius. Default 3.
+    pub least_samples: usize,
+    /// Samples are inliers within 2.5 robust standard deviations of the plane, and always
+    /// within this many spacings of it (so that coarsely quantised depths stay inliers).
+    /// Default 0.5.
+    pub inlier_floor: f64,
+}
+
+impl Default for SupportSettings {
+    fn default() -> Self {
+        Self {
+            radius: 2.0,
+            margin: 0.4,
+            least_samples: 3,
+            inlier_floor: 0.5,
+        }
+    }
+}
+
+/// Settings of [`crate::Regridder`] and [`crate::regrid`](fn@crate::regrid).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RegridSettings {
+    /// Distance of grid nodes in x and y, millimetres. No default: it depends on the scan.
+    pub pitch_mm: f64,
+    /// M: samples in a node's window. At most half of them come from one column, so that
+    /// columns far apart with dense samples still span a plane. Default 32.
+    pub neighbours: usize,
+    /// N_s: planes tried at a node ([`Estimator::LeastMedian`]). Default 32.
+    pub draws: usize,
+    /// Columns on either side of a node that its window may reach into; bounds memory and
+    /// the delay until a node is finished. In y the window reaches as far as that many
+    /// columns, or that many sample spacings if they are wider. Default 8.
+    pub reach_columns: usize,
+    /// The estimator.
+    pub estimator: Estimator,
+    /// The region of interest; everything by default.
+    pub roi: Roi,
+    /// Seed of the draws. Default 1.
+    pub seed: u64,
+    /// When a node gets a value.
+    pub support: SupportSettings,
+    /// Threads of [`crate::regrid`](fn@crate::regrid); 0 (default) for all processors. The
+    /// result does not depend on it.
+    pub threads: usize,
+}
+
+impl RegridSettings {
+    /// Defaults for everything but the pitch, millimetres.
+    #[must_use]
+    pub fn with_pitch(pitch_mm: f64) -> Self {
+        Self {
+            pitch_mm,
+            neighbours: 32,
+            draws: 32,
+            reach_columns: 8,
+            estimator: Estimator::default(),
+            roi: Roi::default(),
+            seed: 1,
+            support: SupportSettings::default(),
+            threads: 0,
+        }
+    }
+
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`SettingsError`] with the name of the first setting that is out of its range.
+    pub fn validate(&self) -> Result<(), SettingsError> {
+        let number = |name, value: f64, low: f64, high: f64| {
+            if (low..=high).contains(&value) {
+                Ok(())
+            } else {
+                Err(SettingsError::Number {
+                    name,
+                    value,
+                    low,
+                    high,
+                })
+            }
+        };
+        let count = |name, value: usize, low: usize, high: usize| {
+            if (low..=high).contains(&value) {
+                Ok(())
+            } else {
+                Err(SettingsError::Count {
+                    name,
+                    value,
+                    low,
+                    high,
+                })
+            }
+        };
+        number("pitch_mm", self.pitch_mm, 1e-3, 1e3)?;
+        count("neighbours", self.neighbours, LEAST_WINDOW, 1024)?;
+        count("draws", self.draws, 1, 100_000)?;
+        count("reach_columns", self.reach_columns, 1, 1000)?;
+        count("threads", self.threads, 0, 1024)?;
+        number("support.radius", self.support.radius, 1.0, 10.0)?;
+        number("support.margin", self.support.margin, 0.0, 1.0)?;
+        number("support.inlier_floor", self.support.inlier_floor, 0.0, 10.0)?;
+        count("support.least_samples", self.support.least_samples, 3, 100)?;
+        for (axis, (low, high)) in [
+            ("roi.x_mm", self.roi.x_mm),
+            ("roi.y_mm", self.roi.y_mm),
+            ("roi.z_mm", self.roi.z_mm),
+        ] {
+            if !(low < high) {
+                return Err(SettingsError::Limits { axis, low, high });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Fewest samples that can outvote an outlier: a plane takes three of them.
+pub(crate) const LEAST_WINDOW: usize = 6;
+
+/// A setting out of its range.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SettingsError {
+    /// A number out of range.
+    #[error("{name} = {value}: must be from {low} to {high}")]
+    Number {
+        /// Name of the setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Least value allowed.
+        low: f64,
+        /// Greatest value allowed.
+        high: f64,
+    },
+    /// A count out of range.
+    #[error("{name} = {value}: must be from {low} to {high}")]
+    Count {
+        /// Name of the setting.
+        name: &'static str,
+        /// Its value.
+        value: usize,
+        /// Least value allowed.
+        low: usize,
+        /// Greatest value allowed.
+        high: usize,
+    },
+    /// Limits of the region of interest that enclose nothing.
+    #[error("{axis} = [{low}, {high}]: the first limit must be below the second")]
+    Limits {
+        /// Name of the setting.
+        axis: &'static str,
+        /// First limit.
+        low: f64,
+        /// Second limit.
+        high: f64,
+    },
+}
