@@ -291,6 +291,11 @@ def judge(path, arguments):
     return report
 
 
+def silence():
+    """Keep OpenCASCADE's own messages from standard output."""
+    Message.DefaultMessenger_s().ChangePrinters().Clear()
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("file")
@@ -305,9 +310,7 @@ def main():
     parser.add_argument("--allow-warnings", action="store_true")
     parser.add_argument("--no-points", action="store_true", help="leave out points on loops")
     arguments = parser.parse_args()
-    # Standard output is for the JSON alone.
-    messenger = Message.DefaultMessenger_s()
-    messenger.ChangePrinters().Clear()
+    silence()
     report = judge(arguments.file, arguments)
     json.dump(report, sys.stdout, indent=1)
     print()

@@ -1,1 +1,46 @@
-fn main() {}
+//! The project's chores. `cargo xtask --help` lists them.
+
+mod judge;
+mod rules;
+mod shell;
+
+use clap::{Parser, Subcommand};
+
+/// The project's chores: checks, studies and their tables.
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    chore: Chore,
+}
+
+#[derive(Debug, Subcommand)]
+enum Chore {
+    /// Check who depends on whom, how long files are, and that sources are ASCII.
+    Rules,
+    /// Scan the simulated objects and let OpenCASCADE judge the IGES files.
+    ///
+    /// Needs Python 3; installs the judge's packages into `target/judges`.
+    Judge(judge::Options),
+    /// Everything: tests, lints, rules, judges with all seeds, FreeCAD.
+    Full,
+}
+
+fn main() -> anyhow::Result<()> {
+    match Arguments::parse().chore {
+        Chore::Rules => rules::check(),
+        Chore::Judge(options) => judge::run(&options),
+        Chore::Full => full(),
+    }
+}
+
+fn full() -> anyhow::Result<()> {
+    shell::run("cargo", &["fmt", "--all", "--check"])?;
+    shell::run(
+        "cargo",
+        &["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"],
+    )?;
+    rules::check()?;
+    shell::run("cargo", &["test", "--workspace"])?;
+    judge::run(&judge::Options { seeds: 10, freecad: true, out: None })
+}

@@ -1,0 +1,1 @@
+//! Lets independent programs judge the CAD files of simulated scans.

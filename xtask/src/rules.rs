@@ -1,0 +1,153 @@
+//! Rules of the house that the compiler does not hold.
+
+use std::collections::BTreeMap;
+use std::fs;
+
+use anyhow::{Context, Result, bail};
+use serde_json::Value;
+
+use crate::shell;
+
+/// Longest source file we accept, in lines.
+const LONGEST_FILE_LINES: usize = 600;
+
+/// What a crate may depend on among ours, outside of its tests.
+///
+/// Dependencies point one way; a crate that is missing here is an error, so that a new
+/// crate's place is a decision and not an accident.
+const ALLOWED: &[(&str, &[&str])] = &[
+    ("scanner-protocol", &[]),
+    ("scanner-driver", &["scanner-protocol"]),
+    ("scan-files", &[]),
+    ("sim-scanner", &["scanner-protocol", "scan-files"]),
+    ("range-image", &[]),
+    ("nurbs", &[]),
+    ("regrid", &["range-image"]),
+    ("segment", &["range-image"]),
+    ("reconstruct", &["nurbs", "range-image"]),
+    ("cad-exchange", &["nurbs", "reconstruct"]),
+    ("pipeline", &["range-image", "reconstruct", "regrid", "segment"]),
+    ("scan-record", &["range-image", "scanner-protocol"]),
+    ("deliverables", &GEOMETRY),
+    ("relief-api", &[]),
+    ("reliefd", &DAEMON),
+    ("relief", &COMMAND_LINE),
+    ("relief-tests", &EVERYTHING),
+    ("xtask", &[]),
+];
+
+const GEOMETRY: [&str; 7] =
+    ["cad-exchange", "nurbs", "pipeline", "range-image", "reconstruct", "regrid", "segment"];
+
+const DAEMON: [&str; 12] = [
+    "cad-exchange",
+    "deliverables",
+    "nurbs",
+    "pipeline",
+    "range-image",
+    "reconstruct",
+    "regrid",
+    "relief-api",
+    "scan-record",
+    "scanner-driver",
+    "scanner-protocol",
+    "segment",
+];
+
+const COMMAND_LINE: [&str; 14] = [
+    "cad-exchange",
+    "deliverables",
+    "nurbs",
+    "pipeline",
+    "range-image",
+    "reconstruct",
+    "regrid",
+    "relief-api",
+    "reliefd",
+    "scan-files",
+    "scan-record",
+    "scanner-driver",
+    "segment",
+    "sim-scanner",
+];
+
+const EVERYTHING: [&str; 16] = [
+    "cad-exchange",
+    "deliverables",
+    "nurbs",
+    "pipeline",
+    "range-image",
+    "reconstruct",
+    "regrid",
+    "relief",
+    "relief-api",
+    "reliefd",
+    "scan-files",
+    "scan-record",
+    "scanner-driver",
+    "scanner-protocol",
+    "segment",
+    "sim-scanner",
+];
+
+/// Libraries that computation must not link: clocks, files and runtimes come with them.
+const KEPT_FROM_GEOMETRY: [&str; 6] =
+    ["tokio", "tracing", "serde_json", "jiff", "rustix", "tempfile"];
+
+/// Checks every rule and reports all that are broken.
+pub(crate) fn check() -> Result<()> {
+    let mut broken = Vec::new();
+    dependencies(&mut broken)?;
+    sources(&mut broken)?;
+    if broken.is_empty() {
+        println!("rules: all hold");
+        return Ok(());
+    }
+    bail!("{} rules are broken:\n  {}", broken.len(), broken.join("\n  "));
+}
+
+fn dependencies(broken: &mut Vec<String>) -> Result<()> {
+    let metadata: Value = serde_json::from_str(&shell::output(
+        "cargo",
+        &["metadata", "--no-deps", "--format-version", "1"],
+    )?)?;
+    let allowed: BTreeMap<_, _> = ALLOWED.iter().copied().collect();
+    for package in metadata["packages"].as_array().context("cargo metadata lists no packages")? {
+        let name = package["name"].as_str().context("a package without a name")?;
+        let Some(may_use) = allowed.get(name) else {
+            broken.push(format!("{name}: has no place in xtask's table of dependencies"));
+            continue;
+        };
+        let in_geometry =
+            package["manifest_path"].as_str().is_some_and(|path| path.contains("/geometry/"));
+        for dependency in package["dependencies"].as_array().into_iter().flatten() {
+            let used = dependency["name"].as_str().unwrap_or_default();
+            // Tests may compare with anything; only what is linked matters.
+            if dependency["kind"].as_str() == Some("dev") {
+                continue;
+            }
+            if allowed.contains_key(used) && !may_use.contains(&used) {
+                broken.push(format!("{name}: must not depend on {used}"));
+            }
+            if in_geometry && KEPT_FROM_GEOMETRY.contains(&used) {
+                broken.push(format!("{name}: computation must not link {used}"));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn sources(broken: &mut Vec<String>) -> Result<()> {
+    for path in shell::output("git", &["ls-files", "*.rs", "*.py"])?.lines() {
+        let text = fs::read_to_string(shell::root().join(path))
+            .with_context(|| format!("cannot read {path}"))?;
+        let lines = text.lines().count();
+        if lines > LONGEST_FILE_LINES {
+            broken.push(format!("{path}: {lines} lines, more than {LONGEST_FILE_LINES}"));
+        }
+        if let Some(line) = text.lines().position(|line| !line.is_ascii()) {
+            broken.push(format!("{path}:{}: a character outside ASCII", line + 1));
+        }
+    }
+    Ok(())
+}
