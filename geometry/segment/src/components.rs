@@ -1,7 +1,7 @@
 //! Connected components, sizes and depths of labelled nodes.
 
 use crate::grid::{Grid, Links};
-use crate::scene::NONE;
+use crate::scene::{NONE, Scene};
 
 /// Gives every set of nodes that share a key and are joined by links its own label, counted
 /// from `first` in the order of their first nodes. Nodes without a key keep their label.
@@ -47,13 +47,22 @@ pub(crate) fn sizes(labels: &[u32]) -> Vec<usize> {
     sizes
 }
 
-/// How deep each node lies in its region: 0 beside (also cornerwise) a node with a value that
-/// has another label, 1 beside those, and so on up to `limit`. Masked nodes and the image's
-/// edge are no border.
-pub(crate) fn depths(grid: &Grid<'_>, labels: &[u32], limit: u8) -> Vec<u8> {
+/// What ends a region.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Border {
+    /// Nodes with a value and another label.
+    Neighbours,
+    /// These, and masked nodes, steps and the image's edge.
+    All,
+}
+
+/// How deep each node lies in its region: 0 beside (also cornerwise) a border, 1 beside those
+/// nodes, and so on up to `limit`.
+pub(crate) fn depths(scene: &Scene<'_>, labels: &[u32], limit: u8, border: Border) -> Vec<u8> {
+    let grid = &scene.grid;
     let mut depths: Vec<u8> = (0..grid.nodes())
         .map(|node| {
-            if grid.is_valid(node) && beside_another(grid, labels, node) {
+            if grid.is_valid(node) && is_on_border(scene, labels, node, border) {
                 0
             } else {
                 limit
@@ -77,12 +86,17 @@ pub(crate) fn depths(grid: &Grid<'_>, labels: &[u32], limit: u8) -> Vec<u8> {
     depths
 }
 
-fn beside_another(grid: &Grid<'_>, labels: &[u32], node: usize) -> bool {
+fn is_on_border(scene: &Scene<'_>, labels: &[u32], node: usize, border: Border) -> bool {
+    let grid = &scene.grid;
     let (columns, rows) = grid.window(node, 1);
+    let all = border == Border::All;
+    if all && scene.links.linked(node).count() < 4 {
+        return true;
+    }
     columns.into_iter().any(|c| {
         rows.clone().any(|r| {
             let k = c * grid.rows + r;
-            grid.is_valid(k) && labels[k] != labels[node]
+            labels[k] != labels[node] && (all || grid.is_valid(k))
         })
     })
 }

@@ -158,10 +158,14 @@ impl Line<'_> {
         let before =
             value(self.before > 0, self.first.wrapping_sub(self.stride)).map(|other| a - other);
         let after = value(self.after > 0, self.first + 2 * self.stride).map(|other| other - b);
-        // A crease leaves the continuation of one side only, so the smaller miss decides.
+        // A crease leaves the continuation of one side only, so the smaller miss decides. At
+        // an outline there is one side only, and round things fall away ever faster there.
         let (miss, rise) = match (before, after) {
             (Some(p), Some(q)) => ((leap - p).abs().min((leap - q).abs()), p.abs().min(q.abs())),
-            (Some(p), None) | (None, Some(p)) => ((leap - p).abs(), p.abs()),
+            (Some(p), None) | (None, Some(p)) => {
+                let quickening = if leap * p > 0.0 { p.abs() } else { 0.0 };
+                (((leap - p).abs() - quickening).max(0.0), p.abs())
+            }
             (None, None) => (leap.abs(), 0.0),
         };
         let slope = rise / self.grid.pitch_mm;

@@ -1,6 +1,6 @@
 //! Nodes without a region join the one whose surface, carried on, explains them best.
 
-use crate::components::depths;
+use crate::components::{Border, depths};
 use crate::local_fit::{LocalFit, Sums};
 use crate::scene::{FIT_REACH, NONE, Scene};
 use range_image::{Cancelled, Monitor};
@@ -11,6 +11,10 @@ const LAYERS: u8 = 4;
 const BAND: u8 = 3;
 /// A region keeps its nodes when fewer than this lie deeper than the band.
 const LEAST_CORE: usize = 25;
+/// A surface explains a node that lies off it by less than this share of a step.
+const EXPLAINED: f64 = 0.5;
+/// Least z of a normal by which a miss is judged, lest a fit that has tipped over explain all.
+const STEEPEST: f64 = 0.2;
 /// At most this many regions compete for a node.
 const RIVALS: usize = 4;
 
@@ -24,7 +28,7 @@ pub(crate) fn redraw_borders(
     labels: &mut [u32],
     monitor: &dyn Monitor,
 ) -> Result<(), Cancelled> {
-    let depths = depths(&scene.grid, labels, BAND);
+    let depths = depths(scene, labels, BAND, Border::Neighbours);
     let most = labels.iter().copied().max().unwrap_or(NONE) as usize;
     let mut cores = vec![0_usize; most + 1];
     for (&label, &depth) in labels.iter().zip(&depths) {
@@ -39,6 +43,9 @@ pub(crate) fn redraw_borders(
 }
 
 /// Labels every node that links join to a labelled one.
+///
+/// Nodes that no surface explains yet wait until surfaces have grown nearer; only when all
+/// wait do those next to a region join the nearest in z.
 pub(crate) fn regrow(
     scene: &Scene<'_>,
     labels: &mut [u32],
@@ -56,7 +63,9 @@ pub(crate) fn regrow(
             scene.sums_around(labels, node, FIT_REACH, |_| true, &mut sums);
             *ranking = rank(scene, &sums);
         }
-        settle(scene, labels, &open, &rankings);
+        if !settle(scene, labels, &open, &rankings) {
+            join_nearest(scene, labels, &open);
+        }
     }
 }
 
@@ -88,52 +97,47 @@ fn front(scene: &Scene<'_>, labels: &[u32]) -> Vec<usize> {
 }
 
 /// First lets every node join its best region, in as many layers as it takes; then one layer
-/// of the rest its next best within reach, and so on. At least one node is labelled.
-fn settle(scene: &Scene<'_>, labels: &mut [u32], open: &[usize], rankings: &[Ranking]) {
+/// of the rest its next best within reach, and so on. Returns whether any node was labelled.
+fn settle(scene: &Scene<'_>, labels: &mut [u32], open: &[usize], rankings: &[Ranking]) -> bool {
     let mut waiting: Vec<usize> = (0..open.len()).collect();
     let mut joins = Vec::new();
-    loop {
-        let mut choose = |labels: &mut [u32], waiting: &mut Vec<usize>, strict: bool| {
-            joins.clear();
-            waiting.retain(|&k| {
-                let node = open[k];
-                let beside = |label: u32| scene.links.linked(node).any(|n| labels[n] == label);
-                let ranking = &rankings[k];
-                let choice = if strict {
-                    Some(ranking[0]).filter(|&l| l != NONE && beside(l))
-                } else {
-                    ranking
-                        .iter()
-                        .copied()
-                        .find(|&l| l != NONE && beside(l))
-                        .or_else(|| nearest_in_z(scene, labels, node))
-                };
-                if let Some(label) = choice {
-                    joins.push((node, label));
-                }
-                choice.is_none()
+    let mut choose = |labels: &mut [u32], rivals: usize| {
+        joins.clear();
+        waiting.retain(|&k| {
+            let node = open[k];
+            let choice = rankings[k].iter().take(rivals).find(|&&label| {
+                label != NONE && scene.links.linked(node).any(|n| labels[n] == label)
             });
-            for &(node, label) in &joins {
-                labels[node] = label;
-            }
-            !joins.is_empty()
-        };
-        while choose(labels, &mut waiting, true) {}
-        if !choose(labels, &mut waiting, false) {
-            return;
+            joins.extend(choice.map(|&label| (node, label)));
+            choice.is_none()
+        });
+        for &(node, label) in &joins {
+            labels[node] = label;
         }
+        !joins.is_empty()
+    };
+    let mut any = false;
+    while choose(labels, 1) || choose(labels, RIVALS) {
+        any = true;
     }
+    any
 }
 
-/// For nodes where no surface can be fitted.
-fn nearest_in_z(scene: &Scene<'_>, labels: &[u32], node: usize) -> Option<u32> {
+/// Gives every node beside a region the label of the linked neighbour nearest in z.
+fn join_nearest(scene: &Scene<'_>, labels: &mut [u32], open: &[usize]) {
     let z = scene.grid.z_mm;
-    scene
-        .links
-        .linked(node)
-        .filter(|&n| labels[n] != NONE)
-        .min_by(|&a, &b| (z[a] - z[node]).abs().total_cmp(&(z[b] - z[node]).abs()))
-        .map(|n| labels[n])
+    let joins: Vec<(usize, u32)> = open
+        .iter()
+        .filter_map(|&node| {
+            let off = |n: usize| (z[n] - z[node]).abs();
+            let beside = scene.links.linked(node).filter(|&n| labels[n] != NONE);
+            let nearest = beside.min_by(|&a, &b| off(a).total_cmp(&off(b)))?;
+            Some((node, labels[nearest]))
+        })
+        .collect();
+    for (node, label) in joins {
+        labels[node] = label;
+    }
 }
 
 /// Orders the regions around a node by how well they explain it; the node is the origin.
@@ -144,10 +148,10 @@ fn rank(scene: &Scene<'_>, sums: &[Sums]) -> Ranking {
             let fit = sums.fit()?;
             Some((miss_mm(scene, &fit), sums.label, fit))
         })
+        .filter(|rival| rival.0 < EXPLAINED * scene.step_mm)
         .collect();
     rivals.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     if let [first, second, ..] = rivals.as_slice()
-        && second.0 < scene.step_mm
         && beyond_intersection(&first.2, &second.2)
     {
         rivals.swap(0, 1);
@@ -161,7 +165,7 @@ fn rank(scene: &Scene<'_>, sums: &[Sums]) -> Ranking {
 
 /// How far the node lies off the surface, millimetres square to it.
 fn miss_mm(scene: &Scene<'_>, fit: &LocalFit) -> f64 {
-    fit.z_mm(0.0, 0.0).abs() * fit.normal(scene.grid.pitch_mm, 0.0, 0.0)[2]
+    fit.z_mm(0.0, 0.0).abs() * fit.normal(scene.grid.pitch_mm, 0.0, 0.0)[2].max(STEEPEST)
 }
 
 /// Whether the node lies on the second's side of the line where two surfaces meet.

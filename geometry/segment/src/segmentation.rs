@@ -1,7 +1,7 @@
 //! The stages in their order.
 
 use crate::cluster::cluster;
-use crate::components::{depths, label_components, sizes};
+use crate::components::{Border, depths, label_components, sizes};
 use crate::crease::creased;
 use crate::features::patterns;
 use crate::fill::filled;
@@ -120,22 +120,28 @@ pub fn segment_with_report(
     monitor.progress(0.2);
     let (mut labels, components) = clusters(&scene, &normals, settings, monitor)?;
     monitor.progress(0.45);
-    let depth = match settings.method {
+    let minimum = settings.minimum_nodes;
+    let (slim, reaches): (u8, &[usize]) = match settings.method {
         // Mixed normals may have made clusters along creases, up to four nodes wide.
-        Method::ShimLee => 2,
-        Method::Relief => 1,
+        Method::ShimLee => (2, &[FIT_REACH, 4]),
+        Method::Relief => (1, &[FIT_REACH, 4, 3]),
     };
-    dissolve_slivers(&scene, &mut labels, settings.minimum_nodes, depth);
+    dissolve_slivers(&scene, &mut labels, minimum, slim, Border::Neighbours);
     regrow(&scene, &mut labels, monitor)?;
     monitor.progress(0.65);
     merge(&scene, &mut labels, &[FIT_REACH], monitor)?;
     monitor.progress(0.8);
+    // What is slim even now is what mixed normals have left along creases and outlines.
+    dissolve_slivers(&scene, &mut labels, minimum, 2, Border::All);
+    regrow(&scene, &mut labels, monitor)?;
     if settings.method == Method::Relief {
         redraw_borders(&scene, &mut labels, monitor)?;
-        // With borders in their places, shorter fits can be trusted too. They follow surfaces
-        // that bend away sharply, as towards the outline of something round.
-        merge(&scene, &mut labels, &[FIT_REACH, 4, 3], monitor)?;
     }
+    // With borders nearer their places, shorter fits can be trusted too. They follow surfaces
+    // that bend away sharply, as towards the outline of something round.
+    merge(&scene, &mut labels, reaches, monitor)?;
+    dissolve_slivers(&scene, &mut labels, minimum, 2, Border::All);
+    regrow(&scene, &mut labels, monitor)?;
     monitor.progress(0.95);
     let (labels, crumbs, crumb_nodes) = finish(&scene, &measured, &labels, settings.minimum_nodes);
     monitor.progress(1.0);
@@ -199,8 +205,14 @@ fn clusters(
 
 /// Takes the label from pieces that are small, or nowhere as deep as `depth` nodes from a
 /// border, so that their nodes go to a neighbour.
-fn dissolve_slivers(scene: &Scene<'_>, labels: &mut [u32], minimum_nodes: usize, depth: u8) {
-    let depths = depths(&scene.grid, labels, depth);
+fn dissolve_slivers(
+    scene: &Scene<'_>,
+    labels: &mut [u32],
+    minimum_nodes: usize,
+    depth: u8,
+    border: Border,
+) {
+    let depths = depths(scene, labels, depth, border);
     let sizes = sizes(labels);
     let mut kept = vec![false; sizes.len()];
     for (&label, depth_here) in labels.iter().zip(depths) {

@@ -3,56 +3,63 @@
 mod scenes;
 
 use range_image::Unmonitored;
-use scenes::{CLEAN, HARSH, Pose, Scene, Spoil, Surface, house};
+use scenes::{Pose, Scene, Spoil, Surface, cylinder, house};
 use segment::{Method, SegmentSettings, segment_with_report};
 
-const METHODS: [Method; 1] = [Method::Relief];
-
-fn check(name: &str, surface: Surface<'_>, faces: usize, spoil: Spoil, method: Method) {
-    let mut bad = Vec::new();
+/// Ten seeds: dropouts from none to 20 %, outlines from clean to ragged.
+fn check(name: &str, surface: Surface<'_>, faces: usize) {
     for seed in 0..10 {
+        let spoil = Spoil {
+            noise_mm: if seed % 2 == 0 { 0.05 } else { 0.03 },
+            dropouts: 0.05 * (seed % 5) as f64,
+            ragged: seed as usize % 3,
+        };
         let scene = Scene::new(surface, spoil, seed);
-        let settings = SegmentSettings {
-            method,
-            seed,
-            ..SegmentSettings::default()
-        };
-        let done = segment_with_report(&scene.image, &settings, &Unmonitored)
-            .expect("default settings fit any scene");
-        let verdict = scene.judge(&done.regions);
-        eprintln!(
-            "{name} {method} {seed}: {verdict:?} {:?} {:?}",
-            done.regions.node_counts(),
-            done.report
-        );
-        // The plain window leaves borders where mixed normals put them.
-        let (right, misplacement) = match method {
-            Method::Relief => (0.97, 1.5),
-            Method::ShimLee => (0.95, 2.5),
-        };
-        if verdict.regions != faces
-            || verdict.right < right
-            || verdict.misplacement_nodes > misplacement
-        {
-            bad.push((seed, verdict));
+        judge(name, &scene, faces, seed, Method::Relief);
+        if seed > 6 {
+            judge(name, &scene, faces, seed, Method::ShimLee);
         }
     }
-    assert!(bad.is_empty(), "{name}, {method}: {bad:?}");
+}
+
+fn judge(name: &str, scene: &Scene, faces: usize, seed: u64, method: Method) {
+    let settings = SegmentSettings {
+        method,
+        seed,
+        ..SegmentSettings::default()
+    };
+    let done = segment_with_report(&scene.image, &settings, &Unmonitored)
+        .expect("default settings fit any scene");
+    let verdict = scene.judge(&done.regions);
+    assert!(
+        verdict.regions == faces && verdict.right >= 0.97 && verdict.misplacement_nodes <= 1.5,
+        "{name}, {method}, seed {seed}: {verdict:?}, {:?}",
+        done.report
+    );
 }
 
 #[test]
 fn a_house_has_four_faces() {
     for (pose, roof) in [
-        (Pose::new(50.0, 10.0, 5.0), 35.0),
+        (Pose::new(50.0, 18.0, 5.0), 35.0),
         (Pose::new(40.0, -25.0, 8.0), 25.0),
         (Pose::new(35.0, 30.0, -4.0), 10.0),
     ] {
-        for method in METHODS {
-            for spoil in [CLEAN, HARSH] {
-                let house = house(pose, roof);
-                check(&format!("house {roof}"), &house, 4, spoil, method);
-            }
-        }
+        check(&format!("house {roof}"), &house(pose, roof), 4);
+    }
+}
+
+#[test]
+fn a_cylinder_has_a_disc_and_one_side() {
+    for (pose, radius) in [
+        (Pose::new(35.0, 0.0, 4.0), 25.0),
+        (Pose::new(55.0, 0.0, -10.0), 18.0),
+    ] {
+        check(
+            &format!("cylinder {radius}"),
+            &cylinder(pose, radius, 70.0),
+            2,
+        );
     }
 }
 
@@ -68,12 +75,8 @@ fn a_step_parts_two_planes() {
         let up = u.abs() < 18.0 && v.abs() < 11.0;
         Some((plane(x, y) + if up { 5.0 } else { 0.0 }, 1 + u16::from(up)))
     };
-    for method in METHODS {
-        for spoil in [CLEAN, HARSH] {
-            check("stairs", &stairs, 2, spoil, method);
-            check("boss", &boss, 2, spoil, method);
-        }
-    }
+    check("stairs", &stairs, 2);
+    check("boss", &boss, 2);
 }
 
 #[test]
@@ -83,12 +86,8 @@ fn one_surface_is_one_region() {
         let inside = x * x + y * y < 44.0 * 44.0;
         inside.then(|| ((50.0_f64 * 50.0 - x * x - y * y).sqrt(), 1))
     };
-    for method in METHODS {
-        for spoil in [CLEAN, HARSH] {
-            check("plane", &plane, 1, spoil, method);
-            check("cap", &cap, 1, spoil, method);
-        }
-    }
+    check("plane", &plane, 1);
+    check("cap", &cap, 1);
 }
 
 #[test]
@@ -97,9 +96,5 @@ fn parts_with_a_gap_between_are_two() {
         let face = 1 + u16::from(x > 0.1 * y);
         ((x - 0.1 * y).abs() > 1.5 && y.abs() < 45.0).then_some((0.1 * x, face))
     };
-    for method in METHODS {
-        for spoil in [CLEAN, HARSH] {
-            check("parts", &parts, 2, spoil, method);
-        }
-    }
+    check("parts", &parts, 2);
 }

@@ -28,17 +28,6 @@ pub(crate) struct Spoil {
     pub(crate) ragged: usize,
 }
 
-pub(crate) const CLEAN: Spoil = Spoil {
-    noise_mm: 0.05,
-    dropouts: 0.0,
-    ragged: 0,
-};
-pub(crate) const HARSH: Spoil = Spoil {
-    noise_mm: 0.05,
-    dropouts: 0.2,
-    ragged: 3,
-};
-
 impl Scene {
     pub(crate) fn new(surface: Surface<'_>, spoil: Spoil, seed: u64) -> Self {
         let mut random = SplitMix64::seed_from_u64(seed);
@@ -270,4 +259,31 @@ pub(crate) fn house(pose: Pose, roof_degrees: f64) -> impl Fn(f64, f64) -> Optio
             ([0.0, -1.0, 0.0], 15.0),
         ],
     )
+}
+
+/// An upright cylinder, y its axis; face 1 the disc, 2 the side.
+pub(crate) fn cylinder(
+    pose: Pose,
+    radius: f64,
+    height: f64,
+) -> impl Fn(f64, f64) -> Option<(f64, u16)> {
+    let axis = pose.apply([0.0, 1.0, 0.0]);
+    move |x, y| {
+        // |p|^2 - (p . axis)^2 = radius^2, the greater root.
+        let flat = axis[0] * x + axis[1] * y;
+        let a = 1.0 - axis[2] * axis[2];
+        let b = -flat * axis[2];
+        let c = x * x + y * y - flat * flat - radius * radius;
+        let root = b * b - a * c;
+        if root < 0.0 {
+            return None;
+        }
+        let (front, back) = ((-b + root.sqrt()) / a, (-b - root.sqrt()) / a);
+        let (lid, base) = (
+            (0.5 * height - flat) / axis[2],
+            (-0.5 * height - flat) / axis[2],
+        );
+        let top = front.min(lid);
+        (top >= back.max(base)).then_some((top, if lid < front { 1 } else { 2 }))
+    }
 }
