@@ -1,12 +1,19 @@
 //! IGES 5.3 in fixed 80-column ASCII.
 //!
 //! [`write`] turns a [`reconstruct::Model`] into trimmed surfaces (entity 144 on 142 on
-//! 114 and 112, or on 128 and 126), one per face, with name, colour and level.
+//! 114 and 112, or on 128 and 126), one per face, with name, colour and level;
+//! [`read_points`] takes measured points (106, 116) from anybody's file; [`read_model`]
+//! reads back what [`write`] writes.
 //!
 //! A file is sections of 80-column lines: Start, Global, Directory entry, Parameter
 //! data, Terminate. Column 73 tells the section, columns 74 to 80 number its lines.
 //! Every entity has two lines in the directory, which point to its parameters.
 
+mod read;
 mod write;
 
+pub use read::{
+    MAX_FILE_BYTES, ReadError, SplineCurve, TrimmedCurve, TrimmedFace, TrimmedModel,
+    TrimmedSurface, read_model, read_points,
+};
 pub use write::{DEFAULT_PALETTE, Entities, FaceDefect, Summary, WriteError, WriteOptions, write};

@@ -1,0 +1,19 @@
+//! The reader, in layers: bytes to lines to sections ([`lines`]), the Global section
+//! ([`global`]), directory entries and parameter records ([`file`] on [`values`]), and on
+//! top of these what is wanted: points ([`points`]) or trimmed faces ([`model`]).
+//!
+//! Files come from anywhere: nothing is allocated by a count before the values are there.
+
+mod error;
+mod file;
+mod global;
+mod lines;
+mod model;
+mod points;
+mod transform;
+mod values;
+
+pub use error::ReadError;
+pub use lines::MAX_FILE_BYTES;
+pub use model::{SplineCurve, TrimmedCurve, TrimmedFace, TrimmedModel, TrimmedSurface, read_model};
+pub use points::read_points;

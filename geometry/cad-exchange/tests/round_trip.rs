@@ -1,0 +1,146 @@
+//! What is written is read back.
+
+#[path = "../examples/sample/mod.rs"]
+mod sample;
+
+use cad_exchange::iges::{
+    self, DEFAULT_PALETTE, Entities, SplineCurve, TrimmedCurve, TrimmedModel, TrimmedSurface,
+    WriteOptions,
+};
+use reconstruct::{Loop, Surface};
+
+fn round_trip(entities: Entities) -> TrimmedModel {
+    let options = WriteOptions {
+        entities,
+        author: "A. Author".to_owned(),
+        organization: "Workshop, Ltd.; Seoul".to_owned(),
+        ..WriteOptions::new("sample", "20261121.093000")
+    };
+    let mut file = Vec::new();
+    iges::write(&sample::model(), &options, &mut file).unwrap();
+    iges::read_model(&file[..]).unwrap()
+}
+
+#[test]
+fn names_colours_and_the_rest() {
+    for entities in [Entities::Parametric114, Entities::Rational128] {
+        let read = round_trip(entities);
+        assert_eq!(read.product, "sample");
+        assert_eq!(read.author, "A. Author");
+        assert_eq!(read.organization, "Workshop, Ltd.; Seoul");
+        assert_eq!(read.timestamp, "20261121.093000");
+        assert_eq!(read.resolution_mm, 1e-4);
+        let faces: Vec<_> = read
+            .faces
+            .iter()
+            .map(|face| (face.name.as_deref(), face.level, face.colour))
+            .collect();
+        assert_eq!(
+            faces,
+            [
+                (Some("Barrel"), 1, Some(DEFAULT_PALETTE[1])),
+                (Some("Ramp"), 2, Some(DEFAULT_PALETTE[2]))
+            ]
+        );
+    }
+}
+
+/// Every colour survives its way through percentages.
+#[test]
+fn every_shade() {
+    let mut model = sample::model();
+    for shade in 0..=255 {
+        let options = WriteOptions {
+            palette: vec![[shade, 255 - shade, 7], [shade, shade / 2, 255]],
+            ..WriteOptions::new("sample", "20261121.093000")
+        };
+        model.faces.truncate(1);
+        let mut file = Vec::new();
+        iges::write(&model, &options, &mut file).unwrap();
+        let colour = iges::read_model(&file[..]).unwrap().faces[0].colour;
+        assert_eq!(colour, Some([shade, shade / 2, 255]));
+    }
+}
+
+#[test]
+fn parametric_splines_to_the_last_bit() {
+    let read = round_trip(Entities::Parametric114);
+    let model = sample::model();
+    assert_eq!(read.faces.len(), model.faces.len());
+    let same = |curves: &[TrimmedCurve], border: &Loop| {
+        assert_eq!(curves.len(), border.coedges.len());
+        for (curve, coedge) in curves.iter().zip(&border.coedges) {
+            assert_eq!(
+                curve.parameter_curve,
+                SplineCurve::Cubic(coedge.parameter_curve.clone())
+            );
+            assert_eq!(
+                curve.space_curve,
+                SplineCurve::Cubic(coedge.space_curve.clone())
+            );
+        }
+    };
+    for (face, original) in read.faces.iter().zip(&model.faces) {
+        let Surface::Patches(patches) = &original.surface;
+        assert_eq!(face.surface, TrimmedSurface::Patches(patches.clone()));
+        same(&face.outer, &original.outer);
+        assert_eq!(face.inner.len(), original.inner.len());
+        for (curves, border) in face.inner.iter().zip(&original.inner) {
+            same(curves, border);
+        }
+    }
+}
+
+#[test]
+fn bsplines_are_the_same_shapes() {
+    let read = round_trip(Entities::Rational128);
+    let near = |a: &[f64], b: &[f64]| {
+        for (a, b) in a.iter().zip(b) {
+            assert!((a - b).abs() < 1e-9, "{a} {b}");
+        }
+    };
+    for (face, original) in read.faces.iter().zip(&sample::model().faces) {
+        let Surface::Patches(patches) = &original.surface;
+        let TrimmedSurface::BSpline(surface) = &face.surface else {
+            panic!("{:?}", face.surface);
+        };
+        let ((u0, u1), (v0, v1)) = (patches.u_domain(), patches.v_domain());
+        for i in 0..=17 {
+            for j in 0..=17 {
+                let u = u0 + (u1 - u0) * f64::from(i) / 17.0;
+                let v = v0 + (v1 - v0) * f64::from(j) / 17.0;
+                near(&surface.evaluate(u, v), &patches.evaluate(u, v));
+            }
+        }
+        let borders = std::iter::once(&original.outer).chain(&original.inner);
+        let curves = std::iter::once(&face.outer).chain(&face.inner);
+        let pairs = curves
+            .flatten()
+            .zip(borders.flat_map(|border| &border.coedges));
+        for (curve, coedge) in pairs {
+            let (first, last) = coedge.parameter_curve.domain();
+            for k in 0..=50 {
+                let t = first + (last - first) * f64::from(k) / 50.0;
+                near(
+                    &curve.parameter_curve.evaluate(t),
+                    &coedge.parameter_curve.evaluate(t),
+                );
+                near(
+                    &curve.space_curve.evaluate(t),
+                    &coedge.space_curve.evaluate(t),
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_same_bytes_every_time() {
+    let options = WriteOptions::new("sample", "20261121.093000");
+    let write = || {
+        let mut file = Vec::new();
+        iges::write(&sample::model(), &options, &mut file).unwrap();
+        file
+    };
+    assert_eq!(write(), write());
+}
