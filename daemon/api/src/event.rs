@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::job::{Job, JobId};
 use crate::scan::Scan;
-use crate::status::Status;
+use crate::status::{ScannerStatus, Status};
 
 /// One server-sent event. Its kind is also the `event:` field of the stream.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -12,6 +12,8 @@ use crate::status::Status;
 pub enum Event {
     /// First on every stream, so that nothing is missed between asking and listening.
     Status(Status),
+    /// The scanner was reached, lost, or got into trouble.
+    Scanner(ScannerStatus),
     /// A scan began or changed its state.
     Scan(Scan),
     /// A column is on disk.
@@ -65,6 +67,9 @@ pub enum Event {
         /// How many were lost.
         missed: u64,
     },
+    /// Of a kind that this version does not know; never sent.
+    #[serde(other)]
+    Unknown,
 }
 
 impl Event {
@@ -73,12 +78,14 @@ impl Event {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Status(_) => "status",
+            Self::Scanner(_) => "scanner",
             Self::Scan(_) => "scan",
             Self::Column { .. } => "column",
             Self::Job(_) => "job",
             Self::Progress { .. } => "progress",
             Self::Published { .. } => "published",
             Self::Lagged { .. } => "lagged",
+            Self::Unknown => "unknown",
         }
     }
 }
@@ -128,6 +135,12 @@ mod tests {
         assert_eq!(back, column);
         let z: Vec<f64> = back.z_mm().collect();
         assert!(z[1].is_nan() && (z[3] - 12.346).abs() < 1e-12, "{z:?}");
+    }
+
+    #[test]
+    fn an_event_of_a_later_version_is_not_an_error() {
+        let event: Event = serde_json::from_str(r#"{"kind":"tea","minutes":3}"#).unwrap();
+        assert_eq!(event, Event::Unknown);
     }
 
     #[test]

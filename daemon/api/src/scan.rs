@@ -48,16 +48,22 @@ pub struct PlanRequest {
     /// Distance of neighbouring columns, millimetres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pitch_mm: Option<f64>,
-    /// Number of columns, instead of `x_last_mm`.
+    /// Number of columns. With a pitch it takes the place of `x_last_mm`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub columns: Option<u32>,
-    /// Angle of the lowest ray, degrees (polar heads), or its y in millimetres.
+    /// Angle of the lowest ray, degrees; for heads that turn their ray.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub angle_first_deg: Option<f64>,
-    /// Angle of the highest ray, degrees.
+    /// Angle of the highest ray, degrees; for heads that turn their ray.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub angle_last_deg: Option<f64>,
-    /// Rays in a column.
+    /// y of the lowest sample, millimetres; for profile sensors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub y_first_mm: Option<f64>,
+    /// y of the highest sample, millimetres; for profile sensors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub y_last_mm: Option<f64>,
+    /// Samples in a column.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub samples: Option<u16>,
     /// Exposure of a sample, microseconds.
@@ -66,6 +72,29 @@ pub struct PlanRequest {
 }
 
 impl PlanRequest {
+    /// This request, with what it leaves out taken from another.
+    #[must_use]
+    pub fn or(&self, other: &Self) -> Self {
+        // A pitch and a number of columns contradict each other, so either displaces both.
+        let spacing = if self.pitch_mm.is_some() || self.columns.is_some() {
+            self
+        } else {
+            other
+        };
+        Self {
+            x_first_mm: self.x_first_mm.or(other.x_first_mm),
+            x_last_mm: self.x_last_mm.or(other.x_last_mm),
+            pitch_mm: spacing.pitch_mm,
+            columns: spacing.columns,
+            angle_first_deg: self.angle_first_deg.or(other.angle_first_deg),
+            angle_last_deg: self.angle_last_deg.or(other.angle_last_deg),
+            y_first_mm: self.y_first_mm.or(other.y_first_mm),
+            y_last_mm: self.y_last_mm.or(other.y_last_mm),
+            samples: self.samples.or(other.samples),
+            exposure_us: self.exposure_us.or(other.exposure_us),
+        }
+    }
+
     /// True when nothing is asked for in particular.
     #[must_use]
     pub fn is_empty(&self) -> bool {
@@ -157,4 +186,50 @@ pub struct Scan {
 pub struct ScanList {
     /// Newest first.
     pub scans: Vec<Scan>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_request_goes_before_the_configuration() {
+        let configured = PlanRequest {
+            x_first_mm: Some(-50.0),
+            x_last_mm: Some(50.0),
+            pitch_mm: Some(0.5),
+            samples: Some(256),
+            ..PlanRequest::default()
+        };
+        let asked = PlanRequest {
+            x_last_mm: Some(10.0),
+            columns: Some(20),
+            ..PlanRequest::default()
+        };
+        let merged = asked.or(&configured);
+        assert_eq!(
+            merged,
+            PlanRequest {
+                x_first_mm: Some(-50.0),
+                x_last_mm: Some(10.0),
+                pitch_mm: None,
+                columns: Some(20),
+                samples: Some(256),
+                ..PlanRequest::default()
+            }
+        );
+        assert_eq!(PlanRequest::default().or(&configured), configured);
+        assert!(PlanRequest::default().is_empty() && !asked.is_empty());
+    }
+
+    #[test]
+    fn a_misspelt_wish_is_refused() {
+        let error = serde_json::from_str::<StartScan>(r#"{"name":"a","operater":"b"}"#)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("unknown field `operater`"), "{error}");
+        let request: StartScan = serde_json::from_str("{}").unwrap();
+        assert_eq!(request, StartScan::default());
+        assert_eq!(serde_json::to_string(&request).unwrap(), "{}");
+    }
 }

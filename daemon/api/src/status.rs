@@ -38,6 +38,19 @@ pub enum ScannerLink {
     Trouble,
 }
 
+impl ScannerLink {
+    /// As it is spelt in JSON.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Unknown => "unknown",
+            Self::Ready => "ready",
+            Self::Scanning => "scanning",
+            Self::Trouble => "trouble",
+        }
+    }
+}
+
 /// What is known of the scanner.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScannerStatus {

@@ -118,6 +118,7 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
             angle_last_deg: plan.angle_last_deg,
             samples: plan.samples,
             exposure_us: plan.exposure_us,
+            ..PlanRequest::default()
         },
         settings: setting::overrides(args.settings),
     };

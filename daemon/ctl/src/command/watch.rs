@@ -114,5 +114,17 @@ fn line(event: &Event) -> String {
             format!("job {job}: published {directory} ({})", files.join(", "))
         }
         Event::Lagged { missed } => format!("({missed} events were lost: too slow a reader)"),
+        Event::Scanner(scanner) => {
+            let problem = scanner
+                .problem
+                .as_ref()
+                .map_or(String::new(), |problem| format!(": {problem}"));
+            format!(
+                "scanner at {}: {}{problem}",
+                scanner.endpoint,
+                scanner.link.as_str()
+            )
+        }
+        Event::Unknown => "(an event this program does not know)".to_owned(),
     }
 }
