@@ -10,8 +10,6 @@ mod opening;
 mod receive;
 mod request;
 mod scan;
-#[cfg(test)]
-mod tests;
 
 use std::collections::VecDeque;
 use std::time::Duration;

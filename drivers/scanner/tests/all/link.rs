@@ -1,0 +1,236 @@
+//! The device's thread over pipes in memory. What is awaited is awaited by events; no
+//! outcome here depends on how fast the machine is.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, mpsc};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use scanner_driver::transport::memory::{self, MemoryTransport};
+use scanner_driver::transport::{Connector, Transport};
+use scanner_driver::{LinkScanner, LinkSettings, Scanner, ScannerError};
+
+use crate::bench::{expected, plan};
+use crate::device::Device;
+
+/// A device on a thread of its own, at the other end of a transport.
+pub(crate) struct Running {
+    pub(crate) device: Arc<Mutex<Device>>,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Running {
+    pub(crate) fn serve(
+        device: Arc<Mutex<Device>>,
+        mut transport: impl Transport + 'static,
+    ) -> Self {
+        let stop = Arc::new(AtomicBool::new(false));
+        let (shared, stopped) = (Arc::clone(&device), Arc::clone(&stop));
+        let thread = std::thread::spawn(move || {
+            let start = Instant::now();
+            let mut buffer = [0; 1024];
+            while !stopped.load(Ordering::Relaxed) {
+                let Ok(count) = transport.read(&mut buffer, Duration::from_millis(1)) else {
+                    return;
+                };
+                let frames = {
+                    let mut device = shared.lock().unwrap();
+                    device.receive(&buffer[..count], start.elapsed());
+                    device.poll(start.elapsed())
+                };
+                for frame in frames {
+                    let mut rest = frame.as_bytes();
+                    while !rest.is_empty() && !stopped.load(Ordering::Relaxed) {
+                        match transport.write(rest, Duration::from_millis(10)) {
+                            Ok(count) => rest = &rest[count..],
+                            Err(_) => return,
+                        }
+                    }
+                }
+            }
+        });
+        Self {
+            device,
+            stop,
+            thread: Some(thread),
+        }
+    }
+
+    /// Pulls the cable: waits until the transport is gone.
+    pub(crate) fn pull(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            thread.join().unwrap();
+        }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.pull();
+    }
+}
+
+/// A connector over the transports that are put into the channel, one for each connection.
+fn plug() -> (mpsc::Sender<MemoryTransport>, impl Connector) {
+    let (sockets, plugged) = mpsc::channel::<MemoryTransport>();
+    let connector = ("memory".to_owned(), move || {
+        plugged
+            .try_recv()
+            .map(|end| Box::new(end) as Box<dyn Transport>)
+            .map_err(|_| ScannerError::NoSuchPort {
+                port: "memory".to_owned(),
+            })
+    });
+    (sockets, connector)
+}
+
+fn connect(device: Device) -> (LinkScanner, Running, mpsc::Sender<MemoryTransport>) {
+    let (sockets, connector) = plug();
+    let (ours, theirs) = memory::pair();
+    sockets.send(ours).unwrap();
+    let running = Running::serve(Arc::new(Mutex::new(device)), theirs);
+    let scanner = LinkScanner::start(connector, LinkSettings::default()).unwrap();
+    (scanner, running, sockets)
+}
+
+/// Waits for something that the device's own thread will bring about.
+fn eventually(what: &str, done: impl Fn() -> bool) {
+    let until = Instant::now() + Duration::from_secs(30);
+    while !done() {
+        assert!(Instant::now() < until, "never: {what}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+#[test]
+fn a_scan_runs_from_start_to_end() {
+    let (scanner, running, _sockets) = connect(Device::new());
+    let identity = scanner.identify().unwrap();
+    assert_eq!(identity.model.as_str(), "Bench");
+    scanner.home().unwrap();
+    let mut stream = scanner.start_scan(&plan(80)).unwrap();
+    assert_eq!(stream.info().columns, 80);
+    let acknowledger = stream.acknowledger();
+    for index in 0..80 {
+        assert_eq!(stream.next().unwrap(), Some(expected(index)));
+        acknowledger.acknowledge(index);
+    }
+    assert_eq!(stream.next(), Ok(None));
+    assert_eq!(stream.next(), Ok(None));
+    eventually("the scan is closed", || {
+        !running.device.lock().unwrap().has_scan()
+    });
+    assert!(scanner.status().unwrap().homed);
+}
+
+#[test]
+fn a_slow_reader_holds_the_device_up_and_loses_nothing() {
+    let (scanner, running, _sockets) = connect(Device {
+        max_credits: 4,
+        columns_per_poll: 100,
+        ..Device::homed()
+    });
+    let mut stream = scanner.start_scan(&plan(50)).unwrap();
+    eventually("the credit is used up", || {
+        running.device.lock().unwrap().sent_columns() == 4
+    });
+    for index in 0..50 {
+        assert_eq!(stream.next().unwrap(), Some(expected(index)));
+        stream.acknowledger().acknowledge(index);
+    }
+    assert_eq!(stream.next(), Ok(None));
+    assert_eq!(running.device.lock().unwrap().most_unacknowledged, 4);
+}
+
+#[test]
+fn an_abort_from_another_thread_wakes_the_reader() {
+    let (scanner, running, _sockets) = connect(Device {
+        columns_per_poll: 0,
+        ..Device::homed()
+    });
+    let mut stream = scanner.start_scan(&plan(50)).unwrap();
+    let reader = std::thread::spawn(move || stream.next());
+    scanner.abort().unwrap();
+    assert_eq!(reader.join().unwrap(), Err(ScannerError::Aborted));
+    assert!(!running.device.lock().unwrap().laser_on);
+}
+
+#[test]
+fn dropping_the_stream_or_the_scanner_turns_the_laser_off() {
+    let (scanner, running, _sockets) = connect(Device::homed());
+    let stream = scanner.start_scan(&plan(100_000)).unwrap();
+    assert!(running.device.lock().unwrap().laser_on);
+    drop(stream);
+    eventually("laser off", || !running.device.lock().unwrap().laser_on);
+
+    let mut stream = scanner.start_scan(&plan(100_000)).unwrap();
+    assert!(running.device.lock().unwrap().laser_on);
+    drop(scanner);
+    assert!(!running.device.lock().unwrap().laser_on);
+    // The columns that had come are still there; then the stream ends.
+    let end = std::iter::repeat_with(|| stream.next()).find(|next| !matches!(next, Ok(Some(_))));
+    assert_eq!(end, Some(Err(ScannerError::Closed)));
+}
+
+#[test]
+fn a_late_acknowledgement_does_not_count_for_the_next_scan() {
+    let (scanner, running, _sockets) = connect(Device {
+        max_credits: 4,
+        ..Device::homed()
+    });
+    let first = scanner.start_scan(&plan(50)).unwrap();
+    let late = first.acknowledger();
+    drop(first);
+    let mut second = scanner.start_scan(&plan(50)).unwrap();
+    for index in 0..4 {
+        assert_eq!(second.next().unwrap(), Some(expected(index)));
+        late.acknowledge(index);
+    }
+    // A status goes the same way as the acknowledgements, after them.
+    scanner.status().unwrap();
+    scanner.status().unwrap();
+    assert_eq!(running.device.lock().unwrap().sent_columns(), 4);
+}
+
+#[test]
+fn a_pulled_cable_is_told_and_the_next_connection_is_found() {
+    let (scanner, mut running, sockets) = connect(Device::homed());
+    let mut stream = scanner.start_scan(&plan(100_000)).unwrap();
+    assert!(stream.next().is_ok());
+    running.pull();
+    let end = std::iter::repeat_with(|| stream.next()).find_map(Result::err);
+    assert!(
+        matches!(&end, Some(ScannerError::LostConnection { why, .. }) if why.contains("unplugged")),
+        "{end:?}"
+    );
+    assert!(matches!(
+        scanner.identify(),
+        Err(ScannerError::NoSuchPort { .. })
+    ));
+
+    let (ours, theirs) = memory::pair();
+    sockets.send(ours).unwrap();
+    let device = Arc::clone(&running.device);
+    let _again = Running::serve(device, theirs);
+    assert_eq!(scanner.identify().unwrap().serial.as_str(), "0001");
+    let mut stream = scanner.start_scan(&plan(4)).unwrap();
+    for index in 0..4 {
+        assert_eq!(stream.next().unwrap(), Some(expected(index)));
+    }
+    assert_eq!(stream.next(), Ok(None));
+}
+
+#[test]
+fn contradictory_settings_are_refused_at_once() {
+    let (_sockets, connector) = plug();
+    let settings = LinkSettings {
+        credits: 0,
+        ..LinkSettings::default()
+    };
+    assert!(matches!(
+        LinkScanner::start(connector, settings),
+        Err(ScannerError::Settings(_))
+    ));
+}

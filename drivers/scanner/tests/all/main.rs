@@ -1,0 +1,14 @@
+//! The driver against a small device of its own: session alone under simulated time, then
+//! the thread over memory and over a pseudo-terminal.
+
+// A helper that unwraps fails its test, as it should.
+#![allow(clippy::unwrap_used)]
+
+mod bench;
+mod device;
+mod faults;
+mod hostile;
+mod link;
+mod opening;
+mod pty;
+mod scans;
