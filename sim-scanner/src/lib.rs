@@ -19,13 +19,20 @@
 //!
 //! The crate shares no code with the geometry that is judged by what [`truth`] says.
 
+pub mod config;
+pub mod control;
+pub mod device;
+pub mod endpoint;
+pub mod line;
 pub mod mechanics;
 pub mod noise;
 pub mod optics;
 pub mod preset;
 pub mod random;
+pub mod replay;
 pub mod scanner;
 pub mod scene;
+pub mod source;
 pub mod truth;
 
 pub use glam::DVec3 as Vec3;

@@ -264,7 +264,7 @@ impl Preset {
 }
 
 /// Travel of the table, millimetres.
-pub const TABLE_MM: f64 = 1_000.0;
+pub const TABLE_MM: f64 = 400.0;
 const TABLE_COUNT_NM: u32 = 10_000;
 const ANGLE_COUNT_NRAD: u32 = 1_000;
 /// Free space around the object in a proposed scan, millimetres.

@@ -1,0 +1,243 @@
+//! The control side: what a test does to a running device, and what it waits for.
+//!
+//! Tests wait for events, never for a while: [`Control::wait_for`] returns as soon as the
+//! event is there, and its time limit only keeps a broken test from hanging.
+
+use std::io::Write;
+use std::os::unix::net::UnixStream;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use scanner_protocol::{Faults, ResetCause};
+use thiserror::Error;
+
+use crate::device::{Device, Event, Snapshot};
+
+/// What the endpoint's thread and the controls share.
+#[derive(Debug)]
+pub(crate) struct Shared {
+    pub(crate) bench: Mutex<Running>,
+    changed: Condvar,
+    /// A byte written here wakes the endpoint's thread.
+    waker: UnixStream,
+    started: Instant,
+}
+
+#[derive(Debug)]
+pub(crate) struct Running {
+    pub(crate) device: Device,
+    /// Nothing is taken in and nothing is sent.
+    pub(crate) stalled: bool,
+    /// Whether a host has the port open; unknown for endpoints without one.
+    pub(crate) host_connected: Option<bool>,
+    pub(crate) ended: bool,
+}
+
+impl Shared {
+    pub(crate) fn new(device: Device, waker: UnixStream, started: Instant) -> Arc<Self> {
+        Arc::new(Self {
+            bench: Mutex::new(Running {
+                device,
+                stalled: false,
+                host_connected: None,
+                ended: false,
+            }),
+            changed: Condvar::new(),
+            waker,
+            started,
+        })
+    }
+
+    /// A panic elsewhere leaves the device in a state as good as any for a test to look at.
+    pub(crate) fn lock(&self) -> MutexGuard<'_, Running> {
+        self.bench.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn now(&self) -> Duration {
+        self.started.elapsed()
+    }
+
+    pub(crate) fn notify(&self) {
+        self.changed.notify_all();
+    }
+
+    pub(crate) fn wake(&self) {
+        // A full pipe means that a wake-up is under way already.
+        let _ = (&self.waker).write(&[1]);
+    }
+}
+
+/// What a test waited for did not come in time.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("waited {waited:?} in vain; the last events were {last:?}, the device is {snapshot:?}")]
+pub struct WaitError {
+    /// How long.
+    pub waited: Duration,
+    /// The latest events.
+    pub last: Vec<Event>,
+    /// How the device is.
+    pub snapshot: Box<Snapshot>,
+}
+
+/// A hand on a running device. Clones share the device, but each waits on its own.
+#[derive(Debug, Clone)]
+pub struct Control {
+    shared: Arc<Shared>,
+    /// Number of the first event not yet waited for.
+    next: u64,
+}
+
+impl Control {
+    pub(crate) fn new(shared: Arc<Shared>) -> Self {
+        Self { shared, next: 0 }
+    }
+
+    fn act(&self, action: impl FnOnce(&mut Running, Duration)) {
+        let now = self.shared.now();
+        action(&mut self.shared.lock(), now);
+        self.shared.wake();
+        self.shared.notify();
+    }
+
+    /// Silences the device: it neither hears nor speaks until [`Control::resume`]. Its own
+    /// clock goes on.
+    pub fn stall(&self) {
+        self.act(|running, _| running.stalled = true);
+    }
+
+    /// Ends a stall.
+    pub fn resume(&self) {
+        self.act(|running, _| running.stalled = false);
+    }
+
+    /// See [`Device::step_columns`].
+    pub fn step_columns(&self, columns: Option<u32>) {
+        self.act(|running, _| running.device.step_columns(columns));
+    }
+
+    /// See [`Device::drop_frames`].
+    pub fn drop_frames(&self, frames: u32) {
+        self.act(|running, _| running.device.drop_frames(frames));
+    }
+
+    /// See [`Device::corrupt_frames`].
+    pub fn corrupt_frames(&self, frames: u32) {
+        self.act(|running, _| running.device.corrupt_frames(frames));
+    }
+
+    /// See [`Device::send_garbage`].
+    pub fn send_garbage(&self, bytes: &[u8]) {
+        self.act(|running, _| running.device.send_garbage(bytes));
+    }
+
+    /// See [`Device::raise_faults`].
+    pub fn raise_faults(&self, faults: Faults) {
+        self.act(|running, now| running.device.raise_faults(faults, now));
+    }
+
+    /// See [`Device::mend`].
+    pub fn mend(&self, faults: Faults) {
+        self.act(|running, _| running.device.mend(faults));
+    }
+
+    /// Starts the firmware anew, with these bytes on the line before the banner.
+    pub fn reset(&self, cause: ResetCause, garbage: &[u8]) {
+        self.act(|running, now| {
+            running.device.send_garbage(garbage);
+            running.device.reset(cause, now);
+        });
+    }
+
+    /// See [`Device::press_stop`].
+    pub fn press_stop(&self) {
+        self.act(|running, now| running.device.press_stop(now));
+    }
+
+    /// How the device is.
+    #[must_use]
+    pub fn snapshot(&self) -> Snapshot {
+        self.shared.lock().device.snapshot(self.shared.now())
+    }
+
+    /// Whether a host has the port open; `None` for endpoints that cannot tell.
+    #[must_use]
+    pub fn host_connected(&self) -> Option<bool> {
+        self.shared.lock().host_connected
+    }
+
+    /// Everything that has happened and is still remembered.
+    #[must_use]
+    pub fn events(&self) -> Vec<Event> {
+        self.shared.lock().device.events()
+    }
+
+    /// The next event that is looked for, from the one last waited for on; those in between
+    /// are passed over.
+    ///
+    /// # Errors
+    /// [`WaitError`] when it has not come within the limit.
+    pub fn wait_for(
+        &mut self,
+        limit: Duration,
+        wanted: impl Fn(&Event) -> bool,
+    ) -> Result<Event, WaitError> {
+        let next = self.next;
+        let (number, event) = self.wait(limit, |running, _| {
+            running
+                .device
+                .log()
+                .since(next)
+                .find(|(_, event)| wanted(event))
+        })?;
+        self.next = number + 1;
+        Ok(event)
+    }
+
+    /// Waits until the device is as wanted.
+    ///
+    /// # Errors
+    /// [`WaitError`] when it has not become so within the limit.
+    pub fn wait_until(
+        &self,
+        limit: Duration,
+        wanted: impl Fn(&Snapshot) -> bool,
+    ) -> Result<Snapshot, WaitError> {
+        self.wait(limit, |running, now| {
+            Some(running.device.snapshot(now)).filter(&wanted)
+        })
+    }
+
+    /// Passes over all that has happened so far.
+    pub fn skip_events(&mut self) {
+        self.next = self.shared.lock().device.log().end();
+    }
+
+    fn wait<T>(
+        &self,
+        limit: Duration,
+        found: impl Fn(&Running, Duration) -> Option<T>,
+    ) -> Result<T, WaitError> {
+        let start = Instant::now();
+        let mut running = self.shared.lock();
+        loop {
+            if let Some(found) = found(&running, self.shared.now()) {
+                return Ok(found);
+            }
+            let waited = start.elapsed();
+            if waited >= limit || running.ended {
+                let last = running.device.events();
+                return Err(WaitError {
+                    waited,
+                    last: last.iter().rev().take(12).rev().copied().collect(),
+                    snapshot: Box::new(running.device.snapshot(self.shared.now())),
+                });
+            }
+            running = self
+                .shared
+                .changed
+                .wait_timeout(running, limit - waited)
+                .unwrap_or_else(PoisonError::into_inner)
+                .0;
+        }
+    }
+}

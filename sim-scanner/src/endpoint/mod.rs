@@ -1,0 +1,4 @@
+//! Where a device meets a host.
+
+pub mod memory;
+pub mod pty;

@@ -1,0 +1,320 @@
+//! The simulated scanner as a program: makes a pseudo-terminal and serves until ended.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+
+use sim_scanner::config::{Object, SimConfig};
+use sim_scanner::device::DeviceSettings;
+use sim_scanner::line::LineFaults;
+use sim_scanner::preset::{Overrides, Preset};
+use sim_scanner::source::Source;
+
+/// A simulated slide-table laser scanner on a pseudo-terminal.
+///
+/// Makes a pseudo-terminal, links it at LINK, and behaves on it like a scanner on a serial
+/// port until it is ended (Ctrl-C, or the TERM signal), when it removes the link.
+#[derive(Debug, Parser)]
+#[command(name = "sim-scanner", version)]
+struct Cli {
+    /// Where to link the pseudo-terminal; a link that is there is replaced
+    #[arg(long, value_name = "LINK")]
+    pty: PathBuf,
+
+    /// What stands on the table: house, cylinder, figure, groove, or an STL file in mm, which
+    /// keeps its own coordinates
+    #[arg(long, default_value = "house", value_name = "OBJECT|FILE.stl")]
+    object: Object,
+
+    /// The scanner to imitate
+    #[arg(long, value_enum, default_value = "paper")]
+    preset: PresetName,
+
+    /// Send a recorded scan (text, PLY; plain or gzip) instead of measuring an object
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["object", "preset"])]
+    replay: Option<PathBuf>,
+
+    /// Columns of the proposed scan
+    #[arg(long, value_name = "N")]
+    columns: Option<u32>,
+
+    /// Samples per column of the proposed scan
+    #[arg(long, value_name = "N")]
+    samples: Option<u32>,
+
+    /// Distance between the columns of the proposed scan, mm
+    #[arg(long, value_name = "P")]
+    pitch_mm: Option<f64>,
+
+    /// Seed of noise, outliers and dropouts
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    seed: u64,
+
+    /// Range noise at normal incidence (1 sigma), mm
+    #[arg(long, value_name = "S")]
+    noise_mm: Option<f64>,
+
+    /// Probability of an outlier anywhere in the range window
+    #[arg(long, value_name = "P")]
+    outliers: Option<f64>,
+
+    /// Probability of an outlier before the surface
+    #[arg(long, value_name = "P")]
+    outliers_one_sided: Option<f64>,
+
+    /// Probability that a run of 3 to 8 outliers starts at a sample
+    #[arg(long, value_name = "P")]
+    outlier_clusters: Option<f64>,
+
+    /// Probability that a sample whose spot lies on a step edge is mixed
+    #[arg(long, value_name = "P")]
+    mixed: Option<f64>,
+
+    /// Probability of a lost sample at normal incidence
+    #[arg(long, value_name = "P")]
+    dropouts: Option<f64>,
+
+    /// Range (or y and z) per count, mm [paper: 0.1]
+    #[arg(long, value_name = "C")]
+    range_count_mm: Option<f64>,
+
+    /// Distance of the camera from the object's middle, mm [paper: 750]
+    #[arg(long, value_name = "D")]
+    standoff_mm: Option<f64>,
+
+    /// Scatter of the table's stops, which the encoder reports (1 sigma), mm
+    #[arg(long, value_name = "S")]
+    jitter_mm: Option<f64>,
+
+    /// Play of the table when it travels backwards, mm
+    #[arg(long, value_name = "B")]
+    backlash_mm: Option<f64>,
+
+    /// Show the table's top just below the object
+    #[arg(long)]
+    table_plane: bool,
+
+    /// Show a plane this far behind the object, mm
+    #[arg(long, value_name = "D")]
+    back_plane_mm: Option<f64>,
+
+    /// Columns per second; 0 or max for as fast as the host grants credit
+    #[arg(long, default_value = "max", value_name = "HZ", value_parser = line_rate)]
+    line_rate: LineRate,
+
+    /// Speed of the table on its way, mm/s; 0 for at once
+    #[arg(long, default_value_t = 200.0, value_name = "V")]
+    table_speed: f64,
+
+    /// Give each scan noise of its own; otherwise equal scans are equal to the bit
+    #[arg(long)]
+    fresh_noise: bool,
+
+    /// Serial number that the device reports
+    #[arg(long, default_value = "SIM-0001", value_name = "TEXT")]
+    serial: String,
+
+    /// Faults of the line, as key=value,...: flip (per bit), lose, garbage and stall (per
+    /// byte), stall-ms, to (host, device or both), seed. Example: flip=1e-5,lose=1e-5,seed=7
+    #[arg(
+        long,
+        default_value = "",
+        hide_default_value = true,
+        value_name = "SPEC"
+    )]
+    faults: LineFaults,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum PresetName {
+    /// 240 columns by 256 samples, 0.1 mm counts, from 750 mm
+    Paper,
+    /// Columns 0.25 mm apart, samples 1.4 mm apart
+    Cyberware,
+    /// Samples 0.147 mm apart, from close by
+    Rf627,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct LineRate(Option<f64>);
+
+fn line_rate(text: &str) -> Result<LineRate, String> {
+    if text == "max" {
+        return Ok(LineRate(None));
+    }
+    match text.parse::<f64>() {
+        Ok(0.0) => Ok(LineRate(None)),
+        Ok(rate) if (0.001..=1e6).contains(&rate) => Ok(LineRate(Some(rate))),
+        _ => Err("give columns per second (0.001 to 1000000), or 0 or max".into()),
+    }
+}
+
+impl Cli {
+    fn config(self) -> SimConfig {
+        SimConfig {
+            object: self.replay.map_or(self.object, Object::Recording),
+            preset: match self.preset {
+                PresetName::Paper => Preset::Paper,
+                PresetName::Cyberware => Preset::Cyberware,
+                PresetName::Rf627 => Preset::Rf627,
+            },
+            overrides: Overrides {
+                columns: self.columns,
+                samples: self.samples,
+                pitch_mm: self.pitch_mm,
+                range_count_mm: self.range_count_mm,
+                standoff_mm: self.standoff_mm,
+                noise_mm: self.noise_mm,
+                outliers: self.outliers,
+                outliers_one_sided: self.outliers_one_sided,
+                outlier_clusters: self.outlier_clusters,
+                mixed: self.mixed,
+                dropouts: self.dropouts,
+                jitter_mm: self.jitter_mm,
+                backlash_mm: self.backlash_mm,
+            },
+            seed: self.seed,
+            device: DeviceSettings {
+                serial: self.serial,
+                line_rate_hz: self.line_rate.0,
+                table_speed_mm_s: if self.table_speed > 0.0 {
+                    self.table_speed
+                } else {
+                    f64::INFINITY
+                },
+                fresh_noise: self.fresh_noise,
+                ..DeviceSettings::default()
+            },
+            line: self.faults,
+            table_plane: self.table_plane,
+            back_plane_mm: self.back_plane_mm,
+        }
+    }
+}
+
+fn run(cli: Cli) -> Result<(), String> {
+    // Before the link is made, so that a signal never leaves it behind.
+    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])
+        .map_err(|error| format!("cannot wait for signals: {error}"))?;
+    let link = cli.pty.clone();
+    let config = cli.config();
+    let source = config.source().map_err(|error| error.to_string())?;
+    let server = config
+        .serve_with(source.clone(), Some(&link))
+        .map_err(|error| error.to_string())?;
+    describe(&config, &source);
+    println!("port    {} -> {}", link.display(), server.port().display());
+    println!("serving until ended (Ctrl-C)");
+    signals.forever().next();
+    drop(server);
+    println!("ended");
+    Ok(())
+}
+
+fn describe(config: &SimConfig, source: &Source) {
+    println!("object  {}", config.object);
+    println!(
+        "device  {}, serial {}",
+        config.device.model, config.device.serial
+    );
+    match source {
+        Source::Simulated { .. } => {
+            println!("preset  {}, seed {}", config.preset.name(), config.seed);
+        }
+        Source::Replay(replay) => {
+            println!(
+                "points  {} in {} columns",
+                replay.points(),
+                replay.columns()
+            );
+        }
+    }
+    let plan = source.proposed();
+    let calibration = source.calibration();
+    let pitch_mm = f64::from(plan.pitch_counts) * f64::from(calibration.table_count_pm) / 1e9;
+    println!(
+        "plan    {} columns {pitch_mm:.3} mm apart, {} samples each",
+        plan.columns, plan.samples
+    );
+}
+
+fn main() -> ExitCode {
+    match run(Cli::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("sim-scanner: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn the_contract_of_the_program_is_understood() {
+        let cli = Cli::try_parse_from([
+            "sim-scanner",
+            "--pty",
+            "link",
+            "--object",
+            "cylinder",
+            "--columns",
+            "60",
+            "--samples",
+            "64",
+            "--pitch-mm",
+            "0.5",
+            "--seed",
+            "9",
+            "--noise-mm",
+            "0.05",
+            "--outliers",
+            "0.01",
+            "--mixed",
+            "0.2",
+            "--dropouts",
+            "0.01",
+            "--line-rate",
+            "0",
+            "--faults",
+            "flip=1e-5,seed=7",
+        ])
+        .expect("as in the contract");
+        let config = cli.config();
+        assert_eq!(config.object, Object::BuiltIn("cylinder".into()));
+        assert_eq!(config.device.line_rate_hz, None);
+        assert_eq!(config.line.seed, 7);
+        assert!(config.source().is_ok());
+    }
+
+    #[test]
+    fn wrong_usage_is_refused() {
+        for wrong in [
+            &["sim-scanner"][..],
+            &["sim-scanner", "--pty", "l", "--line-rate", "fast"],
+            &["sim-scanner", "--pty", "l", "--faults", "flip"],
+            &[
+                "sim-scanner",
+                "--pty",
+                "l",
+                "--replay",
+                "a",
+                "--object",
+                "b",
+            ],
+        ] {
+            assert!(Cli::try_parse_from(wrong).is_err(), "{wrong:?}");
+        }
+    }
+}
