@@ -60,13 +60,21 @@ pub(crate) fn build(mut gather: Gather<'_>) -> Result<PointScan, ScanFileError> 
         ));
     }
     let intensity_scale = intensity_scale(&points, &mut gather);
-    let (groups, pitch) = group(&points, &mut gather);
+    let Grouping {
+        groups,
+        pitch,
+        cloud_distance,
+    } = group(&points, &mut gather);
     let columns: Vec<PointColumn> = groups
         .into_iter()
         .map(|group| column(&mut points, group, intensity_scale))
         .collect();
-    let spacing_mm = sample_spacing_mm(&columns);
     let pitch_mm = pitch.map(|counts| f64::from(counts) * LATTICE_MM);
+    let spacing_mm = match (cloud_distance, pitch) {
+        // In a cloud's columns spacings scatter widely; the density is what is known.
+        (Some(distance), Some(bin)) => Some(distance * distance / f64::from(bin) * LATTICE_MM),
+        _ => sample_spacing_mm(&columns),
+    };
     if pitch_mm.is_none() {
         gather.note("all points share one x: a single column");
     }
@@ -80,13 +88,29 @@ pub(crate) fn build(mut gather: Gather<'_>) -> Result<PointScan, ScanFileError> 
     })
 }
 
-/// Groups and their pitch; the pitch is `None` for a single column.
-fn group(points: &[Point], gather: &mut Gather<'_>) -> (Vec<Group>, Option<u32>) {
+/// Points put into columns.
+struct Grouping {
+    groups: Vec<Group>,
+    /// `None` for a single column.
+    pitch: Option<u32>,
+    /// Mean distance of points, if they are a cloud.
+    cloud_distance: Option<f64>,
+}
+
+fn group(points: &[Point], gather: &mut Gather<'_>) -> Grouping {
     if let Some(bin) = gather.options.column_pitch_mm.and_then(lattice_counts) {
-        return (bins(points, bin), Some(bin.unsigned_abs()));
+        return Grouping {
+            groups: bins(points, bin),
+            pitch: Some(bin.unsigned_abs()),
+            cloud_distance: None,
+        };
     }
     if let Some((groups, pitch)) = shared_x(points) {
-        return (groups, pitch);
+        return Grouping {
+            groups,
+            pitch,
+            cloud_distance: None,
+        };
     }
     let distance = mean_distance(points);
     let bin = (distance / CLOUD_BINS).round().clamp(10.0, 1e9) as i32;
@@ -96,7 +120,11 @@ fn group(points: &[Point], gather: &mut Gather<'_>) -> (Vec<Group>, Option<u32>)
         distance * LATTICE_MM,
         lattice_mm(bin)
     ));
-    (bins(points, bin), Some(bin.unsigned_abs()))
+    Grouping {
+        groups: bins(points, bin),
+        pitch: Some(bin.unsigned_abs()),
+        cloud_distance: Some(distance),
+    }
 }
 
 /// Columns as the scanner took them, if the points show any.

@@ -90,7 +90,8 @@ pub struct PointScan {
     pub columns: Vec<PointColumn>,
     /// Distance of neighbouring columns in x, millimetres.
     pub column_pitch_mm: f64,
-    /// Median distance in y of neighbouring samples within a column, millimetres.
+    /// Median distance in y of neighbouring samples within a column, millimetres; for a
+    /// cloud the mean one, as it follows from the area that the points cover.
     pub sample_spacing_mm: f64,
     /// What was decided or left out while reading, one sentence each, for the user.
     pub notes: Vec<String>,

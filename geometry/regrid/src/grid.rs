@@ -1,18 +1,16 @@
 //! One column of grid nodes.
 
+use core::f64::consts::PI;
+
 use range_image::{GridColumn, Lattice};
 
 use crate::draws::Draws;
 use crate::neighbours::{Neighbour, Search};
-use crate::plane::{Fit, PlaneFinder};
+use crate::plane::PlaneFinder;
 use crate::settings::{Estimator, LEAST_WINDOW, RegridSettings};
-use crate::strip::{Strip, lower_median};
+use crate::strip::{Strip, typical};
 use crate::support::Surroundings;
 use crate::window::{Spacing, Window};
-
-/// Least number of samples of the smaller windows that are tried where the full one's
-/// plane belongs to another surface.
-const LEAST_RETRY: usize = 8;
 
 /// Computes grid columns; keeps its buffers from one to the next.
 #[derive(Debug, Default)]
@@ -20,6 +18,8 @@ pub(crate) struct GridWorker {
     search: Search,
     finder: PlaneFinder,
     surroundings: Surroundings,
+    /// What is left of a node's window.
+    samples: Vec<Neighbour>,
     lengths: Vec<f64>,
 }
 
@@ -115,46 +115,63 @@ impl GridWorker {
         {
             return None;
         }
+        if settings.estimator == Estimator::LeastSquares {
+            let fit = self.finder.least_squares(nearest)?;
+            let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm);
+            let supported = self
+                .surroundings
+                .supported(nearest, spacing, support, agrees);
+            return supported.then_some(fit.plane.c);
+        }
+        self.samples.clear();
+        self.samples.extend_from_slice(nearest);
         let mut draws = Draws::new(settings.seed, i, j);
-        let mut number = nearest.len();
-        loop {
-            let samples = &nearest[..number];
-            let fit = match settings.estimator {
-                Estimator::LeastMedian => {
-                    self.finder
-                        .least_median(samples, settings.draws, &mut draws)
-                }
-                Estimator::LeastSquares => self.finder.least_squares(samples),
-            };
-            if let Some(Fit { plane, tolerance }) = fit {
-                let tolerance = tolerance.max(support.inlier_floor * spacing.mean_mm);
-                let agrees = |n: &Neighbour| plane.residual(n).abs() <= tolerance;
-                if self
-                    .surroundings
-                    .supported(samples, spacing, support, agrees)
-                {
-                    return Some(plane.c);
-                }
+        while self.samples.len() >= LEAST_WINDOW {
+            let fit = self
+                .finder
+                .least_median(&self.samples, settings.draws, &mut draws)?;
+            if fit.tolerance > support.inlier_ceiling * spacing.mean_mm {
+                // No surface has a majority; the nearer half may show one.
+                let half = self.samples.len() / 2;
+                self.samples.truncate(half);
+                continue;
             }
-            // Most of the window may lie on another surface than the node: a corner in
-            // front of a wall. The nearer half may have the node's own surface in majority.
-            if number / 2 < LEAST_RETRY.max(LEAST_WINDOW) {
+            let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm);
+            if self
+                .surroundings
+                .supported(nearest, spacing, support, &agrees)
+            {
+                return Some(fit.plane.c);
+            }
+            // The majority lies on another surface than the node, as at a corner in front of
+            // a wall. Without it the node's own surface may be found.
+            let before = self.samples.len();
+            self.samples.retain(|n| !agrees(n));
+            if self.samples.len() == before {
                 return None;
             }
-            number /= 2;
         }
+        None
     }
 }
 
-/// The spacing around a node: the median distance in y from the window's samples to the
-/// next ones in their columns.
+/// Share of the spacing that follows from the area of the window, as a circle around the
+/// node, that is believed: at a straight edge half of that circle is empty, which makes
+/// the spacing seem wider by the square root of 2.
+const AREA_SHARE: f64 = 0.7;
+
+/// The spacing around a node, from the distances in y of the window's samples to the next
+/// ones in their columns, but no less than the window's area lets expect.
 fn local_spacing(window: &Window<'_>, nearest: &[Neighbour], lengths: &mut Vec<f64>) -> Spacing {
     lengths.clear();
     for n in nearest {
         lengths.extend(window.strips[n.strip].gaps(n.index));
     }
     let limit_mm = window.greatest_sample_spacing_mm;
-    window.spacing(lower_median(lengths).map_or(limit_mm, |gap| gap.min(limit_mm)))
+    let along = typical(lengths).map_or(limit_mm, |spacing| spacing.min(limit_mm));
+    let area = nearest.last().map_or(0.0, |n| PI * n.distance2);
+    let by_area = (area / nearest.len().max(1) as f64).sqrt();
+    window.widened(window.spacing(along), AREA_SHARE * by_area)
 }
 
 /// Adds a node above all others of the column, masking those in between.

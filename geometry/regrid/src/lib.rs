@@ -27,6 +27,8 @@ mod regridder;
 mod settings;
 mod strip;
 mod support;
+#[cfg(test)]
+mod textbook;
 mod window;
 
 pub use batch::regrid;

@@ -46,6 +46,14 @@ pub(crate) struct Fit {
     pub(crate) tolerance: f64,
 }
 
+impl Fit {
+    /// Tells inliers, which may always lie `floor` from the plane.
+    pub(crate) fn agrees(&self, floor: f64) -> impl Fn(&Neighbour) -> bool + use<> {
+        let (plane, tolerance) = (self.plane, self.tolerance.max(floor));
+        move |n| plane.residual(n).abs() <= tolerance
+    }
+}
+
 /// Standard deviations within which a residual is an inlier's.
 const INLIER_DEVIATIONS: f64 = 2.5;
 
@@ -73,8 +81,9 @@ impl PlaneFinder {
             return None;
         }
         self.load(window);
-        // The median of an even number is the upper one.
-        let middle = number / 2;
+        // The median of an even number is the lower one: at a node between two surfaces that
+        // share its window equally, each then beats the planes that join them.
+        let middle = (number - 1) / 2;
         let mut best: Option<(f64, Plane)> = None;
         let mut tried = 0;
         for _ in 0..planes.saturating_mul(DRAWS_PER_PLANE) {

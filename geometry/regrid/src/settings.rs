@@ -1,5 +1,7 @@
 //! Settings of the regridder.
 
+use core::cmp::Ordering;
+
 /// How z at a node is estimated from its window of samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Estimator {
@@ -40,7 +42,7 @@ impl Default for Roi {
 /// Lengths are in local spacings: the square root of column spacing times sample spacing
 /// (the side of the square that holds one sample on average), but in x at least the column
 /// spacing and in y at least half the sample spacing, so that stretched patterns count as
-/// closed too. Both spacings are medians over the node's surroundings, so they follow the
+/// closed too. Both spacings are taken from the node's surroundings, so they follow the
 /// scan.
 ///
 /// A node is supported when its plane's inliers within `radius` number at least
@@ -56,12 +58,19 @@ pub struct SupportSettings {
     pub radius: f64,
     /// How far outside the hull of its inliers a node may lie. Default 0.4.
     pub margin: f64,
+    /// The same where samples of another surface close the gap on the other side, as at a
+    /// step edge: a little more than half, so that one of the two gets the node.
+    /// Default 0.6.
+    pub step_margin: f64,
     /// Least number of inliers within the radius. Default 3.
     pub least_samples: usize,
     /// Samples are inliers within 2.5 robust standard deviations of the plane, and always
     /// within this many spacings of it (so that coarsely quantised depths stay inliers).
     /// Default 0.5.
     pub inlier_floor: f64,
+    /// A plane whose 2.5 robust standard deviations exceed this many spacings describes no
+    /// surface, only stray samples. Default 4.
+    pub inlier_ceiling: f64,
 }
 
 impl Default for SupportSettings {
@@ -69,8 +78,10 @@ impl Default for SupportSettings {
         Self {
             radius: 2.0,
             margin: 0.4,
+            step_margin: 0.6,
             least_samples: 3,
             inlier_floor: 0.5,
+            inlier_ceiling: 4.0,
         }
     }
 }
@@ -155,14 +166,21 @@ impl RegridSettings {
         count("threads", self.threads, 0, 1024)?;
         number("support.radius", self.support.radius, 1.0, 10.0)?;
         number("support.margin", self.support.margin, 0.0, 1.0)?;
+        number("support.step_margin", self.support.step_margin, 0.0, 1.0)?;
         number("support.inlier_floor", self.support.inlier_floor, 0.0, 10.0)?;
+        number(
+            "support.inlier_ceiling",
+            self.support.inlier_ceiling,
+            self.support.inlier_floor,
+            1000.0,
+        )?;
         count("support.least_samples", self.support.least_samples, 3, 100)?;
         for (axis, (low, high)) in [
             ("roi.x_mm", self.roi.x_mm),
             ("roi.y_mm", self.roi.y_mm),
             ("roi.z_mm", self.roi.z_mm),
         ] {
-            if !(low < high) {
+            if low.partial_cmp(&high) != Some(Ordering::Less) {
                 return Err(SettingsError::Limits { axis, low, high });
             }
         }

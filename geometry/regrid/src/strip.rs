@@ -67,3 +67,65 @@ pub(crate) fn lower_median(values: &mut [f64]) -> Option<f64> {
     let middle = (values.len() - 1) / 2;
     Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
+
+/// Distances count up to this many times their median in [`typical`].
+const DISTANCE_LIMIT: f64 = 4.0;
+
+/// Typical distance: the mean, which follows the density where distances scatter or
+/// samples have dropped out, but with each distance cut to a few times their median, since
+/// the width of an occlusion gap says nothing of the density. Adds up in the order given
+/// and a selection makes of it.
+pub(crate) fn typical(distances: &mut [f64]) -> Option<f64> {
+    let limit = DISTANCE_LIMIT * lower_median(distances)?;
+    let sum: f64 = distances.iter().map(|distance| distance.min(limit)).sum();
+    Some(sum / distances.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use range_image::Sample;
+
+    #[test]
+    fn typical_distances_ignore_the_width_of_gaps() {
+        assert_eq!(typical(&mut [1.0, 1.0, 1.0, 3.0]), Some(1.5));
+        assert_eq!(typical(&mut [1.0, 1.0, 1.0, 500.0]), Some(1.75));
+        assert_eq!(typical(&mut []), None);
+    }
+
+    #[test]
+    fn the_region_of_interest_cuts_on_all_sides() {
+        let samples = (0..10).map(|k| Sample {
+            y_mm: f64::from(k),
+            z_mm: 10.0 * f64::from(k),
+            intensity: 9,
+        });
+        let column = Column::new(5.0, samples.collect());
+        let roi = Roi {
+            x_mm: (5.0, 6.0),
+            y_mm: (2.0, 8.0),
+            z_mm: (30.0, 65.0),
+        };
+        let strip = Strip::new(&column, &roi, 0).unwrap();
+        let heights: Vec<f64> = strip.samples.iter().map(|s| s.0).collect();
+        assert_eq!(heights, [3.0, 4.0, 5.0, 6.0]);
+        let aside = Roi {
+            x_mm: (5.5, 6.0),
+            ..roi
+        };
+        assert!(Strip::new(&column, &aside, 0).unwrap().samples.is_empty());
+    }
+
+    #[test]
+    fn gaps_look_both_ways_and_skip_equal_heights() {
+        let strip = Strip {
+            x_mm: 0.0,
+            samples: vec![(0.0, 1.0), (1.0, 1.0), (1.0, 2.0), (4.0, 1.0)],
+        };
+        let gaps = |index| strip.gaps(index).collect::<Vec<_>>();
+        assert_eq!(gaps(0), [1.0]);
+        assert_eq!(gaps(1), [1.0]);
+        assert_eq!(gaps(2), [3.0]);
+        assert_eq!(gaps(3), [3.0]);
+    }
+}

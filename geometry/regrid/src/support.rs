@@ -8,28 +8,45 @@ use crate::window::Spacing;
 #[derive(Debug, Default)]
 pub(crate) struct Surroundings {
     points: Vec<(f64, f64)>,
+    others: Vec<(f64, f64)>,
 }
 
 impl Surroundings {
-    /// Whether the samples near the node support a value there. `admits` says which
-    /// samples count.
+    /// Whether the samples near the node support a value there. `agrees` tells inliers.
     pub(crate) fn supported(
         &mut self,
         window: &[Neighbour],
         spacing: Spacing,
         settings: &SupportSettings,
-        admits: impl Fn(&Neighbour) -> bool,
+        agrees: impl Fn(&Neighbour) -> bool,
     ) -> bool {
         self.points.clear();
+        self.others.clear();
         for neighbour in window {
             let (u, v) = (neighbour.dx / spacing.x_mm, neighbour.dy / spacing.y_mm);
-            if u * u + v * v <= settings.radius * settings.radius && admits(neighbour) {
-                self.points.push((u, v));
+            if u * u + v * v <= settings.radius * settings.radius {
+                if agrees(neighbour) {
+                    self.points.push((u, v));
+                } else {
+                    self.others.push((u, v));
+                }
             }
         }
-        self.points.len() >= settings.least_samples
-            && (hull_holds_origin(&self.points)
-                || hull_distance2(&self.points) <= settings.margin * settings.margin)
+        if self.points.len() < settings.least_samples {
+            return false;
+        }
+        if hull_holds_origin(&self.points) {
+            return true;
+        }
+        let distance2 = hull_distance2(&self.points);
+        if distance2 <= settings.margin * settings.margin {
+            return true;
+        }
+        // At a step edge without a gap the node belongs to one surface or the other.
+        distance2 <= settings.step_margin * settings.step_margin && {
+            self.points.append(&mut self.others);
+            hull_holds_origin(&self.points)
+        }
     }
 }
 

@@ -1,11 +1,17 @@
 //! The columns that the nodes of one grid column may draw on.
 
 use crate::settings::RegridSettings;
-use crate::strip::{Strip, lower_median};
+use crate::strip::{Strip, lower_median, typical};
 
 /// Within a window the local sample spacing is believed up to this many times the median
 /// one, which bounds the area a node has to look at.
 const SPACING_LIMIT: f64 = 4.0;
+/// It is also believed only up to this many times the spacing for which the pitch would be
+/// about right. Where a window holds stray samples alone, their distances say nothing.
+const PITCH_LIMIT: f64 = 4.0;
+/// A node's window may show samples to be thinner than their distances along columns say,
+/// up to this factor.
+const WIDENING_LIMIT: f64 = 2.0;
 
 /// Columns within reach of a grid column, and what follows from them for all its nodes.
 #[derive(Debug)]
@@ -13,7 +19,7 @@ pub(crate) struct Window<'a> {
     /// In ascending x: up to `reach_columns` on each side of the grid column, and one at
     /// its very x.
     pub(crate) strips: Vec<&'a Strip>,
-    /// Median distance of neighbouring columns, millimetres.
+    /// Typical distance of neighbouring columns, millimetres.
     pub(crate) column_spacing_mm: f64,
     /// Greatest local sample spacing believed, millimetres.
     pub(crate) greatest_sample_spacing_mm: f64,
@@ -39,17 +45,24 @@ impl<'a> Window<'a> {
 
         scratch.clear();
         scratch.extend(strips.windows(2).map(|pair| pair[1].x_mm - pair[0].x_mm));
-        let column_spacing_mm = lower_median(scratch)?;
+        // In an order that a mirrored scan shares, so that the sum is the same.
+        scratch.sort_unstable_by(f64::total_cmp);
+        let column_spacing_mm = typical(scratch)?;
         scratch.clear();
         for strip in &strips {
             let heights = strip.samples.windows(2).map(|pair| pair[1].0 - pair[0].0);
             scratch.extend(heights.filter(|gap| *gap > 0.0));
         }
-        let sample_spacing_mm = lower_median(scratch)?;
+        let pitch_mm = settings.pitch_mm;
+        let suited_mm = (pitch_mm * pitch_mm / column_spacing_mm)
+            .max(pitch_mm)
+            .max(column_spacing_mm);
+        let limit_mm = PITCH_LIMIT * suited_mm;
+        let sample_spacing_mm = lower_median(scratch)?.min(limit_mm);
         Some(Self {
             strips,
             column_spacing_mm,
-            greatest_sample_spacing_mm: SPACING_LIMIT * sample_spacing_mm,
+            greatest_sample_spacing_mm: (SPACING_LIMIT * sample_spacing_mm).min(limit_mm),
             reach_y_mm: settings.reach_columns as f64 * column_spacing_mm.max(sample_spacing_mm),
         })
     }
@@ -67,6 +80,19 @@ impl<'a> Window<'a> {
     /// The greatest unit that any node of this window may have.
     pub(crate) fn greatest_spacing(&self) -> Spacing {
         self.spacing(self.greatest_sample_spacing_mm)
+    }
+
+    /// The spacing widened to this mean one, within the window's limits. Columns made from
+    /// a cloud may be full in one place and empty beside it, which distances along the full
+    /// ones do not show.
+    pub(crate) fn widened(&self, spacing: Spacing, mean_mm: f64) -> Spacing {
+        let limit_mm = (WIDENING_LIMIT * spacing.mean_mm).min(self.greatest_spacing().mean_mm);
+        let mean_mm = mean_mm.min(limit_mm).max(spacing.mean_mm);
+        Spacing {
+            mean_mm,
+            x_mm: spacing.x_mm.max(mean_mm),
+            y_mm: spacing.y_mm.max(mean_mm),
+        }
     }
 }
 

@@ -1,0 +1,139 @@
+//! What the estimator promises, against closed forms.
+
+mod common;
+
+use common::{Noise, image, nodes, rms, scan};
+use regrid::{Estimator, RegridSettings};
+
+const NOISE_MM: f64 = 0.05;
+
+fn least_squares(settings: RegridSettings) -> RegridSettings {
+    RegridSettings {
+        estimator: Estimator::LeastSquares,
+        ..settings
+    }
+}
+
+#[test]
+fn a_plane_without_noise_is_reproduced() {
+    let plane = |x: f64, y: f64| 0.7 * x - 1.3 * y + 250.0;
+    for spacing in [(0.4, 0.3), (0.25, 1.4), (1.0, 0.2)] {
+        let columns = scan(30.0, spacing, (0.3, 0.6), |x, y| Some(plane(x, y)));
+        for settings in [
+            RegridSettings::with_pitch(0.7),
+            least_squares(RegridSettings::with_pitch(0.7)),
+        ] {
+            let nodes = nodes(&image(&columns, &settings));
+            assert!(nodes.len() > 1700, "{} nodes", nodes.len());
+            for (x, y, z) in nodes {
+                assert!((z - plane(x, y)).abs() < 1e-9, "{x} {y} {z}");
+            }
+        }
+    }
+}
+
+/// 40 % of the samples up to 30 mm too near: MLMS does not see them, least squares fails.
+#[test]
+fn two_fifths_of_one_sided_outliers_do_no_harm() {
+    let plane = |x: f64, y: f64| 0.2 * x + 0.1 * y - 40.0;
+    let mut noise = Noise::new(4);
+    let columns = scan(30.0, (0.4, 0.4), (0.0, 0.0), |x, y| {
+        // Spread evenly, so that every window has its two fifths.
+        let place = (x / 0.4).round() + 2.0 * (y / 0.4).round();
+        let error = if place.rem_euclid(5.0) < 1.5 {
+            5.0 + 25.0 * noise.uniform()
+        } else {
+            NOISE_MM * noise.normal()
+        };
+        Some(plane(x, y) + error)
+    });
+    // With 0.6^3 of the draws free of outliers, 32 would all fail at one node in 2400.
+    let settings = RegridSettings {
+        draws: 64,
+        ..RegridSettings::with_pitch(0.5)
+    };
+    let error = |settings: &RegridSettings| -> Vec<f64> {
+        nodes(&image(&columns, settings))
+            .into_iter()
+            .filter(|(x, y, _)| (3.0..27.0).contains(x) && (3.0..27.0).contains(y))
+            .map(|(x, y, z)| (z - plane(x, y)).abs())
+            .collect()
+    };
+    let robust = error(&settings);
+    assert_eq!(robust.len(), 48 * 48, "no holes");
+    let plain = error(&least_squares(settings));
+    let share_bad = robust.iter().filter(|e| **e > 0.5).count() as f64 / robust.len() as f64;
+    assert!(share_bad < 0.005, "{share_bad}");
+    let mut sorted = robust.clone();
+    sorted.sort_by(f64::total_cmp);
+    assert!(
+        sorted[sorted.len() / 2] < NOISE_MM,
+        "{}",
+        sorted[sorted.len() / 2]
+    );
+    assert!(rms(plain.into_iter()) > 5.0);
+}
+
+#[test]
+fn a_step_edge_stays_a_step_where_least_squares_smears() {
+    for along_x in [true, false] {
+        let height = |x: f64, y: f64| {
+            if (if along_x { x } else { y }) < 15.13 {
+                0.0
+            } else {
+                10.0
+            }
+        };
+        let mut noise = Noise::new(9);
+        let columns = scan(30.0, (0.4, 0.4), (0.5, 0.5), |x, y| {
+            Some(height(x, y) + NOISE_MM * noise.normal())
+        });
+        let in_between = |settings: &RegridSettings| {
+            nodes(&image(&columns, settings))
+                .iter()
+                .filter(|(_, _, z)| (0.5..9.5).contains(z))
+                .count()
+        };
+        let settings = RegridSettings::with_pitch(0.4);
+        let robust = in_between(&settings);
+        let smeared = in_between(&least_squares(settings));
+        assert!(robust <= 3, "{robust} nodes between the levels");
+        assert!(smeared > 150, "{smeared}");
+        // The edge itself lies where it is, to a pitch.
+        for (x, y, z) in nodes(&image(&columns, &settings)) {
+            let across = if along_x { x } else { y };
+            if (across - 15.13).abs() > 0.5 && (1.0..29.0).contains(&x) && (1.0..29.0).contains(&y)
+            {
+                assert!((z - height(x, y)).abs() < 0.5, "{x} {y} {z}");
+            }
+        }
+    }
+}
+
+/// The window averages: noise at the nodes is well below that of the samples, and on a
+/// sphere the bias of a plane stays below the noise.
+#[test]
+fn noise_shrinks_and_curvature_is_followed() {
+    let mut noise = Noise::new(2);
+    let sphere = |x: f64, y: f64| {
+        let (u, v) = (x - 15.0, y - 15.0);
+        (40.0_f64 * 40.0 - u * u - v * v).sqrt()
+    };
+    let columns = scan(30.0, (0.42, 0.39), (0.0, 0.0), |x, y| {
+        Some(sphere(x, y) + NOISE_MM * noise.normal())
+    });
+    for (settings, limit) in [
+        (RegridSettings::with_pitch(0.42), 0.9 * NOISE_MM),
+        (
+            least_squares(RegridSettings::with_pitch(0.42)),
+            0.5 * NOISE_MM,
+        ),
+    ] {
+        let inner: Vec<_> = nodes(&image(&columns, &settings))
+            .into_iter()
+            .filter(|(x, y, _)| (2.0..28.0).contains(x) && (2.0..28.0).contains(y))
+            .collect();
+        let error = rms(inner.iter().map(|(x, y, z)| z - sphere(*x, *y)));
+        assert!(error < limit, "{error}");
+    }
+}
