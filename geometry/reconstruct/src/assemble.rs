@@ -1,0 +1,197 @@
+//! From the planar map and the surfaces to the model.
+
+use nurbs::{PatchSurface, PiecewiseCubic};
+use range_image::RangeImage;
+
+use crate::border::map::PlanarMap;
+use crate::fit::Domain;
+use crate::lift::lift;
+use crate::model::{Coedge, Edge, EdgeId, EdgeKind, Face, Loop, Model, Surface, Vertex, VertexId};
+
+/// Places along an edge at which its two surfaces are compared.
+const PROBES: usize = 15;
+
+/// Surfaces that differ by less than this many standard deviations of their residuals
+/// may be continuous.
+const STEP_SIGMAS: f64 = 4.0;
+
+/// Margin of a surface around its face, pitches.
+const MARGIN: f64 = 1.0;
+
+/// Maps pitches, counted from the image's first node, to the part frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Placement {
+    pub(crate) origin_mm: [f64; 2],
+    pub(crate) pitch_mm: f64,
+}
+
+impl Placement {
+    pub(crate) fn of(image: &RangeImage) -> Self {
+        Self {
+            origin_mm: [image.x_mm(0), image.y_mm(0)],
+            pitch_mm: image.pitch_mm(),
+        }
+    }
+
+    fn to_mm(self, p: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|d| self.origin_mm[d] + self.pitch_mm * p[d])
+    }
+
+    pub(crate) fn to_pitches(self, p: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|d| (p[d] - self.origin_mm[d]) / self.pitch_mm)
+    }
+
+    fn path_to_mm(self, path: &PiecewiseCubic<2>) -> PiecewiseCubic<2> {
+        let h = self.pitch_mm;
+        PiecewiseCubic {
+            breaks: path.breaks.iter().map(|b| b * h).collect(),
+            pieces: path
+                .pieces
+                .iter()
+                .map(|piece| {
+                    [0, 1].map(|d| {
+                        let c = piece[d];
+                        [self.origin_mm[d] + h * c[0], c[1], c[2] / h, c[3] / (h * h)]
+                    })
+                })
+                .collect(),
+        }
+    }
+}
+
+/// The rectangle of the x-y plane that each piece's surface must cover: its outline and
+/// a margin. `None` for a piece without a closed outline.
+pub(crate) fn domains(map: &PlanarMap, placement: Placement) -> Vec<Option<Domain>> {
+    map.loops
+        .iter()
+        .map(|loops| {
+            let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+            for &(edge, _) in loops.first()? {
+                for p in map.edges[edge].path.sampled(16) {
+                    for d in 0..2 {
+                        low[d] = low[d].min(p[d] - MARGIN);
+                        high[d] = high[d].max(p[d] + MARGIN);
+                    }
+                }
+            }
+            let (low, high) = (placement.to_mm(low), placement.to_mm(high));
+            let finite = low.iter().chain(&high).all(|v| v.is_finite());
+            finite.then_some(Domain {
+                x_mm: (low[0], high[0]),
+                y_mm: (low[1], high[1]),
+            })
+        })
+        .collect()
+}
+
+/// What a face is made of.
+pub(crate) struct Carrier {
+    pub(crate) region: u16,
+    pub(crate) name: String,
+    pub(crate) surface: PatchSurface,
+    /// Root mean square residual, millimetres.
+    pub(crate) rms_mm: f64,
+}
+
+/// Joins the map and the surfaces; `carriers[k]` belongs to piece `k + 1`.
+pub(crate) fn model(map: &PlanarMap, carriers: Vec<Carrier>, placement: Placement) -> Model {
+    let vertices: Vec<Vertex> = map
+        .vertices
+        .iter()
+        .map(|&v| {
+            let [x_mm, y_mm] = placement.to_mm(v);
+            Vertex { x_mm, y_mm }
+        })
+        .collect();
+    let edges: Vec<Edge> = map
+        .edges
+        .iter()
+        .map(|edge| {
+            let mut path = placement.path_to_mm(&edge.path);
+            let start = vertices[edge.start];
+            path.pieces[0][0][0] = start.x_mm;
+            path.pieces[0][1][0] = start.y_mm;
+            let side = |s: u32| carriers.get((s as usize).wrapping_sub(1));
+            let kind = match (side(edge.sides[0]), side(edge.sides[1])) {
+                (Some(a), Some(b)) => kind_between(a, b, &path, placement.pitch_mm),
+                _ => EdgeKind::Silhouette,
+            };
+            Edge {
+                start: VertexId(edge.start),
+                end: VertexId(edge.end),
+                kind,
+                path,
+            }
+        })
+        .collect();
+    let mut faces = Vec::with_capacity(carriers.len());
+    for (carrier, loops) in carriers.into_iter().zip(&map.loops) {
+        let mut lifted = loops.iter().map(|uses| Loop {
+            coedges: uses
+                .iter()
+                .map(|&(edge, reversed)| {
+                    let path = &edges[edge].path;
+                    let mut parameter_curve = if reversed {
+                        path.reversed()
+                    } else {
+                        path.clone()
+                    };
+                    let end = if reversed {
+                        edges[edge].end
+                    } else {
+                        edges[edge].start
+                    };
+                    let start = vertices[end.0];
+                    parameter_curve.pieces[0][0][0] = start.x_mm;
+                    parameter_curve.pieces[0][1][0] = start.y_mm;
+                    let space_curve = lift(&carrier.surface, &parameter_curve);
+                    Coedge {
+                        edge: EdgeId(edge),
+                        reversed,
+                        parameter_curve,
+                        space_curve,
+                    }
+                })
+                .collect(),
+        });
+        if let Some(outer) = lifted.next() {
+            let inner = lifted.collect();
+            faces.push(Face {
+                name: carrier.name,
+                region: carrier.region,
+                surface: Surface::Patches(carrier.surface),
+                outer,
+                inner,
+            });
+        }
+    }
+    Model {
+        vertices,
+        edges,
+        faces,
+    }
+}
+
+/// A step where the two surfaces part by more than their residuals explain, and more
+/// than a border off by a pitch would make of their different slopes.
+fn kind_between(a: &Carrier, b: &Carrier, path: &PiecewiseCubic<2>, pitch_mm: f64) -> EdgeKind {
+    let noise = STEP_SIGMAS * (a.rms_mm * a.rms_mm + b.rms_mm * b.rms_mm).sqrt();
+    let (first, last) = path.domain();
+    let mut apart = 0;
+    for k in 0..PROBES {
+        let t = first + (last - first) * (k as f64 + 0.5) / PROBES as f64;
+        let [x, y] = path.evaluate(t);
+        let gap = (a.surface.z(x, y) - b.surface.z(x, y)).abs();
+        let slopes = [(1, 0), (0, 1)]
+            .map(|(u, v)| a.surface.z_partial(x, y, u, v) - b.surface.z_partial(x, y, u, v));
+        let slope = (slopes[0] * slopes[0] + slopes[1] * slopes[1]).sqrt();
+        if gap > noise + pitch_mm * slope + 1e-9 {
+            apart += 1;
+        }
+    }
+    if 2 * apart > PROBES {
+        EdgeKind::Step
+    } else {
+        EdgeKind::Crease
+    }
+}

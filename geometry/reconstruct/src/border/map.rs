@@ -1,0 +1,419 @@
+//! The planar map: vertices, edges and loops, none of which cross.
+
+use std::collections::BTreeSet;
+
+use nurbs::PiecewiseCubic;
+use range_image::{Cancelled, Monitor};
+
+use super::cracks::{Chain, CrackMap, Use};
+use super::crossing::{Strand, conflicts};
+use super::path;
+use super::segments::{Price, Samples, Segment, sharpest};
+use crate::polygon::{distance_to_segment, minus, norm, signed_area};
+
+/// How borders are drawn.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct BorderSettings {
+    /// Follow the traced border by cubics through thirds, without smoothing.
+    pub(crate) literal: bool,
+    /// Cosine of the least turn that makes a vertex.
+    pub(crate) corner_cosine: f64,
+    /// Price of a straight piece in square pitches; a curved one costs 11 to 7 as much.
+    pub(crate) piece_price: f64,
+    /// How far a cubic may leave its border before it is divided, pitches (literal only).
+    pub(crate) bound: f64,
+}
+
+/// An edge of the planar map; lengths in pitches.
+#[derive(Debug, Clone)]
+pub(crate) struct MapEdge {
+    pub(crate) start: usize,
+    pub(crate) end: usize,
+    /// Piece on the left and on the right; 0 for nothing.
+    pub(crate) sides: [u32; 2],
+    pub(crate) path: PiecewiseCubic<2>,
+}
+
+/// Vertices, edges, and the loops of each piece, outer first; lengths in pitches.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct PlanarMap {
+    pub(crate) vertices: Vec<[f64; 2]>,
+    pub(crate) edges: Vec<MapEdge>,
+    pub(crate) loops: Vec<Vec<Vec<Use>>>,
+    /// Borders drawn with less smoothing because they would have crossed otherwise.
+    pub(crate) unsmoothed: usize,
+    /// Borders in all.
+    pub(crate) borders: usize,
+}
+
+/// How closely a border is followed: each level is tried when the one before fails.
+const SMOOTH: usize = 0;
+const CLOSE: usize = 1;
+const TRACED: usize = 2;
+
+/// Factor of the price of pieces at level [`CLOSE`].
+const CLOSE_PRICE: f64 = 0.2;
+
+/// Farthest a junction moves from its corner of the lattice, pitches.
+const JUNCTION_REACH: f64 = 1.0;
+
+/// Farthest the middle of a crack may lie from the drawn border, pitches: half a pitch
+/// is the width of a digital line, the rest is for uneven borders.
+const FARTHEST: f64 = 1.25;
+
+/// A border with the samples and division its present level asks for.
+struct Border<'a> {
+    chain: &'a Chain,
+    samples: Samples,
+    segments: Vec<Segment>,
+    level: usize,
+}
+
+pub(crate) fn build(
+    cracks: &CrackMap,
+    settings: &BorderSettings,
+    monitor: &dyn Monitor,
+) -> Result<PlanarMap, Cancelled> {
+    let mut borders: Vec<Border<'_>> = cracks
+        .chains
+        .iter()
+        .map(|chain| {
+            let mut points = chain.middles.clone();
+            if chain.ends.is_none() {
+                let start = sharpest(&points);
+                points.rotate_left(start);
+                points.push(points[0]);
+            }
+            let mut border = Border {
+                chain,
+                samples: Samples::new(points),
+                segments: Vec::new(),
+                level: SMOOTH,
+            };
+            border.divide(settings);
+            border
+        })
+        .collect();
+    loop {
+        monitor.check()?;
+        let junctions = place_junctions(cracks, &borders, settings);
+        let drawn: Vec<Option<Vec<PiecewiseCubic<2>>>> = borders
+            .iter()
+            .map(|b| b.draw(&junctions, settings))
+            .collect();
+        let bad = faults(cracks, &borders, &drawn, &junctions);
+        let mut raised = false;
+        for k in bad {
+            if borders[k].level < TRACED {
+                borders[k].level = if settings.literal {
+                    TRACED
+                } else {
+                    borders[k].level + 1
+                };
+                borders[k].divide(settings);
+                raised = true;
+            }
+        }
+        if !raised {
+            return Ok(assemble(cracks, &borders, drawn, junctions));
+        }
+    }
+}
+
+impl Border<'_> {
+    fn divide(&mut self, settings: &BorderSettings) {
+        let factor = match self.level {
+            SMOOTH => settings.piece_price,
+            CLOSE => settings.piece_price * CLOSE_PRICE,
+            _ => return,
+        };
+        let price = Price {
+            line: factor,
+            cubic: factor * 11.0 / 7.0,
+        };
+        self.segments = self.samples.divide(price);
+    }
+
+    /// Paths between vertices; `None` when one has no length.
+    fn draw(
+        &self,
+        junctions: &[[f64; 2]],
+        settings: &BorderSettings,
+    ) -> Option<Vec<PiecewiseCubic<2>>> {
+        let ends = self.chain.ends.map(|(a, b)| (junctions[a], junctions[b]));
+        let points = &self.samples.points;
+        if self.level == TRACED || points.len() < 2 {
+            let (start, end) = ends.map_or((None, None), |(a, b)| (Some(a), Some(b)));
+            let whole: Vec<_> = start
+                .into_iter()
+                .chain(points.iter().copied())
+                .chain(end)
+                .collect();
+            return Some(vec![path::polyline(&whole)?]);
+        }
+        let stretches = path::draw(&self.samples, &self.segments, ends, settings.corner_cosine)?;
+        if !settings.literal {
+            return Some(stretches);
+        }
+        // The corners found stay vertices, at the samples nearest to them.
+        let mut cuts = vec![0];
+        for stretch in &stretches[..stretches.len() - 1] {
+            let corner = stretch.end();
+            let after = cuts[cuts.len() - 1] + 1;
+            let near = |k: &usize| norm(minus(points[*k], corner));
+            let best = (after..points.len() - 1).min_by(|a, b| near(a).total_cmp(&near(b)));
+            cuts.extend(best);
+        }
+        cuts.push(points.len() - 1);
+        let mut paths = Vec::new();
+        for (k, cut) in cuts.windows(2).enumerate() {
+            let mut run = points[cut[0]..=cut[1]].to_vec();
+            if let Some((a, b)) = ends {
+                if k == 0 {
+                    run.insert(0, a);
+                }
+                if k + 2 == cuts.len() {
+                    run.push(b);
+                }
+            }
+            paths.push(path::through_thirds(&run, settings.bound)?);
+        }
+        Some(paths)
+    }
+}
+
+/// Junctions at the point nearest to the curves that meet there, or on their corner of
+/// the lattice where a traced border ends.
+fn place_junctions(
+    cracks: &CrackMap,
+    borders: &[Border<'_>],
+    settings: &BorderSettings,
+) -> Vec<[f64; 2]> {
+    // Normal equations of squared distances from the lines, held by the corner itself.
+    let hold = 0.05;
+    let mut sums: Vec<_> = cracks
+        .junctions
+        .iter()
+        .map(|c| {
+            (
+                [[hold, 0.0], [0.0, hold]],
+                [hold * c[0], hold * c[1]],
+                settings.literal,
+            )
+        })
+        .collect();
+    for border in borders {
+        let Some((start, end)) = border.chain.ends else {
+            continue;
+        };
+        if border.level == TRACED {
+            sums[start].2 = true;
+            sums[end].2 = true;
+        }
+        let (Some(first), Some(last)) = (border.segments.first(), border.segments.last()) else {
+            continue;
+        };
+        for (junction, segment, sample) in [(start, first, first.first), (end, last, last.last)] {
+            let (point, along) = border.samples.at(segment, sample);
+            let normal = [-along[1], along[0]];
+            let offset = normal[0] * point[0] + normal[1] * point[1];
+            let (matrix, rhs, _) = &mut sums[junction];
+            for i in 0..2 {
+                for j in 0..2 {
+                    matrix[i][j] += normal[i] * normal[j];
+                }
+                rhs[i] += normal[i] * offset;
+            }
+        }
+    }
+    sums.iter()
+        .zip(&cracks.junctions)
+        .map(|((m, rhs, fixed), &corner)| {
+            let det = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+            if *fixed || det <= 0.0 {
+                return corner;
+            }
+            let place = [
+                (m[1][1] * rhs[0] - m[0][1] * rhs[1]) / det,
+                (m[0][0] * rhs[1] - m[1][0] * rhs[0]) / det,
+            ];
+            let (by, far) = (minus(place, corner), norm(minus(place, corner)));
+            let share = if far > JUNCTION_REACH {
+                JUNCTION_REACH / far
+            } else {
+                1.0
+            };
+            [corner[0] + share * by[0], corner[1] + share * by[1]]
+        })
+        .collect()
+}
+
+/// Ends of a border's stretches, in order: one more than there are stretches.
+fn stops(
+    border: &Border<'_>,
+    stretches: &[PiecewiseCubic<2>],
+    junctions: &[[f64; 2]],
+) -> Vec<[f64; 2]> {
+    let mut stops: Vec<[f64; 2]> = stretches.iter().map(PiecewiseCubic::start).collect();
+    match border.chain.ends {
+        Some((a, b)) => {
+            stops[0] = junctions[a];
+            stops.push(junctions[b]);
+        }
+        None => stops.push(stops[0]),
+    }
+    stops
+}
+
+/// Borders that may not stay as they are drawn.
+fn faults(
+    cracks: &CrackMap,
+    borders: &[Border<'_>],
+    drawn: &[Option<Vec<PiecewiseCubic<2>>>],
+    junctions: &[[f64; 2]],
+) -> BTreeSet<usize> {
+    let mut bad = BTreeSet::new();
+    let mut strands = Vec::new();
+    let mut outlines: Vec<Vec<[f64; 2]>> = Vec::with_capacity(borders.len());
+    for (k, (border, stretches)) in borders.iter().zip(drawn).enumerate() {
+        let Some(stretches) = stretches else {
+            bad.insert(k);
+            outlines.push(border.samples.points.clone());
+            continue;
+        };
+        let stops = stops(border, stretches, junctions);
+        let mut outline = Vec::new();
+        for (n, path) in stretches.iter().enumerate() {
+            let strand = Strand::new(k, path, stops[n], stops[n + 1]);
+            outline.extend_from_slice(&strand.points);
+            strands.push(strand);
+        }
+        if border.level < TRACED && strays(&border.samples, &outline) {
+            bad.insert(k);
+        }
+        outlines.push(outline);
+    }
+    for (a, b) in conflicts(&strands) {
+        // The border that is still the smoother of the two gives way.
+        let least = borders[a].level.min(borders[b].level);
+        bad.extend([a, b].into_iter().filter(|&k| borders[k].level == least));
+    }
+    for uses in cracks.loops.iter().flatten() {
+        let mut polygon = Vec::new();
+        for &(k, reversed) in uses {
+            if reversed {
+                polygon.extend(outlines[k].iter().rev());
+            } else {
+                polygon.extend(outlines[k].iter());
+            }
+        }
+        let (traced, smooth) = (cracks.area(uses), signed_area(&polygon));
+        if !(smooth / traced > 0.5 && smooth / traced < 2.0) {
+            bad.extend(uses.iter().map(|u| u.0));
+        }
+    }
+    bad
+}
+
+/// True when a drawn border leaves its samples.
+fn strays(samples: &Samples, outline: &[[f64; 2]]) -> bool {
+    let mut length = vec![0.0];
+    for pair in outline.windows(2) {
+        length.push(length[length.len() - 1] + norm(minus(pair[1], pair[0])));
+    }
+    let (drawn, total) = (
+        length[length.len() - 1],
+        samples.length[samples.length.len() - 1],
+    );
+    if !(drawn.is_finite() && total > 0.0) {
+        return true;
+    }
+    let reach = 6.0 + 0.1 * drawn;
+    samples
+        .points
+        .iter()
+        .zip(&samples.length)
+        .any(|(point, at)| {
+            let near = at / total * drawn;
+            let from = length
+                .partition_point(|&l| l < near - reach)
+                .saturating_sub(1);
+            let to = length.partition_point(|&l| l <= near + reach);
+            let close = outline[from..(to + 1).min(outline.len())]
+                .windows(2)
+                .any(|s| distance_to_segment(*point, s[0], s[1]) <= FARTHEST);
+            !close
+        })
+}
+
+fn assemble(
+    cracks: &CrackMap,
+    borders: &[Border<'_>],
+    drawn: Vec<Option<Vec<PiecewiseCubic<2>>>>,
+    junctions: Vec<[f64; 2]>,
+) -> PlanarMap {
+    let mut map = PlanarMap {
+        vertices: junctions.clone(),
+        borders: borders.len(),
+        ..PlanarMap::default()
+    };
+    let mut edges_of: Vec<core::ops::Range<usize>> = Vec::with_capacity(borders.len());
+    for (border, stretches) in borders.iter().zip(drawn) {
+        let stretches = stretches.unwrap_or_default();
+        let before = map.edges.len();
+        if !stretches.is_empty() {
+            let stops = stops(border, &stretches, &junctions);
+            let mut ids: Vec<usize> = Vec::with_capacity(stops.len());
+            for (n, &stop) in stops.iter().enumerate() {
+                let last = n + 1 == stops.len();
+                ids.push(match border.chain.ends {
+                    Some((a, _)) if n == 0 => a,
+                    Some((_, b)) if last => b,
+                    None if last => ids[0],
+                    _ => {
+                        map.vertices.push(stop);
+                        map.vertices.len() - 1
+                    }
+                });
+            }
+            for (n, path) in stretches.into_iter().enumerate() {
+                let sides = [border.chain.left, border.chain.right];
+                map.edges.push(MapEdge {
+                    start: ids[n],
+                    end: ids[n + 1],
+                    sides,
+                    path,
+                });
+            }
+        }
+        map.unsmoothed += usize::from(border.level > SMOOTH);
+        edges_of.push(before..map.edges.len());
+    }
+    map.loops = cracks
+        .loops
+        .iter()
+        .map(|loops| {
+            let mut outlined: Vec<(bool, Vec<Use>)> = loops
+                .iter()
+                .map(|uses| (cracks.area(uses) <= 0.0, expanded(uses, &edges_of)))
+                .collect();
+            outlined.sort_by_key(|l| l.0);
+            outlined.into_iter().map(|l| l.1).collect()
+        })
+        .collect();
+    map
+}
+
+/// The edges of a loop of chains.
+fn expanded(uses: &[Use], edges_of: &[core::ops::Range<usize>]) -> Vec<Use> {
+    let mut edges = Vec::new();
+    for &(chain, reversed) in uses {
+        let range = edges_of[chain].clone();
+        if reversed {
+            edges.extend(range.rev().map(|e| (e, true)));
+        } else {
+            edges.extend(range.map(|e| (e, false)));
+        }
+    }
+    edges
+}

@@ -1,0 +1,7 @@
+//! Borders: from labels to a planar map of smooth paths (Shim & Lee 1995, section IV).
+
+pub(crate) mod cracks;
+pub(crate) mod crossing;
+pub(crate) mod map;
+pub(crate) mod path;
+pub(crate) mod segments;

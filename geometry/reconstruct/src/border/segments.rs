@@ -1,0 +1,455 @@
+//! Division of a border into straight and curved pieces.
+//!
+//! The samples are the middles of cracks: a straight border of any slope leaves them
+//! within half a pitch, in a pattern with a variance of about a twelfth. The division
+//! with the least sum of squared distances plus a price for each piece is found by
+//! dynamic programming; the price is what keeps a straight border whole. Corners are the
+//! joints at which the tangents of neighbouring pieces disagree: the local maxima of
+//! curvature change of section IV, found without differentiating a staircase.
+
+use crate::polygon::{cross, dot, minus, norm};
+
+/// Price of pieces in square pitches, against sums of squared distances.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Price {
+    pub(crate) line: f64,
+    pub(crate) cubic: f64,
+}
+
+/// A curved piece has at least this many steps between samples.
+const MIN_CUBIC_STEPS: usize = 8;
+
+/// Greatest turn of a curved piece once cut into arcs, radians.
+const MAX_TURN: f64 = 0.8;
+
+/// No piece costs more than this many times the price of a cubic: several would be
+/// cheaper. Costs grow with length, so the search ends there.
+const HOPELESS: f64 = 6.0;
+
+/// The least-squares curve of a piece.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Form {
+    /// Through a point, along a unit vector.
+    Line { point: [f64; 2], along: [f64; 2] },
+    /// Coefficients of x and of y in ascending powers of the arc length from the first
+    /// sample.
+    Cubic { x: [f64; 4], y: [f64; 4] },
+}
+
+/// A piece of a border: samples `first..=last`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Segment {
+    pub(crate) first: usize,
+    pub(crate) last: usize,
+    /// Sample from which the form counts arc length.
+    pub(crate) origin: usize,
+    pub(crate) form: Form,
+}
+
+/// Samples of a border with their arc length.
+#[derive(Debug, Clone)]
+pub(crate) struct Samples {
+    pub(crate) points: Vec<[f64; 2]>,
+    /// Length of the smoothed border up to each sample: the staircase itself is longer.
+    pub(crate) length: Vec<f64>,
+}
+
+impl Samples {
+    pub(crate) fn new(points: Vec<[f64; 2]>) -> Self {
+        let smooth = smoothed(&points, 4);
+        let mut length = Vec::with_capacity(points.len());
+        let mut sum = 0.0;
+        for (k, p) in smooth.iter().enumerate() {
+            if k > 0 {
+                sum += norm(minus(*p, smooth[k - 1])).max(1e-3);
+            }
+            length.push(sum);
+        }
+        Self { points, length }
+    }
+
+    /// The division into pieces; none when there are fewer than two samples.
+    pub(crate) fn divide(&self, price: Price) -> Vec<Segment> {
+        let count = self.points.len();
+        if count < 2 {
+            return Vec::new();
+        }
+        // best[j]: least cost up to sample j, the first sample of the last piece, and
+        // whether that piece is curved.
+        let mut best = vec![(f64::INFINITY, 0, false); count];
+        best[0].0 = 0.0;
+        for first in 0..count - 1 {
+            let base = best[first].0;
+            let mut sums = Sums::start(self, first);
+            for (last, reached) in best.iter_mut().enumerate().skip(first + 1) {
+                sums.push(self, last);
+                let line = sums.line_error();
+                let mut cost = (line + price.line, false);
+                let mut cubic = line;
+                if line + price.line > price.cubic && last - first >= MIN_CUBIC_STEPS {
+                    cubic = sums.cubic_error();
+                    if cubic + price.cubic < cost.0 {
+                        cost = (cubic + price.cubic, true);
+                    }
+                }
+                if base + cost.0 < reached.0 {
+                    *reached = (base + cost.0, first, cost.1);
+                }
+                if cubic.min(line) > HOPELESS * price.cubic {
+                    break;
+                }
+            }
+        }
+        let mut segments = Vec::new();
+        let mut last = count - 1;
+        while last > 0 {
+            let (_, first, curved) = best[last];
+            let form = self.form(first, last, curved);
+            segments.extend(self.arcs(Segment {
+                first,
+                last,
+                origin: first,
+                form,
+            }));
+            last = first;
+        }
+        segments.reverse();
+        segments
+    }
+
+    /// A piece cut into arcs of little turn, the last one first: cubics with unit speed at
+    /// both ends follow only such arcs.
+    fn arcs(&self, whole: Segment) -> impl Iterator<Item = Segment> {
+        let mut turn = 0.0;
+        if matches!(whole.form, Form::Cubic { .. }) {
+            let tangents = (whole.first..=whole.last).map(|k| self.at(&whole, k).1);
+            let tangents: Vec<[f64; 2]> = tangents.collect();
+            for pair in tangents.windows(2) {
+                turn += libm::atan2(cross(pair[0], pair[1]), dot(pair[0], pair[1])).abs();
+            }
+        }
+        let steps = whole.last - whole.first;
+        let parts = ((turn / MAX_TURN).ceil() as usize).clamp(1, steps);
+        let cut = move |n: usize| whole.first + steps * n / parts;
+        (0..parts).rev().map(move |n| Segment {
+            first: cut(n),
+            last: cut(n + 1),
+            ..whole
+        })
+    }
+
+    fn form(&self, first: usize, last: usize, curved: bool) -> Form {
+        let mut sums = Sums::start(self, first);
+        for k in first + 1..=last {
+            sums.push(self, k);
+        }
+        let origin = self.points[first];
+        if let (true, Some((x, y))) = (curved, sums.cubic()) {
+            let shift = |mut c: [f64; 4], by: f64| {
+                c[0] += by;
+                c
+            };
+            return Form::Cubic {
+                x: shift(x, origin[0]),
+                y: shift(y, origin[1]),
+            };
+        }
+        let (mean, mut along) = sums.line();
+        let chord = minus(self.points[last], origin);
+        if dot(along, chord) < 0.0 {
+            along = [-along[0], -along[1]];
+        }
+        Form::Line {
+            point: [mean[0] + origin[0], mean[1] + origin[1]],
+            along,
+        }
+    }
+
+    /// Point and unit tangent of a piece's curve at one of its samples.
+    pub(crate) fn at(&self, segment: &Segment, sample: usize) -> ([f64; 2], [f64; 2]) {
+        match segment.form {
+            Form::Line { point, along } => {
+                let t = dot(minus(self.points[sample], point), along);
+                ([point[0] + t * along[0], point[1] + t * along[1]], along)
+            }
+            Form::Cubic { x, y } => {
+                let t = self.length[sample] - self.length[segment.origin];
+                let value = |c: [f64; 4]| c[0] + t * (c[1] + t * (c[2] + t * c[3]));
+                let slope = |c: [f64; 4]| c[1] + t * (2.0 * c[2] + t * 3.0 * c[3]);
+                let tangent = [slope(x), slope(y)];
+                let speed = norm(tangent).max(1e-9);
+                (
+                    [value(x), value(y)],
+                    [tangent[0] / speed, tangent[1] / speed],
+                )
+            }
+        }
+    }
+}
+
+/// The polyline after passes of the binomial filter 1-2-1, its ends kept.
+pub(crate) fn smoothed(points: &[[f64; 2]], passes: usize) -> Vec<[f64; 2]> {
+    let mut smooth = points.to_vec();
+    for _ in 0..passes {
+        let before = smooth.clone();
+        for k in 1..before.len().saturating_sub(1) {
+            for d in 0..2 {
+                smooth[k][d] = (before[k - 1][d] + 2.0 * before[k][d] + before[k + 1][d]) / 4.0;
+            }
+        }
+    }
+    smooth
+}
+
+/// Index of the sample of a closed border with the sharpest turn, seen over a window.
+pub(crate) fn sharpest(points: &[[f64; 2]]) -> usize {
+    let count = points.len();
+    let window = (count / 6).clamp(1, 6);
+    let mut best = (f64::INFINITY, 0);
+    for k in 0..count {
+        let (mut before, mut after) = ([0.0; 2], [0.0; 2]);
+        for w in 1..=window {
+            let (a, b) = (points[(k + count - w) % count], points[(k + w) % count]);
+            for d in 0..2 {
+                before[d] += points[k][d] - a[d];
+                after[d] += b[d] - points[k][d];
+            }
+        }
+        let cosine = dot(before, after) / (norm(before) * norm(after)).max(1e-9);
+        if cosine < best.0 - 1e-12 {
+            best = (cosine, k);
+        }
+    }
+    best.1
+}
+
+/// Running sums over samples from a first one on, relative to it.
+struct Sums {
+    origin: [f64; 2],
+    start: f64,
+    /// Arc length of the last sample.
+    reach: f64,
+    /// Sums of powers 0 to 6 of the arc length.
+    powers: [f64; 7],
+    /// Sums of x and y times powers 0 to 3.
+    x: [f64; 4],
+    y: [f64; 4],
+    xx: f64,
+    xy: f64,
+    yy: f64,
+}
+
+impl Sums {
+    fn start(samples: &Samples, first: usize) -> Self {
+        let mut sums = Self {
+            origin: samples.points[first],
+            start: samples.length[first],
+            reach: 0.0,
+            powers: [0.0; 7],
+            x: [0.0; 4],
+            y: [0.0; 4],
+            xx: 0.0,
+            xy: 0.0,
+            yy: 0.0,
+        };
+        sums.push(samples, first);
+        sums
+    }
+
+    fn push(&mut self, samples: &Samples, sample: usize) {
+        let [x, y] = minus(samples.points[sample], self.origin);
+        let t = samples.length[sample] - self.start;
+        self.reach = t;
+        let mut power = 1.0;
+        for k in 0..7 {
+            self.powers[k] += power;
+            if k < 4 {
+                self.x[k] += power * x;
+                self.y[k] += power * y;
+            }
+            power *= t;
+        }
+        self.xx += x * x;
+        self.xy += x * y;
+        self.yy += y * y;
+    }
+
+    /// Scatter about the mean: xx, xy, yy.
+    fn scatter(&self) -> (f64, f64, f64) {
+        let (n, sx, sy) = (self.powers[0], self.x[0], self.y[0]);
+        (
+            self.xx - sx * sx / n,
+            self.xy - sx * sy / n,
+            self.yy - sy * sy / n,
+        )
+    }
+
+    /// Sum of squared distances from the best line.
+    fn line_error(&self) -> f64 {
+        let (a, b, c) = self.scatter();
+        let half = ((a - c) * (a - c) / 4.0 + b * b).sqrt();
+        ((a + c) / 2.0 - half).max(0.0)
+    }
+
+    /// The best line: its mean point (relative to the first sample) and unit direction.
+    fn line(&self) -> ([f64; 2], [f64; 2]) {
+        let (a, b, c) = self.scatter();
+        let half = ((a - c) * (a - c) / 4.0 + b * b).sqrt();
+        // The eigenvector of the greater eigenvalue, in the form that does not cancel.
+        let direction = if a >= c {
+            [(a - c) / 2.0 + half, b]
+        } else {
+            [b, (c - a) / 2.0 + half]
+        };
+        let length = norm(direction);
+        let along = if length > 0.0 {
+            [direction[0] / length, direction[1] / length]
+        } else {
+            [1.0, 0.0]
+        };
+        let n = self.powers[0];
+        ([self.x[0] / n, self.y[0] / n], along)
+    }
+
+    /// The best cubics of x and y over arc length, relative to the first sample.
+    fn cubic(&self) -> Option<([f64; 4], [f64; 4])> {
+        let (x, y, _) = self.solve()?;
+        let unscale = |c: [f64; 4]| {
+            let mut scale = 1.0;
+            c.map(|v| {
+                let value = v / scale;
+                scale *= self.reach;
+                value
+            })
+        };
+        Some((unscale(x), unscale(y)))
+    }
+
+    /// Sum of squared distances from the best cubics, at equal arc length.
+    fn cubic_error(&self) -> f64 {
+        self.solve().map_or(f64::INFINITY, |(_, _, error)| error)
+    }
+
+    /// Cubics over arc length divided by its reach, and their error.
+    fn solve(&self) -> Option<([f64; 4], [f64; 4], f64)> {
+        let mut scales = [1.0; 7];
+        for k in 1..7 {
+            scales[k] = scales[k - 1] * self.reach;
+        }
+        // Cholesky factor of the matrix of powers.
+        let mut l = [[0.0_f64; 4]; 4];
+        for i in 0..4 {
+            for j in 0..=i {
+                let mut sum = self.powers[i + j] / scales[i + j];
+                sum -= (0..j).map(|k| l[i][k] * l[j][k]).sum::<f64>();
+                if i == j {
+                    if sum <= 1e-10 {
+                        return None;
+                    }
+                    l[i][i] = sum.sqrt();
+                } else {
+                    l[i][j] = sum / l[j][j];
+                }
+            }
+        }
+        let mut explained = 0.0;
+        let mut solve = |rhs: &[f64; 4]| {
+            let mut v = [0.0; 4];
+            for i in 0..4 {
+                let mut sum = rhs[i] / scales[i];
+                for k in 0..i {
+                    sum -= l[i][k] * v[k];
+                }
+                v[i] = sum / l[i][i];
+                explained += v[i] * v[i];
+            }
+            for i in (0..4).rev() {
+                let mut sum = v[i];
+                for k in i + 1..4 {
+                    sum -= l[k][i] * v[k];
+                }
+                v[i] = sum / l[i][i];
+            }
+            v
+        };
+        let (x, y) = (solve(&self.x), solve(&self.y));
+        Some((x, y, (self.xx + self.yy - explained).max(0.0)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PRICE: Price = Price {
+        line: 7.0,
+        cubic: 11.0,
+    };
+
+    #[test]
+    fn a_line_of_any_slope_stays_whole() {
+        for step in 0..60 {
+            let slope = f64::from(step) / 59.0;
+            // Middles of the cracks that part the nodes below a line from those above.
+            let mut points = Vec::new();
+            let height = |i: f64| (slope * i + 0.3).floor();
+            for i in 0..150 {
+                let i = f64::from(i);
+                points.push([i, height(i) + 0.5]);
+                if height(i + 1.0) > height(i) {
+                    points.push([i + 0.5, height(i) + 1.0]);
+                }
+            }
+            let samples = Samples::new(points);
+            let segments = samples.divide(PRICE);
+            assert_eq!(segments.len(), 1, "slope {slope}");
+            let (_, along) = samples.at(&segments[0], 0);
+            let error = libm::atan2(along[1], along[0]) - libm::atan(slope);
+            assert!(error.abs() < 0.005, "slope {slope}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_corner_divides_two_lines_where_it_is() {
+        for degrees in [25.0_f64, 40.0, 90.0] {
+            let (sin, cos) = libm::sincos(degrees.to_radians());
+            let mut points: Vec<[f64; 2]> = (0..40).map(|k| [f64::from(k), 0.0]).collect();
+            points.extend((1..40).map(|k| [39.0 + f64::from(k) * cos, f64::from(k) * sin]));
+            for (k, p) in points.iter_mut().enumerate() {
+                p[1] += [0.3, -0.2, 0.1, -0.3, 0.2][k % 5];
+            }
+            let samples = Samples::new(points);
+            let segments = samples.divide(PRICE);
+            assert_eq!(segments.len(), 2, "{degrees} degrees");
+            assert!(segments[0].last.abs_diff(39) <= 1);
+        }
+    }
+
+    #[test]
+    fn a_circle_takes_a_few_cubics() {
+        let points: Vec<[f64; 2]> = (0..=250)
+            .map(|k| {
+                let (sin, cos) = libm::sincos(f64::from(k) * core::f64::consts::TAU / 250.0);
+                [40.0 * cos, 40.0 * sin]
+            })
+            .collect();
+        let samples = Samples::new(points);
+        let segments = samples.divide(PRICE);
+        assert!(segments.len() <= 12, "{}", segments.len());
+        for s in &segments {
+            for k in s.first..=s.last {
+                let radius = norm(samples.at(s, k).0);
+                assert!((radius - 40.0).abs() < 0.5, "{radius}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_sharpest_sample_is_the_corner() {
+        let mut points: Vec<[f64; 2]> = (0..20).map(|k| [f64::from(k), 0.0]).collect();
+        points.extend((1..20).map(|k| [19.0, f64::from(k)]));
+        points.extend((1..19).rev().map(|k| [f64::from(k), f64::from(k)]));
+        let at = points[sharpest(&points)];
+        assert!(norm(minus(at, [0.0, 0.0])) < 1.5 || norm(minus(at, [19.0, 19.0])) < 1.5);
+    }
+}

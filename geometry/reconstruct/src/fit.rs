@@ -1,0 +1,349 @@
+//! Surfaces of regions.
+
+use nurbs::{KnotVector, Observation, PatchSurface, TensorSpline};
+use range_image::RangeImage;
+
+use crate::extension::{ExtendedRegion, NodeRectangle, extend};
+
+/// Degree of the fitted splines: bi-quadratic, as in section III.
+pub const DEGREE: usize = 2;
+
+/// Numbers of spans along the longer side that are tried, besides the greatest allowed.
+const LADDER: [usize; 9] = [1, 2, 3, 4, 6, 8, 12, 16, 20];
+
+/// A span is at least this many pitches wide, so that it averages over the noise that
+/// neighbouring nodes share.
+const MIN_SPAN_PITCHES: f64 = 4.0;
+
+/// More knots must lower the cross-validation score by this factor to be taken.
+const WORTHWHILE: f64 = 0.95;
+
+/// Weight of bending against data: carries surfaces on where there are none.
+const BENDING: f64 = 1e-5;
+
+/// Residuals beyond this many robust standard deviations count as mistakes.
+const GROSS: f64 = 8.0;
+
+/// Residuals beyond this many robust standard deviations lose weight.
+const HUBER: f64 = 2.5;
+
+/// Why a surface could not be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FitError {
+    /// The knots were refused.
+    #[error(transparent)]
+    Knots(#[from] nurbs::KnotError),
+    /// The data do not determine the spline.
+    #[error(transparent)]
+    Singular(#[from] nurbs::Singular),
+    /// The patches are not finite.
+    #[error(transparent)]
+    Patches(#[from] nurbs::PiecewiseError),
+    /// No node of the region has a value.
+    #[error("no node of the region has a range value")]
+    Empty,
+}
+
+/// A rectangle in the x-y plane, millimetres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Domain {
+    /// Least and greatest x.
+    pub x_mm: (f64, f64),
+    /// Least and greatest y.
+    pub y_mm: (f64, f64),
+}
+
+/// Least-squares spline over a full rectangle of nodes with `knots_per_side` distinct
+/// uniform knots along each side, the ends included. A side with too few nodes for that
+/// gets as many knots as its nodes determine.
+///
+/// # Errors
+/// [`FitError`] when a side has fewer than 3 nodes or a value is not finite.
+pub fn rectangle_spline(
+    image: &RangeImage,
+    region: &ExtendedRegion,
+    knots_per_side: usize,
+) -> Result<TensorSpline, FitError> {
+    let NodeRectangle {
+        column_first,
+        row_first,
+        columns,
+        rows,
+    } = region.rectangle;
+    let at = |origin: f64, first: i64, count: usize| -> Vec<f64> {
+        (0..count)
+            .map(|k| origin + (first + k as i64) as f64 * image.pitch_mm())
+            .collect()
+    };
+    let (x, y) = (
+        at(image.x_mm(0), column_first, columns),
+        at(image.y_mm(0), row_first, rows),
+    );
+    let knots = |places: &[f64]| {
+        let (Some(&first), Some(&last)) = (places.first(), places.last()) else {
+            return Err(FitError::Empty);
+        };
+        let spans = (knots_per_side - 1).min(places.len().saturating_sub(DEGREE));
+        Ok(KnotVector::uniform(DEGREE, spans, first, last)?)
+    };
+    let (u, v) = (knots(&x)?, knots(&y)?);
+    Ok(TensorSpline::fit_grid(u, v, &x, &y, |i, j| region.z(i, j))?)
+}
+
+/// Patches through the nodes of the extended range image (section V): `third` pitches
+/// between the points that cut a patch in thirds, breaks uniform, the rectangle the
+/// smallest that covers `domain`.
+///
+/// # Errors
+/// [`FitError::Empty`] when no member has a value.
+pub fn patches_through_nodes(
+    image: &RangeImage,
+    member: impl Fn(usize, usize) -> bool,
+    domain: &Domain,
+    third: usize,
+) -> Result<PatchSurface, FitError> {
+    let pitch = image.pitch_mm();
+    let cover = |(low, high): (f64, f64), origin: f64| {
+        let first = ((low - origin) / pitch).floor() as i64;
+        let last = ((high - origin) / pitch).ceil() as i64;
+        let side = 3 * third;
+        let patches = ((last - first).max(1) as usize).div_ceil(side);
+        // The surplus is shared between both ends.
+        let first = first - ((patches * side) as i64 - (last - first)) / 2;
+        let breaks = (0..=patches)
+            .map(|k| origin + (first + (k * side) as i64) as f64 * pitch)
+            .collect::<Vec<_>>();
+        (first, patches * side + 1, breaks)
+    };
+    let (column_first, columns, u_breaks) = cover(domain.x_mm, image.x_mm(0));
+    let (row_first, rows, v_breaks) = cover(domain.y_mm, image.y_mm(0));
+    let rectangle = NodeRectangle {
+        column_first,
+        row_first,
+        columns,
+        rows,
+    };
+    let extended = extend(image, member, rectangle).ok_or(FitError::Empty)?;
+    Ok(PatchSurface::through_thirds(u_breaks, v_breaks, |i, j| {
+        extended.z(i * third, j * third)
+    })?)
+}
+
+/// Patches that are the spans of a spline fitted to the observations alone and carried
+/// on with little bending to the borders of `domain`. Knots are added while they pay:
+/// until the root mean square residual is within `tolerance_mm` or generalised
+/// cross-validation sees no gain. Few grossly wrong values do not count.
+///
+/// # Errors
+/// [`FitError`] when the observations lie on a line or are fewer than four.
+pub fn patches_from_spline(
+    observations: &mut [Observation],
+    domain: &Domain,
+    pitch_mm: f64,
+    tolerance_mm: f64,
+    max_spans: usize,
+) -> Result<PatchSurface, FitError> {
+    let mut spline = climb(observations, domain, pitch_mm, tolerance_mm, max_spans)?;
+    if reweigh(
+        &spline,
+        observations,
+        |size| if size > GROSS { 0.0 } else { 1.0 },
+    ) {
+        spline = climb(observations, domain, pitch_mm, tolerance_mm, max_spans)?;
+    }
+    for _ in 0..2 {
+        if !reweigh(&spline, observations, |size| (HUBER / size).min(1.0)) {
+            break;
+        }
+        let (u, v) = (spline.u_knots().clone(), spline.v_knots().clone());
+        spline = TensorSpline::fit_scattered(u, v, observations, BENDING)?;
+    }
+    Ok(spline.to_patches()?)
+}
+
+/// Fits with more and more knots, and keeps the last that paid.
+fn climb(
+    observations: &[Observation],
+    domain: &Domain,
+    pitch_mm: f64,
+    tolerance_mm: f64,
+    max_spans: usize,
+) -> Result<TensorSpline, FitError> {
+    let (width, height) = (domain.x_mm.1 - domain.x_mm.0, domain.y_mm.1 - domain.y_mm.0);
+    let longer = width.max(height);
+    let most = ((longer / (MIN_SPAN_PITCHES * pitch_mm)) as usize).clamp(1, max_spans);
+    let data: f64 = observations.iter().map(|o| o.weight).sum();
+    let mut best: Option<(f64, TensorSpline)> = None;
+    let mut failures = 0;
+    for spans in LADDER.into_iter().filter(|&n| n < most).chain([most]) {
+        let side = |length: f64| ((length / longer * spans as f64).round() as usize).max(1);
+        let u = KnotVector::uniform(DEGREE, side(width), domain.x_mm.0, domain.x_mm.1)?;
+        let v = KnotVector::uniform(DEGREE, side(height), domain.y_mm.0, domain.y_mm.1)?;
+        let unknowns = (u.control_count() * v.control_count()) as f64;
+        let spline = TensorSpline::fit_scattered(u, v, observations, BENDING)?;
+        let residuals = residuals(&spline, observations);
+        let squares = residuals
+            .iter()
+            .zip(observations)
+            .map(|(r, o)| o.weight * r * r);
+        let mean_square = squares.sum::<f64>() / data;
+        // Not every unknown meets data; counting all is on the cautious side.
+        let freedom = 1.0 - (unknowns / data).min(0.9);
+        let score = mean_square / (freedom * freedom);
+        if best
+            .as_ref()
+            .is_none_or(|(least, _)| score < WORTHWHILE * least)
+        {
+            best = Some((score, spline));
+            failures = 0;
+        } else {
+            failures += 1;
+        }
+        if mean_square.sqrt() <= tolerance_mm || failures == 3 {
+            break;
+        }
+    }
+    best.map(|b| b.1).ok_or(FitError::Empty)
+}
+
+fn residuals(spline: &TensorSpline, observations: &[Observation]) -> Vec<f64> {
+    observations
+        .iter()
+        .map(|o| o.value - spline.value(o.u, o.v))
+        .collect()
+}
+
+/// Gives each observation the weight of its residual in robust standard deviations; false
+/// when every one keeps full weight.
+fn reweigh(
+    spline: &TensorSpline,
+    observations: &mut [Observation],
+    weight: impl Fn(f64) -> f64,
+) -> bool {
+    let residuals = residuals(spline, observations);
+    let mut sizes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
+    let middle = sizes.len() / 2;
+    if sizes.is_empty() {
+        return false;
+    }
+    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+    // Median absolute deviation to standard deviation of a normal distribution.
+    let sigma = 1.4826 * *median;
+    if sigma < 1e-12 {
+        return false;
+    }
+    let mut changed = false;
+    for (o, r) in observations.iter_mut().zip(&residuals) {
+        o.weight = weight(r.abs() / sigma);
+        changed |= o.weight < 1.0;
+    }
+    changed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use range_image::image::Lattice;
+
+    fn image(z: impl Fn(f64, f64) -> f64) -> RangeImage {
+        let mut image = RangeImage::masked(Lattice { pitch_mm: 0.5 }, -20, 10, 60, 50);
+        for column in 0..60 {
+            for row in 0..50 {
+                let z = z(image.x_mm(column), image.y_mm(row));
+                image.set_z_mm(column, row, Some(z));
+            }
+        }
+        image
+    }
+
+    fn disc(image: &RangeImage) -> impl Fn(usize, usize) -> bool + use<> {
+        let _ = image;
+        |column, row| {
+            let (x, y) = (column as f64 - 30.0, row as f64 - 25.0);
+            x * x + y * y < 400.0
+        }
+    }
+
+    fn domain(image: &RangeImage) -> Domain {
+        Domain {
+            x_mm: (image.x_mm(8), image.x_mm(52)),
+            y_mm: (image.y_mm(3), image.y_mm(47)),
+        }
+    }
+
+    fn observations(image: &RangeImage, member: impl Fn(usize, usize) -> bool) -> Vec<Observation> {
+        let mut seen = Vec::new();
+        for column in 0..image.columns() {
+            for row in 0..image.rows() {
+                if member(column, row) {
+                    seen.push(Observation {
+                        u: image.x_mm(column),
+                        v: image.y_mm(row),
+                        value: image.z_mm(column, row).unwrap(),
+                        weight: 1.0,
+                    });
+                }
+            }
+        }
+        seen
+    }
+
+    #[test]
+    fn a_plane_is_met_exactly_by_one_patch() {
+        let plane = |x: f64, y: f64| 3.0 + 0.4 * x - 0.7 * y;
+        let image = image(plane);
+        let mut seen = observations(&image, disc(&image));
+        let surface = patches_from_spline(&mut seen, &domain(&image), 0.5, 0.01, 25).unwrap();
+        assert_eq!(surface.patches.len(), 1);
+        for o in &seen {
+            assert!((surface.z(o.u, o.v) - o.value).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn curvature_brings_knots_and_outliers_do_not_bend() {
+        let wave = |x: f64, y: f64| libm::sin(0.4 * x) * libm::cos(0.3 * y);
+        let image = image(wave);
+        let mut seen = observations(&image, disc(&image));
+        for k in (0..seen.len()).step_by(97) {
+            seen[k].value += 5.0;
+        }
+        let surface = patches_from_spline(&mut seen, &domain(&image), 0.5, 1e-3, 25).unwrap();
+        let worst = seen
+            .iter()
+            .map(|o| (surface.z(o.u, o.v) - wave(o.u, o.v)).abs())
+            .fold(0.0, f64::max);
+        assert!(worst < 0.12, "{worst}");
+    }
+
+    #[test]
+    fn patches_pass_through_the_nodes() {
+        let image = image(|x, y| x * x - y + x * y);
+        let member = disc(&image);
+        let surface = patches_through_nodes(&image, &member, &domain(&image), 1).unwrap();
+        for column in 12..48 {
+            for row in 8..42 {
+                if member(column, row) {
+                    let z = surface.z(image.x_mm(column), image.y_mm(row));
+                    assert!((z - image.z_mm(column, row).unwrap()).abs() < 1e-9);
+                }
+            }
+        }
+        assert!(surface.u_domain().0 <= image.x_mm(8) && surface.u_domain().1 >= image.x_mm(52));
+    }
+
+    #[test]
+    fn a_small_rectangle_gets_fewer_knots() {
+        let image = image(|x, y| x + y);
+        let rectangle = NodeRectangle {
+            column_first: 0,
+            row_first: 0,
+            columns: 5,
+            rows: 40,
+        };
+        let region = extend(&image, |_, _| true, rectangle).unwrap();
+        let spline = rectangle_spline(&image, &region, 26).unwrap();
+        assert_eq!(spline.u_knots().breaks().len(), 4);
+        assert_eq!(spline.v_knots().breaks().len(), 26);
+    }
+}

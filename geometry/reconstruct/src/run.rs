@@ -1,0 +1,324 @@
+//! The whole road from regions to the model.
+
+use nurbs::{Observation, PatchSurface};
+use range_image::{Monitor, RangeImage, RegionMap};
+
+use crate::assemble::{Carrier, Placement, domains, model};
+use crate::border::cracks::trace;
+use crate::border::map::{BorderSettings, PlanarMap, build};
+use crate::fit::{Domain, FitError, patches_from_spline, patches_through_nodes};
+use crate::metrics::{Metrics, compare, psnr_db};
+use crate::model::{Model, Surface};
+use crate::pieces::{PieceLimits, PieceMap};
+use crate::settings::{Method, ReconstructError, ReconstructSettings};
+use crate::trim::Trim;
+
+/// A model and how well it agrees with what was measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reconstruction {
+    /// The trimmed faces.
+    pub model: Model,
+    /// z of the trimmed faces at the nodes of the range image; masked outside all faces.
+    pub restored: RangeImage,
+    /// How each region that gave a face was met, in the order of labels.
+    pub regions: Vec<RegionFit>,
+    /// The restored image against the range image.
+    pub metrics: Metrics,
+    /// Holes filled, and the nodes in them.
+    pub filled_holes: (usize, usize),
+    /// Borders that had to be drawn with less smoothing than the others.
+    pub unsmoothed_borders: usize,
+    /// What a user should know.
+    pub warnings: Vec<String>,
+}
+
+/// How the surfaces of a region agree with its nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RegionFit {
+    /// The region.
+    pub label: u16,
+    /// Nodes the surfaces were fitted to.
+    pub nodes: usize,
+    /// Faces made of it.
+    pub faces: usize,
+    /// Patches of its surfaces, in all.
+    pub patches: usize,
+    /// Root mean square residual in z, millimetres.
+    pub rms_mm: f64,
+    /// Greatest residual in z, millimetres.
+    pub max_mm: f64,
+    /// Peak signal-to-noise ratio as in Table 1 of the paper, decibels.
+    pub psnr_db: f64,
+}
+
+/// A node with its place and height in millimetres.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    column: usize,
+    row: usize,
+    z_mm: f64,
+}
+
+/// Makes a model of trimmed faces from the regions of a range image.
+///
+/// # Errors
+/// [`ReconstructError`] when a setting is out of range, the map does not belong to the
+/// image, no region can become a face, or the caller cancels.
+pub fn reconstruct(
+    image: &RangeImage,
+    map: &RegionMap,
+    settings: &ReconstructSettings,
+    monitor: &dyn Monitor,
+) -> Result<Reconstruction, ReconstructError> {
+    settings.validate()?;
+    check_input(image, map)?;
+    let limits = PieceLimits {
+        min_nodes: settings.min_piece_nodes,
+        min_hole_nodes: settings.min_hole_nodes,
+    };
+    let pieces = PieceMap::new(map, limits);
+    if pieces.regions.is_empty() {
+        return Err(ReconstructError::NoFaces {
+            regions: usize::from(map.regions()),
+            min_nodes: settings.min_piece_nodes,
+        });
+    }
+    monitor.check()?;
+    let borders = BorderSettings {
+        literal: settings.method == Method::ShimLee,
+        corner_cosine: libm::cos(settings.corner_angle_rad),
+        piece_price: settings.piece_price_pitch2,
+        bound: settings.border_bound_pitches,
+    };
+    let planar = build(&trace(&pieces), &borders, monitor)?;
+    monitor.progress(0.4);
+
+    let nodes = nodes_of(image, map, &pieces);
+    let placement = Placement::of(image);
+    let names = names(&pieces.regions);
+    let mut carriers = Vec::with_capacity(nodes.len());
+    let mut fits: Vec<RegionFit> = Vec::new();
+    for (k, domain) in domains(&planar, placement).into_iter().enumerate() {
+        monitor.check()?;
+        let region = pieces.regions[k];
+        let failed = |e: FitError| ReconstructError::Fit {
+            label: region,
+            reason: e.to_string(),
+        };
+        let domain = domain.ok_or(FitError::Empty).map_err(failed)?;
+        let surface = surface(image, &nodes[k], &domain, settings).map_err(failed)?;
+        let rms_mm = tally(&mut fits, region, image, &nodes[k], &surface);
+        carriers.push(Carrier {
+            region,
+            name: names[k].clone(),
+            surface,
+            rms_mm,
+        });
+        monitor.progress(0.4 + 0.4 * (k + 1) as f64 / nodes.len() as f64);
+    }
+    for fit in &mut fits {
+        fit.psnr_db = psnr_db(fit.rms_mm);
+    }
+    let model = model(&planar, carriers, placement);
+    monitor.check()?;
+    let restored = restore(image, &model, placement);
+    monitor.progress(1.0);
+    Ok(Reconstruction {
+        metrics: compare(image, &restored),
+        warnings: warnings(&pieces, &planar, map),
+        model,
+        restored,
+        regions: fits,
+        filled_holes: (pieces.filled_holes, pieces.filled_nodes),
+        unsmoothed_borders: planar.unsmoothed,
+    })
+}
+
+fn check_input(image: &RangeImage, map: &RegionMap) -> Result<(), ReconstructError> {
+    let (columns, rows) = (image.columns(), image.rows());
+    if (map.columns(), map.rows()) != (columns, rows) {
+        return Err(ReconstructError::SizeMismatch {
+            columns,
+            rows,
+            map_columns: map.columns(),
+            map_rows: map.rows(),
+        });
+    }
+    let masked = map
+        .raw_labels()
+        .iter()
+        .zip(image.raw_z_mm())
+        .position(|(&label, z)| label != 0 && !z.is_finite());
+    if let Some(k) = masked {
+        let (column, row) = (k / rows, k % rows);
+        let label = map.label(column, row);
+        return Err(ReconstructError::MaskedNode { column, row, label });
+    }
+    if map.regions() == 0 {
+        return Err(ReconstructError::NoRegions);
+    }
+    Ok(())
+}
+
+/// The nodes each piece is fitted to: those that segmentation gave to its region.
+fn nodes_of(image: &RangeImage, map: &RegionMap, pieces: &PieceMap) -> Vec<Vec<Node>> {
+    let rows = image.rows();
+    let mut nodes = vec![Vec::new(); pieces.regions.len()];
+    for (k, (&piece, &label)) in pieces.labels().iter().zip(map.raw_labels()).enumerate() {
+        let Some(of_piece) = (piece as usize).checked_sub(1) else {
+            continue;
+        };
+        if pieces.regions[of_piece] == label {
+            let (column, row, z_mm) = (k / rows, k % rows, image.raw_z_mm()[k]);
+            nodes[of_piece].push(Node { column, row, z_mm });
+        }
+    }
+    nodes
+}
+
+fn surface(
+    image: &RangeImage,
+    nodes: &[Node],
+    domain: &Domain,
+    settings: &ReconstructSettings,
+) -> Result<PatchSurface, FitError> {
+    match settings.method {
+        Method::Relief => {
+            let mut observations: Vec<Observation> = nodes
+                .iter()
+                .map(|n| Observation {
+                    u: image.x_mm(n.column),
+                    v: image.y_mm(n.row),
+                    value: n.z_mm,
+                    weight: 1.0,
+                })
+                .collect();
+            patches_from_spline(
+                &mut observations,
+                domain,
+                image.pitch_mm(),
+                settings.tolerance_mm,
+                settings.knots_per_side - 1,
+            )
+        }
+        Method::ShimLee => {
+            let mut member = vec![false; image.raw_z_mm().len()];
+            for n in nodes {
+                member[n.column * image.rows() + n.row] = true;
+            }
+            let member = |column: usize, row: usize| {
+                column < image.columns() && member[column * image.rows() + row]
+            };
+            patches_through_nodes(image, member, domain, settings.patch_third_nodes)
+        }
+    }
+}
+
+/// Adds a face to the account of its region; gives its own root mean square residual.
+fn tally(
+    fits: &mut Vec<RegionFit>,
+    label: u16,
+    image: &RangeImage,
+    nodes: &[Node],
+    surface: &PatchSurface,
+) -> f64 {
+    let (mut sum, mut max_mm) = (0.0, 0.0_f64);
+    for n in nodes {
+        let off = surface.z(image.x_mm(n.column), image.y_mm(n.row)) - n.z_mm;
+        sum += off * off;
+        max_mm = max_mm.max(off.abs());
+    }
+    let count = nodes.len() as f64;
+    match fits.last_mut() {
+        Some(fit) if fit.label == label => {
+            let before = fit.rms_mm * fit.rms_mm * fit.nodes as f64;
+            fit.nodes += nodes.len();
+            fit.rms_mm = ((before + sum) / fit.nodes as f64).sqrt();
+            fit.max_mm = fit.max_mm.max(max_mm);
+            fit.faces += 1;
+            fit.patches += surface.patches.len();
+        }
+        _ => fits.push(RegionFit {
+            label,
+            nodes: nodes.len(),
+            faces: 1,
+            patches: surface.patches.len(),
+            rms_mm: (sum / count).sqrt(),
+            max_mm,
+            psnr_db: 0.0,
+        }),
+    }
+    (sum / count).sqrt()
+}
+
+fn names(regions: &[u16]) -> Vec<String> {
+    let mut names = Vec::with_capacity(regions.len());
+    for (k, &region) in regions.iter().enumerate() {
+        let first = regions.partition_point(|&r| r < region);
+        let alone = regions.partition_point(|&r| r <= region) == first + 1;
+        names.push(if alone {
+            format!("Region {region}")
+        } else {
+            format!("Region {region} part {}", k - first + 1)
+        });
+    }
+    names
+}
+
+/// z of the trimmed faces at the nodes of the image.
+fn restore(image: &RangeImage, model: &Model, placement: Placement) -> RangeImage {
+    let mut restored = image.masked_like();
+    for face in &model.faces {
+        let Surface::Patches(surface) = &face.surface;
+        let loops = core::iter::once(&face.outer).chain(&face.inner);
+        let curves = loops.flat_map(|l| &l.coedges).map(|c| &c.parameter_curve);
+        let trim = Trim::new(curves, image.pitch_mm(), |p| placement.to_pitches(p));
+        trim.nodes(image.columns(), image.rows(), |column, row| {
+            let z = surface.z(image.x_mm(column), image.y_mm(row));
+            restored.set_z_mm(column, row, Some(z));
+        });
+    }
+    restored
+}
+
+fn warnings(pieces: &PieceMap, planar: &PlanarMap, map: &RegionMap) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let counts = map.node_counts();
+    let mut specks = (0, 0);
+    for rejected in &pieces.rejected {
+        let whole = counts[usize::from(rejected.region) - 1] == rejected.nodes;
+        if !whole {
+            specks = (specks.0 + 1, specks.1 + rejected.nodes);
+        } else if rejected.thin {
+            warnings.push(format!(
+                "region {} is too thin for a face: its {} nodes are nowhere two wide both ways",
+                rejected.region, rejected.nodes
+            ));
+        } else {
+            warnings.push(format!(
+                "region {} is too small for a face: {} nodes",
+                rejected.region, rejected.nodes
+            ));
+        }
+    }
+    if specks.0 > 0 {
+        warnings.push(format!(
+            "{} specks apart from their regions, {} nodes in all, were left out",
+            specks.0, specks.1
+        ));
+    }
+    if pieces.filled_holes > 0 {
+        warnings.push(format!(
+            "{} small holes were filled, {} nodes in all",
+            pieces.filled_holes, pieces.filled_nodes
+        ));
+    }
+    if planar.unsmoothed > 0 {
+        warnings.push(format!(
+            "{} of {} borders are drawn with less smoothing, because they are too ragged or too \
+             close to others",
+            planar.unsmoothed, planar.borders
+        ));
+    }
+    warnings
+}

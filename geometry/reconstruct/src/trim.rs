@@ -1,0 +1,104 @@
+//! Which nodes lie inside a trimmed face.
+
+use nurbs::PiecewiseCubic;
+
+/// A face's loops as polygons in pitches, ready to be asked column by column.
+pub(crate) struct Trim {
+    segments: Vec<[[f64; 2]; 2]>,
+}
+
+/// Greatest length of a chord by which a curve is replaced, in units of its parameter.
+const CHORD: f64 = 0.25;
+
+impl Trim {
+    /// From the parameter curves of all loops; `to_pitches` maps millimetres to pitches
+    /// with node `(column, row)` at `(column, row)`.
+    pub(crate) fn new<'a>(
+        curves: impl Iterator<Item = &'a PiecewiseCubic<2>>,
+        pitch_mm: f64,
+        to_pitches: impl Fn([f64; 2]) -> [f64; 2],
+    ) -> Self {
+        let mut segments = Vec::new();
+        for curve in curves {
+            let mut before = to_pitches(curve.start());
+            for k in 0..curve.pieces.len() {
+                let width = curve.breaks[k + 1] - curve.breaks[k];
+                let straight = curve.pieces[k].iter().all(|c| c[2] == 0.0 && c[3] == 0.0);
+                let chords = if straight {
+                    1.0
+                } else {
+                    (width / pitch_mm / CHORD).ceil()
+                };
+                let count = chords.clamp(1.0, 1e5) as usize;
+                for p in 1..=count {
+                    let point = curve.piece_value(k, width * p as f64 / count as f64, 0);
+                    let point = to_pitches(point);
+                    segments.push([before, point]);
+                    before = point;
+                }
+            }
+        }
+        Self { segments }
+    }
+
+    /// Calls `visit(column, row)` for each node inside, by even and odd crossings along
+    /// each column.
+    pub(crate) fn nodes(&self, columns: usize, rows: usize, mut visit: impl FnMut(usize, usize)) {
+        let mut crossings: Vec<Vec<f64>> = vec![Vec::new(); columns];
+        for [a, b] in &self.segments {
+            let (a, b) = if a[0] <= b[0] { (a, b) } else { (b, a) };
+            // Half-open, so that a corner on a column counts once.
+            let first = a[0].ceil().max(0.0) as usize;
+            let end = (b[0].ceil().max(0.0) as usize).min(columns);
+            for (column, found) in crossings.iter_mut().enumerate().take(end).skip(first) {
+                let t = (column as f64 - a[0]) / (b[0] - a[0]);
+                found.push(a[1] + t * (b[1] - a[1]));
+            }
+        }
+        for (column, mut found) in crossings.into_iter().enumerate() {
+            found.sort_by(f64::total_cmp);
+            for pair in found.chunks_exact(2) {
+                let first = pair[0].ceil().max(0.0) as usize;
+                let end = (pair[1].ceil().max(0.0) as usize).min(rows);
+                for row in first..end {
+                    visit(column, row);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ring_holds_the_nodes_between_its_circles() {
+        let circle = |radius: f64| {
+            let quarters = (0..4).map(|q| {
+                let points = [0.0, 1.0, 2.0, 3.0].map(|k: f64| {
+                    let angle = (f64::from(q) + k / 3.0) * core::f64::consts::FRAC_PI_2;
+                    let (sin, cos) = libm::sincos(angle);
+                    [10.3 + radius * cos, 10.2 + radius * sin]
+                });
+                let length = radius * core::f64::consts::FRAC_PI_2;
+                PiecewiseCubic::through_thirds(0.0, length, &points).unwrap()
+            });
+            quarters.collect::<Vec<_>>()
+        };
+        let mut curves = circle(8.0);
+        curves.extend(circle(3.0));
+        let trim = Trim::new(curves.iter(), 1.0, |p| p);
+        let mut inside = vec![false; 21 * 21];
+        trim.nodes(21, 21, |column, row| inside[column * 21 + row] = true);
+        for column in 0..21 {
+            for row in 0..21 {
+                let (x, y) = (column as f64 - 10.3, row as f64 - 10.2);
+                let radius = (x * x + y * y).sqrt();
+                if (radius - 8.0).abs() > 0.1 && (radius - 3.0).abs() > 0.1 {
+                    assert_eq!(inside[column * 21 + row], radius < 8.0 && radius > 3.0);
+                }
+            }
+        }
+    }
+}
