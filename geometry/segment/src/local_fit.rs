@@ -11,13 +11,26 @@ const LEAST_FOR_QUADRATIC: f64 = 18.0;
 /// the noise of neighbouring nodes is not independent.
 const BELIEF: f64 = 6.0;
 
+/// Powers of u and v in each term.
+const POWERS: [(usize, usize); TERMS] = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)];
+
+/// Weighted sums over nodes of one label in one column, by powers of v.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct ColumnSums {
+    powers: [f64; 5],
+    z: [f64; 3],
+    z_squared: f64,
+}
+
 /// Weighted sums over the nodes of one label, u and v in pitches from a common centre.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sums {
     pub(crate) label: u32,
-    normal: [[f64; TERMS]; TERMS],
-    right: [f64; TERMS],
-    squares: f64,
+    /// Of u^a v^b, where a + b is at most 4.
+    moments: [[f64; 5]; 5],
+    /// Of u^a v^b z, where a + b is at most 2.
+    z: [[f64; 3]; 3],
+    z_squared: f64,
 }
 
 /// A fitted piece of surface, z in millimetres over u and v in pitches.
@@ -28,32 +41,49 @@ pub(crate) struct LocalFit {
     pub(crate) centroid: [f64; 2],
 }
 
+impl ColumnSums {
+    pub(crate) fn add(&mut self, v: f64, z_mm: f64, weight: f64) {
+        let mut term = weight;
+        for k in 0..5 {
+            self.powers[k] += term;
+            if k < 3 {
+                self.z[k] += term * z_mm;
+            }
+            term *= v;
+        }
+        self.z_squared += weight * z_mm * z_mm;
+    }
+}
+
 impl Sums {
     pub(crate) fn new(label: u32) -> Self {
         Self {
             label,
-            normal: [[0.0; TERMS]; TERMS],
-            right: [0.0; TERMS],
-            squares: 0.0,
+            moments: [[0.0; 5]; 5],
+            z: [[0.0; 3]; 3],
+            z_squared: 0.0,
         }
     }
 
-    pub(crate) fn add(&mut self, u: f64, v: f64, z_mm: f64, weight: f64) {
-        let terms = [1.0, u, v, u * u, u * v, v * v];
-        for (i, (row, term)) in self.normal.iter_mut().zip(terms).enumerate() {
-            let weighted = weight * term;
-            for (sum, term) in row.iter_mut().zip(terms).take(i + 1) {
-                *sum += weighted * term;
+    /// Adds nodes of the column at u.
+    pub(crate) fn add(&mut self, u: f64, column: &ColumnSums) {
+        let mut power = 1.0;
+        for a in 0..5 {
+            for b in 0..5 - a {
+                self.moments[a][b] += power * column.powers[b];
             }
-            self.right[i] += weighted * z_mm;
+            for b in 0..3_usize.saturating_sub(a) {
+                self.z[a][b] += power * column.z[b];
+            }
+            power *= u;
         }
-        self.squares += weight * z_mm * z_mm;
+        self.z_squared += column.z_squared;
     }
 
     /// The plane, or the quadratic where it is clearly nearer to the nodes; `None` with too
     /// few nodes, or nodes on a line.
     pub(crate) fn fit(&self) -> Option<LocalFit> {
-        let weight = self.normal[0][0];
+        let weight = self.moments[0][0];
         if weight < LEAST_FOR_PLANE {
             return None;
         }
@@ -66,22 +96,26 @@ impl Sums {
         {
             terms = quadratic;
         }
-        let centroid = [self.normal[1][0] / weight, self.normal[2][0] / weight];
+        let centroid = [self.moments[1][0] / weight, self.moments[0][1] / weight];
         Some(LocalFit { terms, centroid })
     }
 
     /// Cholesky solution of the first N normal equations, and the squared error left.
     fn solve<const N: usize>(&self) -> Option<([f64; N], f64)> {
+        let normal = |i: usize, j: usize| {
+            let ((a, b), (c, d)) = (POWERS[i], POWERS[j]);
+            self.moments[a + c][b + d]
+        };
         let mut factor = [[0.0; N]; N];
         for i in 0..N {
             for j in 0..=i {
-                let mut sum = self.normal[i][j];
+                let mut sum = normal(i, j);
                 for (a, b) in factor[i].iter().zip(factor[j]).take(j) {
                     sum -= a * b;
                 }
                 if i == j {
                     // What is left of a term that the others already make up.
-                    if sum <= 1e-7 * self.normal[i][i] {
+                    if sum <= 1e-7 * normal(i, i) {
                         return None;
                     }
                     factor[i][i] = libm::sqrt(sum);
@@ -91,9 +125,9 @@ impl Sums {
             }
         }
         let mut solution = [0.0; N];
-        let mut error = self.squares;
+        let mut error = self.z_squared;
         for i in 0..N {
-            let mut sum = self.right[i];
+            let mut sum = self.z[POWERS[i].0][POWERS[i].1];
             for (factor, known) in factor[i].iter().zip(solution).take(i) {
                 sum -= factor * known;
             }
@@ -140,11 +174,12 @@ mod tests {
     fn a_quadratic_is_found_and_carried_on() {
         let surface = |u: f64, v: f64| 1.0 + 0.3 * u - 0.2 * v + 0.05 * u * u - 0.02 * u * v;
         let mut sums = Sums::new(1);
-        for u in -6..0 {
-            for v in -6..=6 {
-                let (u, v) = (f64::from(u), f64::from(v));
-                sums.add(u, v, surface(u, v), 1.0);
+        for u in (-6..0).map(f64::from) {
+            let mut column = ColumnSums::default();
+            for v in (-6..=6).map(f64::from) {
+                column.add(v, surface(u, v), 1.0);
             }
+            sums.add(u, &column);
         }
         let fit = sums.fit().unwrap();
         assert!((fit.z_mm(2.0, 1.0) - surface(2.0, 1.0)).abs() < 1e-9);
@@ -158,7 +193,9 @@ mod tests {
     fn nodes_on_a_line_give_nothing() {
         let mut sums = Sums::new(1);
         for k in 0..40 {
-            sums.add(f64::from(k), 2.0 * f64::from(k), 1.0, 1.0);
+            let mut column = ColumnSums::default();
+            column.add(2.0 * f64::from(k), 1.0, 1.0);
+            sums.add(f64::from(k), &column);
         }
         assert!(sums.fit().is_none());
     }

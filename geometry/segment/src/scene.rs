@@ -1,7 +1,7 @@
 //! What all stages after the clustering share: the grid, its links and the local scale.
 
 use crate::grid::{Grid, Links};
-use crate::local_fit::Sums;
+use crate::local_fit::{ColumnSums, Sums};
 
 /// Label of a node that belongs to no region (yet).
 pub(crate) const NONE: u32 = 0;
@@ -50,42 +50,54 @@ impl Scene<'_> {
         let (columns, rows) = grid.window(node, reach);
         let z0 = grid.z_mm[node];
         for c in columns {
+            let u = c as f64 - column as f64;
+            let mut current = (NONE, ColumnSums::default());
             for r in rows.clone() {
                 let k = c * grid.rows + r;
                 let label = labels[k];
-                if label == NONE || !wanted(label) {
+                if label != current.0 {
+                    flush(found, u, current.0, &current.1);
+                    let counts = label != NONE && wanted(label);
+                    current = (if counts { label } else { NONE }, ColumnSums::default());
+                }
+                if current.0 == NONE {
                     continue;
                 }
-                let slot = match found.iter().position(|s| s.label == label) {
-                    Some(slot) => slot,
-                    None => {
-                        found.push(Sums::new(label));
-                        found.len() - 1
-                    }
-                };
-                let weight = if self.is_inside(labels, k) {
+                let weight = if self.is_inside(labels, c, r) {
                     1.0
                 } else {
                     BORDER_WEIGHT
                 };
-                found[slot].add(
-                    c as f64 - column as f64,
-                    r as f64 - row as f64,
-                    grid.z_mm[k] - z0,
-                    weight,
-                );
+                let v = r as f64 - row as f64;
+                current.1.add(v, grid.z_mm[k] - z0, weight);
             }
+            flush(found, u, current.0, &current.1);
         }
     }
 
     /// Whether no 4-neighbour has another label.
-    fn is_inside(&self, labels: &[u32], node: usize) -> bool {
+    fn is_inside(&self, labels: &[u32], column: usize, row: usize) -> bool {
+        let node = column * self.grid.rows + row;
         let own = labels[node];
-        let (column, row) = self.grid.column_row(node);
         let same = |node: usize| labels[node] == own || labels[node] == NONE;
         (row == 0 || same(node - 1))
             && (row + 1 == self.grid.rows || same(node + 1))
             && (column == 0 || same(node - self.grid.rows))
             && (column + 1 == self.grid.columns || same(node + self.grid.rows))
     }
+}
+
+/// Adds a run of nodes to the sums of their label.
+fn flush(found: &mut Vec<Sums>, u: f64, label: u32, column: &ColumnSums) {
+    if label == NONE {
+        return;
+    }
+    let slot = match found.iter().position(|s| s.label == label) {
+        Some(slot) => slot,
+        None => {
+            found.push(Sums::new(label));
+            found.len() - 1
+        }
+    };
+    found[slot].add(u, column);
 }
