@@ -41,6 +41,9 @@ pub(crate) struct CrackMap {
 /// Corner `(column, row)` is the lower left one of the node of that address.
 type Corner = (i64, i64);
 
+/// Cracks of the longest chain that is contracted to a point.
+const CONTRACTED: usize = 2;
+
 /// East, north, west, south.
 const STEPS: [(i64, i64); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
 
@@ -79,8 +82,64 @@ pub(crate) fn trace(pieces: &PieceMap) -> CrackMap {
             map.chains.extend(tracer.chain(corner, direction));
         }
     }
+    contract(&mut map);
     map.loops = loops(&map.chains, pieces.regions.len());
     map
+}
+
+/// Makes one junction of two that a very short chain joins: four faces that meet in a
+/// point hardly ever do so on the lattice.
+fn contract(map: &mut CrackMap) {
+    let mut around: Vec<Vec<u32>> = vec![Vec::new(); map.junctions.len()];
+    for chain in &map.chains {
+        if let Some((a, b)) = chain.ends {
+            around[a].extend([chain.left, chain.right]);
+            around[b].extend([chain.left, chain.right]);
+        }
+    }
+    let mut merged = vec![false; map.junctions.len()];
+    let mut target: Vec<usize> = (0..map.junctions.len()).collect();
+    let mut kept = vec![true; map.chains.len()];
+    for (k, chain) in map.chains.iter().enumerate() {
+        let Some((a, b)) = chain.ends else { continue };
+        let beyond = |j: usize| {
+            around[j]
+                .iter()
+                .find(|&&p| p != chain.left && p != chain.right)
+        };
+        let (Some(&before), Some(&after)) = (beyond(a), beyond(b)) else {
+            continue;
+        };
+        // Three chains at each end, so that each of the four pieces is met once.
+        let plain = around[a].len() == 6 && around[b].len() == 6;
+        let short = a != b && chain.middles.len() <= CONTRACTED;
+        if !short || !plain || before * after == 0 || before == after || merged[a] || merged[b] {
+            continue;
+        }
+        (merged[a], merged[b], kept[k]) = (true, true, false);
+        let (p, q) = (map.junctions[a], map.junctions[b]);
+        map.junctions[a] = match chain.middles[..] {
+            [_, m] => [2.0 * m[0] - q[0], 2.0 * m[1] - q[1]],
+            _ => [(p[0] + q[0]) / 2.0, (p[1] + q[1]) / 2.0],
+        };
+        target[b] = a;
+    }
+    let mut number = vec![0; target.len()];
+    let mut junctions = Vec::new();
+    for (j, &t) in target.iter().enumerate() {
+        if t == j {
+            number[j] = junctions.len();
+            junctions.push(map.junctions[j]);
+        }
+    }
+    map.junctions = junctions;
+    let mut kept = kept.into_iter();
+    map.chains.retain(|_| kept.next().unwrap_or(true));
+    for chain in &mut map.chains {
+        chain.ends = chain
+            .ends
+            .map(|(a, b)| (number[target[a]], number[target[b]]));
+    }
 }
 
 fn place((i, j): Corner) -> [f64; 2] {

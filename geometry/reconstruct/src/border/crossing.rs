@@ -6,11 +6,11 @@ use nurbs::PiecewiseCubic;
 
 use crate::polygon::{cross, distance_of_segments, dot, minus, norm};
 
-/// Side of the cells in which segments are looked up, and the longest segment.
+/// Side of the cells in which segments are looked up.
 const CELL: f64 = 2.0;
 
-/// Least number of chords for a curved piece.
-const CHORDS: f64 = 16.0;
+/// Chords by which a curved piece is replaced; it turns by less than a right angle.
+const CHORDS: usize = 24;
 
 /// Strands that share no vertex keep at least this distance.
 const CLEARANCE: f64 = 0.02;
@@ -39,8 +39,7 @@ impl Strand {
         for k in 0..path.pieces.len() {
             let width = path.breaks[k + 1] - path.breaks[k];
             let straight = path.pieces[k].iter().all(|c| c[2] == 0.0 && c[3] == 0.0);
-            let least = if straight { 1.0 } else { CHORDS };
-            let count = (width / CELL).ceil().clamp(least, 1e5) as usize;
+            let count = if straight { 1 } else { CHORDS };
             for p in 1..=count {
                 points.push(path.piece_value(k, width * p as f64 / count as f64, 0));
             }

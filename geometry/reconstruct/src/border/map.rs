@@ -103,6 +103,19 @@ pub(crate) fn build(
             .collect();
         let bad = faults(cracks, &borders, &drawn, &junctions);
         let mut raised = false;
+        if std::env::var("DBG").is_ok() {
+            println!(
+                "bad {:?}",
+                bad.iter()
+                    .map(|&k| (
+                        k,
+                        borders[k].level,
+                        borders[k].samples.points.len(),
+                        borders[k].segments.len()
+                    ))
+                    .collect::<Vec<_>>()
+            );
+        }
         for k in bad {
             if borders[k].level < TRACED {
                 borders[k].level = if settings.literal {
@@ -289,11 +302,17 @@ fn faults(
             strands.push(strand);
         }
         if border.level < TRACED && strays(&border.samples, &outline) {
+            if std::env::var("DBG").is_ok() {
+                println!("strays {k}");
+            }
             bad.insert(k);
         }
         outlines.push(outline);
     }
     for (a, b) in conflicts(&strands) {
+        if std::env::var("DBG").is_ok() {
+            println!("conflict {a} {b}");
+        }
         // The border that is still the smoother of the two gives way.
         let least = borders[a].level.min(borders[b].level);
         bad.extend([a, b].into_iter().filter(|&k| borders[k].level == least));
@@ -325,9 +344,10 @@ fn strays(samples: &Samples, outline: &[[f64; 2]]) -> bool {
         length[length.len() - 1],
         samples.length[samples.length.len() - 1],
     );
-    if !(drawn.is_finite() && total > 0.0) {
+    if !drawn.is_finite() {
         return true;
     }
+    let total = total.max(1e-9);
     let reach = 6.0 + 0.1 * drawn;
     samples
         .points
