@@ -259,9 +259,9 @@ def judge(path, arguments):
         problems.append("no faces")
     if types.count(144) != len(faces):
         problems.append(f"{types.count(144)} entities 144 became {len(faces)} faces")
-    problems += fails + transfer_fails
-    if not arguments.allow_warnings:
-        problems += warnings + transfer_warnings
+    problems += fails + warnings + transfer_fails
+    if not arguments.allow_transfer_warnings:
+        problems += transfer_warnings
     for number, face in enumerate(report["faces"], 1):
         if not face["valid"]:
             problems.append(f"face {number} is not valid by BRepCheck")
@@ -307,7 +307,11 @@ def main():
     parser.add_argument("--max-free-edges", type=int, metavar="N")
     parser.add_argument("--sewing-mm", type=float, default=1e-3, help="tolerance for sewing")
     parser.add_argument("--spacing-mm", type=float, default=0.25, help="of the points on loops")
-    parser.add_argument("--allow-warnings", action="store_true")
+    parser.add_argument(
+        "--allow-transfer-warnings",
+        action="store_true",
+        help="such as those of surfaces whose patches meet without a common tangent",
+    )
     parser.add_argument("--no-points", action="store_true", help="leave out points on loops")
     arguments = parser.parse_args()
     silence()

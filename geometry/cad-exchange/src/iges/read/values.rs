@@ -58,10 +58,10 @@ pub(super) fn next_value(
             };
             return Ok((value, byte == delimiters.record));
         }
-        if matches!(byte, b'H' | b'h') {
-            if let Some(length) = hollerith_length(&word) {
-                return text(next, delimiters, length);
-            }
+        if matches!(byte, b'H' | b'h')
+            && let Some(length) = hollerith_length(&word)
+        {
+            return text(next, delimiters, length);
         }
         if word.is_empty() && byte.is_ascii_whitespace() {
             continue;

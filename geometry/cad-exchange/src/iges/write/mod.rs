@@ -11,23 +11,37 @@ mod colour;
 mod error;
 mod fields;
 mod options;
+mod rounding;
 mod shapes;
 mod sheet;
 
 use std::io;
 
+use nurbs::PiecewiseCubic;
 use reconstruct::{Face, Loop, Model, Surface};
 
 pub use error::{FaceDefect, WriteError};
 pub use options::{DEFAULT_PALETTE, Entities, WriteOptions};
 
 use colour::Colours;
-use shapes::{Joined, curve_status, plain_entry};
+use shapes::{Joined, SMOOTH_MM, curve_status, plain_entry};
 use sheet::{ColourField, Entry, Pointer, Sheet, Status};
 
 /// Preference of 142 for the curve in space. Neighbours share it, and readers that take
 /// one curve only (Autodesk Alias among them) take this one.
 const PREFER_SPACE_CURVE: usize = 2;
+
+/// Part of the resolution that curves may be off for the sake of smooth joints.
+const ROUNDING_PART: f64 = 0.5;
+
+/// How the entities of a face are written.
+#[derive(Debug, Clone, Copy)]
+struct Style {
+    entities: Entities,
+    level: u16,
+    /// Size of what kinks of curves are rounded by.
+    rounding_mm: f64,
+}
 
 /// What was written.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,7 +59,9 @@ pub struct Summary {
 
 /// Writes a model as an IGES 5.3 file of trimmed surfaces.
 ///
-/// The same model and options give the same bytes. Nothing is written unless the whole
+/// The same model and options give the same bytes. Curves are written as they are, but
+/// for slight kinks, which are rounded within half the resolution: readers would split
+/// the edge there. Nothing is written unless the whole
 /// model can be.
 ///
 /// # Errors
@@ -63,7 +79,12 @@ pub fn write(
     let colours = Colours::define(&mut sheet, model, options)?;
     for (index, face) in model.faces.iter().enumerate() {
         let colour = colours.of(face.region, options);
-        write_face(&mut sheet, options.entities, face, index + 1, colour)?;
+        let style = Style {
+            entities: options.entities,
+            level: face.region,
+            rounding_mm: resolution_mm * ROUNDING_PART,
+        };
+        write_face(&mut sheet, style, face, index + 1, colour)?;
     }
     let start = format!("{}: trimmed surfaces from a range scan", options.system);
     let global = global_fields(model, options, resolution_mm);
@@ -78,19 +99,19 @@ pub fn write(
 
 fn write_face(
     sheet: &mut Sheet,
-    entities: Entities,
+    style: Style,
     face: &Face,
     number: usize,
     colour: ColourField,
 ) -> Result<(), WriteError> {
-    let level = face.region;
+    let level = style.level;
     let Surface::Patches(patches) = &face.surface;
-    let surface = shapes::surface(sheet, entities, level, patches)?;
-    let outer = write_loop(sheet, entities, level, surface, &face.outer)?;
+    let surface = shapes::surface(sheet, style.entities, level, patches)?;
+    let outer = write_loop(sheet, style, surface, &face.outer)?;
     let inner = face
         .inner
         .iter()
-        .map(|border| write_loop(sheet, entities, level, surface, border))
+        .map(|border| write_loop(sheet, style, surface, border))
         .collect::<Result<Vec<_>, _>>()?;
 
     let mut name = sheet.begin(Entry {
@@ -127,43 +148,15 @@ fn write_face(
 /// Entity 142 and the curves below it.
 fn write_loop(
     sheet: &mut Sheet,
-    entities: Entities,
-    level: u16,
+    style: Style,
     surface: Pointer,
     border: &Loop,
 ) -> Result<Pointer, WriteError> {
-    let coedges = &border.coedges;
-    let closed = coedges.len() == 1;
-    let following = || coedges.iter().cycle().skip(1);
-    let flat = coedges
-        .iter()
-        .zip(following())
-        .map(|(coedge, next)| {
-            let end = next.parameter_curve.start();
-            let joined = Joined {
-                curve: &coedge.parameter_curve,
-                end,
-                closed,
-            };
-            shapes::curve(sheet, entities, level, &joined)
-        })
-        .collect::<Result<Vec<_>, _>>()?;
-    let flat = composite(sheet, level, curve_status(2), &flat)?;
-    let spatial = coedges
-        .iter()
-        .zip(following())
-        .map(|(coedge, next)| {
-            let end = next.space_curve.start();
-            let joined = Joined {
-                curve: &coedge.space_curve,
-                end,
-                closed,
-            };
-            shapes::curve(sheet, entities, level, &joined)
-        })
-        .collect::<Result<Vec<_>, _>>()?;
-    let spatial = composite(sheet, level, curve_status(3), &spatial)?;
-
+    let flat: Vec<_> = border.coedges.iter().map(|c| &c.parameter_curve).collect();
+    let spatial: Vec<_> = border.coedges.iter().map(|c| &c.space_curve).collect();
+    let flat = write_chain(sheet, style, &flat)?;
+    let spatial = write_chain(sheet, style, &spatial)?;
+    let level = style.level;
     let mut record = sheet.begin(plain_entry(142, level, Status::DependentInParameterPlane));
     // How the curve came about is left open.
     record.integer(0);
@@ -174,20 +167,28 @@ fn write_loop(
     record.finish()
 }
 
-/// Entity 102 over several curves; a single one needs none.
-fn composite(
+/// The curves of a closed loop, and entity 102 over them where there are several.
+fn write_chain<const D: usize>(
     sheet: &mut Sheet,
-    level: u16,
-    status: Status,
-    curves: &[Pointer],
+    style: Style,
+    curves: &[&PiecewiseCubic<D>],
 ) -> Result<Pointer, WriteError> {
-    if let &[single] = curves {
+    let mut pointers = Vec::with_capacity(curves.len());
+    for (curve, next) in curves.iter().zip(curves.iter().cycle().skip(1)) {
+        let joined = Joined {
+            curve: &rounding::without_kinks(curve, SMOOTH_MM, style.rounding_mm),
+            end: next.start(),
+            closed: curves.len() == 1,
+        };
+        pointers.push(shapes::curve(sheet, style.entities, style.level, &joined)?);
+    }
+    if let &[single] = pointers.as_slice() {
         return Ok(single);
     }
-    let mut record = sheet.begin(plain_entry(102, level, status));
-    record.integer(curves.len());
-    for &curve in curves {
-        record.pointer(curve);
+    let mut record = sheet.begin(plain_entry(102, style.level, curve_status(D)));
+    record.integer(pointers.len());
+    for pointer in pointers {
+        record.pointer(pointer);
     }
     record.finish()
 }

@@ -7,7 +7,7 @@ use super::options::Entities;
 use super::sheet::{ColourField, Entry, Pointer, Record, Sheet, Status};
 
 /// Joints whose derivatives differ by less than this, in millimetres, count as smooth.
-const SMOOTH_MM: f64 = 1e-9;
+pub(super) const SMOOTH_MM: f64 = 1e-9;
 
 /// Spline type "cubic" of 112 and boundary type of 114.
 const CUBIC: usize = 3;
