@@ -137,7 +137,7 @@ impl SimConfig {
             }
             Object::BuiltIn(name) => preset::object(name, material)
                 .ok_or_else(|| SimError::UnknownObject(name.clone()))?,
-            Object::Stl(path) => Scene::new(vec![Body::Mesh(read_stl(path)?)], material),
+            Object::Stl(path) => Scene::new(vec![Body::Mesh(Box::new(read_stl(path)?))], material),
         };
         if let Some(distance_mm) = self.back_plane_mm
             && !(0.0..=500.0).contains(&distance_mm)

@@ -1,5 +1,6 @@
 //! The simulated scanner as a program: makes a pseudo-terminal and serves until ended.
 
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -195,6 +196,13 @@ impl Cli {
     }
 }
 
+/// Prints a line. Whoever started the program may have stopped listening; that ends nothing.
+macro_rules! say {
+    ($($argument:tt)*) => {
+        let _ = writeln!(std::io::stdout(), $($argument)*);
+    };
+}
+
 fn run(cli: Cli) -> Result<(), String> {
     // Before the link is made, so that a signal never leaves it behind.
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])
@@ -206,26 +214,27 @@ fn run(cli: Cli) -> Result<(), String> {
         .serve_with(source.clone(), Some(&link))
         .map_err(|error| error.to_string())?;
     describe(&config, &source);
-    println!("port    {} -> {}", link.display(), server.port().display());
-    println!("serving until ended (Ctrl-C)");
+    say!("port    {} -> {}", link.display(), server.port().display());
+    say!("serving until ended (Ctrl-C)");
     signals.forever().next();
     drop(server);
-    println!("ended");
+    say!("ended");
     Ok(())
 }
 
 fn describe(config: &SimConfig, source: &Source) {
-    println!("object  {}", config.object);
-    println!(
+    say!("object  {}", config.object);
+    say!(
         "device  {}, serial {}",
-        config.device.model, config.device.serial
+        config.device.model,
+        config.device.serial
     );
     match source {
         Source::Simulated { .. } => {
-            println!("preset  {}, seed {}", config.preset.name(), config.seed);
+            say!("preset  {}, seed {}", config.preset.name(), config.seed);
         }
         Source::Replay(replay) => {
-            println!(
+            say!(
                 "points  {} in {} columns",
                 replay.points(),
                 replay.columns()
@@ -235,9 +244,10 @@ fn describe(config: &SimConfig, source: &Source) {
     let plan = source.proposed();
     let calibration = source.calibration();
     let pitch_mm = f64::from(plan.pitch_counts) * f64::from(calibration.table_count_pm) / 1e9;
-    println!(
+    say!(
         "plan    {} columns {pitch_mm:.3} mm apart, {} samples each",
-        plan.columns, plan.samples
+        plan.columns,
+        plan.samples
     );
 }
 

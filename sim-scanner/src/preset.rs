@@ -133,7 +133,7 @@ impl Preset {
             Self::Cyberware => Base {
                 standoff_mm: 750.0,
                 baseline_mm: (220.0, 0.0),
-                spot_radius_mm: 0.3,
+                spot_radius_mm: 0.5,
                 polar: false,
                 count_nm: 1_000,
                 fan_jitter: 0.05,
@@ -142,23 +142,24 @@ impl Preset {
                 noise: NoiseModel {
                     noise_mm: 0.05,
                     speckle_share: 0.5,
-                    tail_share: 0.07,
-                    tail_factor: 5.0,
-                    mixed: 0.6,
+                    tail_share: 0.06,
+                    tail_factor: 8.0,
+                    mixed: 0.8,
                     dropouts: 0.002,
                     incidence_max_rad: 1.3,
                     ..none
                 },
             },
             Self::Rf627 => Base {
-                standoff_mm: 200.0,
-                baseline_mm: (60.0, 0.0),
+                standoff_mm: 120.0,
+                baseline_mm: (40.0, 0.0),
                 spot_radius_mm: 0.05,
                 polar: false,
                 count_nm: 1_000,
                 fan_jitter: 0.04,
                 columns: Layout::PitchMm(0.2),
-                samples: Layout::PitchMm(0.147),
+                // At the reference depth; on a groove, most of which is nearer, 0.147 mm.
+                samples: Layout::PitchMm(0.155),
                 noise: NoiseModel {
                     noise_mm: 0.0195,
                     speckle_share: 0.83,
@@ -196,7 +197,7 @@ impl Preset {
             (high.y - low.y, "high", standoff_mm),
             (high.z - low.z, "deep", depth_mm * 2.0),
         ] {
-            if !(size_mm <= most_mm) {
+            if size_mm.is_nan() || size_mm > most_mm {
                 return Err(SetupError::Size {
                     size_mm,
                     along,

@@ -1,5 +1,7 @@
 //! The simulator on a real pseudo-terminal, with a host made of plain reads and writes.
 
+#![allow(clippy::panic)] // A test that panics has failed.
+
 use std::fs::{self, File, OpenOptions};
 use std::io::{Read, Write};
 use std::os::unix::fs::OpenOptionsExt;

@@ -190,12 +190,11 @@ struct Worker {
 }
 
 /// How often a closed port is looked at: a pseudo-terminal gives no sign of being opened.
-const CLOSED_LOOK: Duration = Duration::from_millis(5);
+const CLOSED_LOOK: Duration = Duration::from_millis(10);
 
 impl Worker {
     fn run(mut self) {
-        loop {
-            let Some(wait) = self.turn() else { break };
+        while let Some(wait) = self.turn() {
             if self.sleep(wait).is_err() {
                 break;
             }
@@ -264,9 +263,6 @@ impl Worker {
     }
 
     fn queue(&mut self, bytes: &[u8]) {
-        if bytes.is_empty() {
-            return;
-        }
         let carried = self.to_host.carry(bytes);
         self.pending.extend(carried);
         let stalls = [self.to_host.take_stall(), self.to_device.take_stall()];

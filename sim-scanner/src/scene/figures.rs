@@ -198,6 +198,9 @@ pub fn figure() -> Vec<Body> {
         ),
         ball(Vec3::new(-18.0, -66.0, 34.0), 10.0),
         ball(Vec3::new(47.0, -52.0, -4.0), 12.0),
+        // A hump, and the tip of a drooping ear before it: seen from below, y runs backwards.
+        ball(Vec3::new(6.0, 44.0, -34.0), 24.0),
+        ball(Vec3::new(6.0, 57.0, 12.0), 6.0),
     ]
 }
 

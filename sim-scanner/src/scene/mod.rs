@@ -38,7 +38,7 @@ pub enum Body {
     /// A convex solid with closed-form intersections.
     Solid(ConvexSolid),
     /// A triangle mesh.
-    Mesh(Mesh),
+    Mesh(Box<Mesh>),
 }
 
 /// Names a face of a scene: the body's index and the face's within the body.
