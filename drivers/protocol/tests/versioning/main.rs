@@ -1,0 +1,3 @@
+//! The bytes of every message, version by version.
+
+mod v1;
