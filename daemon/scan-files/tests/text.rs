@@ -189,3 +189,18 @@ fn errors_name_file_place_and_cause() {
         Err(ScanFileError::TooManyPoints { limit: 2, .. })
     ));
 }
+
+#[test]
+fn no_damage_to_a_file_panics() {
+    let text = "X;Y;Z\n1,5;2,0;3,1\n# c\n2.5 1 7 9\n3,4,5\n-1e3;0;2\n";
+    for end in 0..text.len() {
+        let _ = read_text(&text[..end]);
+    }
+    for at in 0..text.len() {
+        for damage in 1..=255 {
+            let mut bytes = text.as_bytes().to_vec();
+            bytes[at] ^= damage;
+            let _ = read_from(&bytes[..], "t", &ReadOptions::default());
+        }
+    }
+}

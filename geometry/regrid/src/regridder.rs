@@ -113,8 +113,8 @@ impl Regridder {
         self.advance(true)
     }
 
-    /// Number of columns kept for nodes to come: what memory depends on. Bounded by twice
-    /// the reach and two, however long the scan.
+    /// Number of columns kept for nodes to come: what memory depends on. At most twice the
+    /// reach and one, however long the scan.
     #[must_use]
     pub fn retained_columns(&self) -> usize {
         self.strips.len()

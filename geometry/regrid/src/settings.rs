@@ -69,7 +69,7 @@ pub struct SupportSettings {
     /// Default 0.5.
     pub inlier_floor: f64,
     /// A plane whose 2.5 robust standard deviations exceed this many spacings describes no
-    /// surface, only stray samples. Default 4.
+    /// surface, only stray samples. Default 6.
     pub inlier_ceiling: f64,
 }
 
@@ -81,7 +81,7 @@ impl Default for SupportSettings {
             step_margin: 0.6,
             least_samples: 3,
             inlier_floor: 0.5,
-            inlier_ceiling: 4.0,
+            inlier_ceiling: 6.0,
         }
     }
 }
@@ -92,9 +92,13 @@ pub struct RegridSettings {
     /// Distance of grid nodes in x and y, millimetres. No default: it depends on the scan.
     pub pitch_mm: f64,
     /// M: samples in a node's window. At most half of them come from one column, so that
-    /// columns far apart with dense samples still span a plane. Default 32.
+    /// columns far apart with dense samples still span a plane. Default 32: with noise of
+    /// 0.05 mm on samples 0.4 mm apart it leaves 0.022 mm at the nodes of a sphere of 90 mm
+    /// radius with 5 % outliers (16: 0.028 mm, 48: 0.021 mm, at half again the time).
     pub neighbours: usize,
-    /// N_s: planes tried at a node ([`Estimator::LeastMedian`]). Default 32.
+    /// N_s: planes tried at a node ([`Estimator::LeastMedian`]). Default 32: on the same
+    /// sphere twice as many gain 0.0006 mm, half as many lose 0.0014 mm and now and then
+    /// miss a step edge.
     pub draws: usize,
     /// Columns on either side of a node that its window may reach into; bounds memory and
     /// the delay until a node is finished. In y the window reaches as far as that many

@@ -76,8 +76,9 @@ fn solve(mut m: [[f64; 4]; 3]) -> [f64; 3] {
         for row in 0..3 {
             if row != k {
                 let factor = m[row][k] / m[k][k];
-                for column in k..4 {
-                    m[row][column] -= factor * m[k][column];
+                let pivot = m[k];
+                for (value, above) in m[row].iter_mut().zip(pivot) {
+                    *value -= factor * above;
                 }
             }
         }
