@@ -55,8 +55,15 @@ pub(super) struct Worker {
     /// Who waits for the identity.
     identify: Vec<Reply>,
     identity: Option<Box<Identity>>,
-    stream: Option<(ScanNumber, SyncSender<StreamItem>)>,
+    stream: Option<Stream>,
     next_scan: u64,
+}
+
+/// The reader of a scan.
+struct Stream {
+    number: ScanNumber,
+    /// `None` once the end has been sent; acknowledgements still come after it.
+    items: Option<SyncSender<StreamItem>>,
 }
 
 /// An open transport and the session over it.
@@ -183,7 +190,7 @@ impl Worker {
     fn is_current(&self, number: ScanNumber) -> bool {
         self.stream
             .as_ref()
-            .is_some_and(|(current, _)| *current == number)
+            .is_some_and(|stream| stream.number == number)
     }
 
     /// Somebody waits: tries to connect now, unless it has only just been tried.
@@ -278,22 +285,35 @@ impl Worker {
             .remove(&ticket)
             .is_some_and(|reply| reply.send(Ok(Outcome::Scan(info, number, items))).is_ok());
         if taken {
-            self.stream = Some((number, sender));
+            self.stream = Some(Stream {
+                number,
+                items: Some(sender),
+            });
         } else if let Some(line) = &mut self.line {
             line.session.close_scan();
         }
     }
 
     fn stream_item(&mut self, item: StreamItem) {
-        let Some((_, sender)) = &self.stream else {
+        let Some(stream) = &mut self.stream else {
             return;
         };
-        if let Err(TrySendError::Full(_)) = sender.try_send(item) {
-            // Only possible if columns are acknowledged before they are taken.
-            tracing::error!("columns were acknowledged before they were taken; scan closed");
-            self.stream = None;
-            if let Some(line) = &mut self.line {
-                line.session.close_scan();
+        let last = matches!(item, StreamItem::End(_));
+        let Some(items) = stream.items.take() else {
+            return;
+        };
+        match items.try_send(item) {
+            Ok(()) if !last => stream.items = Some(items),
+            Ok(()) => {}
+            // The reader has gone; its closing of the scan is on the way.
+            Err(TrySendError::Disconnected(_)) => {}
+            Err(TrySendError::Full(_)) => {
+                // Only possible if columns are acknowledged before they are taken.
+                tracing::error!("columns were acknowledged before they were taken; scan closed");
+                self.stream = None;
+                if let Some(line) = &mut self.line {
+                    line.session.close_scan();
+                }
             }
         }
     }

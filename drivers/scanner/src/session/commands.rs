@@ -16,6 +16,15 @@ impl Session {
     /// Has a command carried out. Its outcome comes as [`super::Event::Finished`] with the
     /// ticket. Commands given before the device is ready wait, except for an abort.
     pub fn command(&mut self, ticket: Ticket, command: Command, now: Duration) {
+        let begins = matches!(
+            command,
+            Command::Home | Command::Move(_) | Command::Laser(true) | Command::Scan(_)
+        );
+        if begins && self.scan_over {
+            // Every column of the last scan is here, though not all are acknowledged. The
+            // device may not have noticed its end yet, and would call itself busy.
+            self.close_scan();
+        }
         match (self.phase, command) {
             (Phase::Dead, _) => self.finish(ticket, Err(ScannerError::Closed)),
             (_, Command::Abort) => self.abort(Some(ticket)),
@@ -81,13 +90,15 @@ impl Session {
     }
 
     fn start_scan(&mut self, ticket: Ticket, plan: ScanPlan) {
-        if self.scan.is_some() && !self.scan_over || self.requests.has_scan() {
+        if self.scan.is_some() || self.requests.has_scan() {
             return self.finish(ticket, Err(ScannerError::ScanRunning));
         }
-        // The columns of the last scan are all here, though not all acknowledged.
-        self.close_scan();
         self.next_scan_id = self.next_scan_id.wrapping_add(1);
         let scan_id = self.next_scan_id;
+        self.ask_for_scan(ticket, scan_id, plan);
+    }
+
+    fn ask_for_scan(&mut self, ticket: Ticket, scan_id: u16, plan: ScanPlan) {
         let credits = self.flow(&plan).credits;
         self.requests.push(
             &Scan {
@@ -97,6 +108,16 @@ impl Session {
             },
             Purpose::Scan(ticket, scan_id, plan),
         );
+    }
+
+    /// Makes a refused request again, now that the faults are cleared.
+    pub(super) fn ask_again(&mut self, refused: Purpose) {
+        match refused {
+            Purpose::Home(_) => self.requests.push(&Home {}, refused),
+            Purpose::Move(_, table_counts) => self.requests.push(&Move { table_counts }, refused),
+            Purpose::Scan(ticket, scan_id, plan) => self.ask_for_scan(ticket, scan_id, plan),
+            other => self.fail(&other, ScannerError::Closed),
+        }
     }
 
     /// The bounds of a scan's flow: the stricter of the settings' and the device's.

@@ -45,6 +45,8 @@ pub struct Session {
     calibration: Option<Calibration>,
     identity: Option<Identity>,
     motion: Option<Motion>,
+    /// The command for whose sake faults were cleared last.
+    recovered: Option<Ticket>,
     scan: Option<ScanTracker>,
     /// All columns of `scan` have been handed on; it is kept until they are acknowledged.
     scan_over: bool,
@@ -96,6 +98,7 @@ impl Session {
             calibration: None,
             identity: None,
             motion: None,
+            recovered: None,
             scan: None,
             scan_over: false,
             next_scan_id: 0,

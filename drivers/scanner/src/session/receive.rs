@@ -81,18 +81,7 @@ impl Session {
                 }
             }
             DeviceMessage::LaserSet(_) => self.done(tag, SetLaser::KIND),
-            DeviceMessage::FaultsCleared(reply) => {
-                if let Some(Purpose::ClearFaults(ticket)) =
-                    self.requests.answered(tag, ClearFaults::KIND)
-                {
-                    let result = if reply.remaining.is_empty() {
-                        Ok(Answer::Done)
-                    } else {
-                        Err(ScannerError::Fault(reply.remaining))
-                    };
-                    self.finish(ticket, result);
-                }
-            }
+            DeviceMessage::FaultsCleared(reply) => self.on_faults_cleared(reply.remaining, tag),
             DeviceMessage::ScanClosed(_) => self.done(tag, CloseScan::KIND),
             DeviceMessage::Aborted(_) => self.done(tag, Abort::KIND),
             DeviceMessage::ScanAccepted(reply) => self.on_accepted(&reply, tag, now),
@@ -155,6 +144,22 @@ impl Session {
         self.finish(ticket, Ok(Answer::Scan(info)));
     }
 
+    fn on_faults_cleared(&mut self, remaining: Faults, tag: u16) {
+        let left = if remaining.is_empty() {
+            Ok(Answer::Done)
+        } else {
+            Err(ScannerError::Fault(remaining))
+        };
+        match self.requests.answered(tag, ClearFaults::KIND) {
+            Some(Purpose::ClearFaults(ticket)) => self.finish(ticket, left),
+            Some(Purpose::Recover(refused)) => match left {
+                Ok(_) => self.ask_again(*refused),
+                Err(error) => self.fail(&refused, error),
+            },
+            _ => {}
+        }
+    }
+
     fn on_rejected(&mut self, reply: &Rejected, tag: u16, now: Duration) {
         let Some(purpose) = self.requests.answered(tag, reply.request) else {
             return;
@@ -167,6 +172,17 @@ impl Session {
         if reply.reason == RejectReason::NoSession {
             self.fail(&purpose, restarted("it knows of no session"));
             return self.restart("it knows of no session", now);
+        }
+        // A fault may be over and only its bit still set; whoever starts something new has
+        // seen to it. Tried once, so that a device that contradicts itself ends it.
+        if reply.reason == RejectReason::Faulted
+            && purpose.starts_motion()
+            && self.recovered != purpose.ticket()
+        {
+            self.recovered = purpose.ticket();
+            self.requests
+                .push(&ClearFaults {}, Purpose::Recover(Box::new(purpose)));
+            return;
         }
         let error = ScannerError::Refused {
             command: purpose.verb(),

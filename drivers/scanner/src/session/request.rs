@@ -20,6 +20,8 @@ pub(super) enum Purpose {
     Move(Ticket, i32),
     Laser(Ticket),
     ClearFaults(Ticket),
+    /// Clearing faults, to try again what was refused for them.
+    Recover(Box<Purpose>),
     Scan(Ticket, u16, ScanPlan),
     CloseScan,
     Abort(Option<Ticket>),
@@ -35,7 +37,7 @@ impl Purpose {
             Self::Home(_) => "home the table",
             Self::Move(..) => "move the table",
             Self::Laser(_) => "switch the laser",
-            Self::ClearFaults(_) => "clear its faults",
+            Self::ClearFaults(_) | Self::Recover(_) => "clear its faults",
             Self::Scan(..) => "scan",
             Self::CloseScan => "close the scan",
             Self::Abort(_) => "abort",
@@ -51,7 +53,7 @@ impl Purpose {
             Self::Home(_) => "answer to the homing command",
             Self::Move(..) => "answer to the move command",
             Self::Laser(_) => "answer to the laser command",
-            Self::ClearFaults(_) => "answer to the clearing of faults",
+            Self::ClearFaults(_) | Self::Recover(_) => "answer to the clearing of faults",
             Self::Scan(..) => "answer to the scan command",
             Self::CloseScan => "answer to the closing of the scan",
             Self::Abort(_) => "answer to the abort command",
@@ -68,8 +70,14 @@ impl Purpose {
             | Self::ClearFaults(ticket)
             | Self::Scan(ticket, ..) => Some(*ticket),
             Self::Abort(ticket) => *ticket,
+            Self::Recover(refused) => refused.ticket(),
             _ => None,
         }
+    }
+
+    /// Whether it begins something in which the table moves.
+    pub(super) fn starts_motion(&self) -> bool {
+        matches!(self, Self::Home(_) | Self::Move(..) | Self::Scan(..))
     }
 
     /// Whether it belongs to opening the session.
@@ -140,7 +148,10 @@ impl Requests {
         self.open
             .iter()
             .chain(&self.queue)
-            .any(|open| matches!(open.purpose, Purpose::Scan(..)))
+            .any(|open| match &open.purpose {
+                Purpose::Recover(refused) => matches!(**refused, Purpose::Scan(..)),
+                purpose => matches!(purpose, Purpose::Scan(..)),
+            })
     }
 
     pub(super) fn retries(&self) -> u64 {

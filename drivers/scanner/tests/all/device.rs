@@ -13,6 +13,8 @@ pub(crate) struct Device {
     pub(crate) version: u8,
     pub(crate) homed: bool,
     pub(crate) faults: Faults,
+    /// Faults whose cause is there still.
+    pub(crate) lasting: Faults,
     pub(crate) laser_on: bool,
     pub(crate) activity: Activity,
     pub(crate) table_counts: i32,
@@ -81,6 +83,7 @@ impl Device {
             version: MAX_VERSION,
             homed: false,
             faults: Faults::NONE,
+            lasting: Faults::NONE,
             laser_on: false,
             activity: Activity::Idle,
             table_counts: 0,
@@ -246,6 +249,10 @@ impl Device {
             ),
             HostMessage::GetLimits(_) => Frame::new(tag, &self.limits()),
             HostMessage::Heartbeat(_) => Frame::new(tag, &self.status(now)),
+            HostMessage::Home(_) | HostMessage::Scan(_) if !self.faults.is_empty() => {
+                reject(RejectReason::Faulted, self.faults.0)
+            }
+            HostMessage::Home(_) if self.is_measuring() => reject(RejectReason::Busy, 0),
             HostMessage::Home(_) => {
                 self.homings += 1;
                 self.homed = false;
@@ -262,7 +269,7 @@ impl Device {
                 Frame::new(tag, &LaserSet { on: set.on })
             }
             HostMessage::ClearFaults(_) => {
-                self.faults = Faults::NONE;
+                self.faults = self.lasting;
                 self.activity = Activity::Idle;
                 Frame::new(
                     tag,

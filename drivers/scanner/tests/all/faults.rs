@@ -208,3 +208,31 @@ fn losing_the_line_ends_the_stream() {
     bench.run_for(Duration::from_secs(5));
     assert!(!bench.device.laser_on, "the dead-man time has passed");
 }
+
+#[test]
+fn a_fault_that_is_over_does_not_keep_the_next_scan_from_starting() {
+    let mut bench = amid_a_scan();
+    let now = bench.now;
+    bench.device.strike(Faults::INTERLOCK, now);
+    assert_eq!(end_of(&mut bench), ScannerError::Fault(Faults::INTERLOCK));
+    // The door is closed again; the bit is still set.
+    bench.columns.clear();
+    assert_eq!(bench.scan(10), Ok(()));
+    bench.assert_columns(10);
+    assert_eq!(bench.run(Command::Home), Ok(Answer::Done));
+}
+
+#[test]
+fn a_fault_that_lasts_is_told() {
+    let mut bench = amid_a_scan();
+    let now = bench.now;
+    bench.device.lasting = Faults::INTERLOCK;
+    bench.device.strike(Faults::INTERLOCK, now);
+    assert_eq!(end_of(&mut bench), ScannerError::Fault(Faults::INTERLOCK));
+    assert_eq!(bench.scan(10), Err(ScannerError::Fault(Faults::INTERLOCK)));
+    assert_eq!(
+        bench.run(Command::Home),
+        Err(ScannerError::Fault(Faults::INTERLOCK))
+    );
+    assert_eq!(bench.device.scans, 1);
+}
