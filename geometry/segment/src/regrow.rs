@@ -2,9 +2,12 @@
 
 use crate::components::{Border, depths};
 use crate::local_fit::{LocalFit, Sums};
-use crate::scene::{FIT_REACH, NONE, Scene};
+use crate::scene::{NONE, Scene};
 use range_image::{Cancelled, Monitor};
 
+/// Half the side of the window of the fits, pitches. Wide, since where two surfaces meet at a
+/// small angle their intersection wanders with every error of theirs.
+const REACH: usize = 8;
 /// So many links away from labelled nodes, surfaces are carried on before they are fitted anew.
 const LAYERS: u8 = 4;
 /// Width of the band on either side of a border that is decided anew, nodes.
@@ -60,7 +63,7 @@ pub(crate) fn regrow(
         let mut rankings = vec![[NONE; RIVALS]; open.len()];
         let mut sums = Vec::new();
         for (ranking, &node) in rankings.iter_mut().zip(&open) {
-            scene.sums_around(labels, node, FIT_REACH, |_| true, &mut sums);
+            scene.sums_around(labels, node, REACH, |_| true, &mut sums);
             *ranking = rank(scene, &sums);
         }
         if !settle(scene, labels, &open, &rankings) {
