@@ -1,5 +1,7 @@
 //! Files from other programs: points are read, everything else is refused with a reason.
 
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 use cad_exchange::iges::{self, ReadError};
 
 /// A file of some entities: type, form, status, matrix pointer, parameters.

@@ -1,6 +1,9 @@
 //! Damaged files end in an error or in numbers, never in a panic.
 
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 #[path = "../examples/sample/mod.rs"]
+#[allow(dead_code)]
 mod sample;
 
 use cad_exchange::iges::{self, Entities, ReadError, WriteOptions};

@@ -1,6 +1,9 @@
 //! The text of written files: columns, counts, pointers, and one file to the letter.
 
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 #[path = "../examples/sample/mod.rs"]
+#[allow(dead_code)]
 mod sample;
 
 use cad_exchange::iges::{self, Entities, Summary, WriteOptions};

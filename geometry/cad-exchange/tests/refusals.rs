@@ -1,6 +1,9 @@
 //! Models that break a promise give an error that says which, and no file.
 
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 #[path = "../examples/sample/mod.rs"]
+#[allow(dead_code)]
 mod sample;
 
 use cad_exchange::iges::{self, FaceDefect, WriteError, WriteOptions};

@@ -1,6 +1,9 @@
 //! What is written is read back.
 
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 #[path = "../examples/sample/mod.rs"]
+#[allow(dead_code)]
 mod sample;
 
 use cad_exchange::iges::{

@@ -31,6 +31,9 @@ use sheet::{ColourField, Entry, Pointer, Sheet, Status};
 /// one curve only (Autodesk Alias among them) take this one.
 const PREFER_SPACE_CURVE: usize = 2;
 
+/// Width of lines on paper; the standard wants one above 0.
+const LINE_WIDTH_MM: f64 = 0.1;
+
 /// Part of the resolution that curves may be off for the sake of smooth joints.
 const ROUNDING_PART: f64 = 0.5;
 
@@ -39,8 +42,8 @@ const ROUNDING_PART: f64 = 0.5;
 struct Style {
     entities: Entities,
     level: u16,
-    /// Size of what kinks of curves are rounded by.
-    rounding_mm: f64,
+    /// The resolution in the global section.
+    resolution_mm: f64,
 }
 
 /// What was written.
@@ -82,7 +85,7 @@ pub fn write(
         let style = Style {
             entities: options.entities,
             level: face.region,
-            rounding_mm: resolution_mm * ROUNDING_PART,
+            resolution_mm,
         };
         write_face(&mut sheet, style, face, index + 1, colour)?;
     }
@@ -173,12 +176,14 @@ fn write_chain<const D: usize>(
     style: Style,
     curves: &[&PiecewiseCubic<D>],
 ) -> Result<Pointer, WriteError> {
+    let rounding_mm = style.resolution_mm * ROUNDING_PART;
     let mut pointers = Vec::with_capacity(curves.len());
     for (curve, next) in curves.iter().zip(curves.iter().cycle().skip(1)) {
         let joined = Joined {
-            curve: &rounding::without_kinks(curve, SMOOTH_MM, style.rounding_mm),
+            curve: &rounding::without_kinks(curve, SMOOTH_MM, rounding_mm),
             end: next.start(),
             closed: curves.len() == 1,
+            flat_mm: style.resolution_mm,
         };
         pointers.push(shapes::curve(sheet, style.entities, style.level, &joined)?);
     }
@@ -227,9 +232,9 @@ fn global_fields(model: &Model, options: &WriteOptions, resolution_mm: f64) -> V
         real(1.0),
         "2".to_owned(),
         text("MM"),
-        // One line weight, of no width.
+        // One line weight, the thinnest and the widest at once.
         "1".to_owned(),
-        real(0.0),
+        real(LINE_WIDTH_MM),
         text(&options.timestamp),
         real(resolution_mm),
         real(largest_coordinate(model)),

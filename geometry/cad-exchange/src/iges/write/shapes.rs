@@ -9,6 +9,10 @@ use super::sheet::{ColourField, Entry, Pointer, Record, Sheet, Status};
 /// Joints whose derivatives differ by less than this, in millimetres, count as smooth.
 pub(super) const SMOOTH_MM: f64 = 1e-9;
 
+/// The same for what 112 claims of its joints; readers that check allow for no more than
+/// rounding.
+const SURE_MM: f64 = 1e-14;
+
 /// Spline type "cubic" of 112 and boundary type of 114.
 const CUBIC: usize = 3;
 
@@ -22,6 +26,8 @@ pub(super) struct Joined<'a, const D: usize> {
     pub(super) end: [f64; D],
     /// The curve is a loop by itself.
     pub(super) closed: bool,
+    /// How far points may lie off a common plane.
+    pub(super) flat_mm: f64,
 }
 
 /// A surface that others depend on.
@@ -169,7 +175,7 @@ fn parametric_curve<const D: usize>(
     let Joined { curve, end, .. } = joined;
     let mut record = sheet.begin(plain_entry(112, level, curve_status(D)));
     record.integer(CUBIC);
-    record.integer(continuity(curve.to_bspline(SMOOTH_MM).knots()));
+    record.integer(continuity(curve.to_bspline(SURE_MM).knots()));
     record.integer(D);
     record.integer(curve.pieces.len());
     record.reals(&curve.breaks);
@@ -219,11 +225,11 @@ fn bspline_curve<const D: usize>(
     let spline: BSplineCurve<D> = joined.curve.to_bspline(SMOOTH_MM);
     let knots = spline.knots();
     let count = knots.control_count();
-    let planar = D == 2;
+    let normal = plane_normal(spline.points(), joined.flat_mm);
     let mut record = sheet.begin(plain_entry(126, level, curve_status(D)));
     record.integer(count - 1);
     record.integer(knots.degree());
-    record.integer(usize::from(planar));
+    record.integer(usize::from(normal.is_some()));
     record.integer(usize::from(joined.closed));
     // Polynomial, not periodic.
     record.integer(1);
@@ -246,6 +252,76 @@ fn bspline_curve<const D: usize>(
     let (first, last) = knots.domain();
     record.reals(&[first, last]);
     // Normal of the plane, zero where there is none.
-    record.reals(&[0.0, 0.0, if planar { 1.0 } else { 0.0 }]);
+    record.reals(&normal.unwrap_or_default());
     record.finish()
+}
+
+/// Unit normal of the one plane that holds the points; `None` where there is none, or
+/// where they lie on a line in space and so in many.
+fn plane_normal<const D: usize>(points: &[[f64; D]], tolerance_mm: f64) -> Option<[f64; 3]> {
+    if D == 2 {
+        return Some([0.0, 0.0, 1.0]);
+    }
+    let origin = points.first()?;
+    let arms: Vec<[f64; 3]> = points
+        .iter()
+        .map(|p| core::array::from_fn(|d| if d < D { p[d] - origin[d] } else { 0.0 }))
+        .collect();
+    let longest = |vectors: &[[f64; 3]]| {
+        vectors
+            .iter()
+            .copied()
+            .max_by(|a, b| dot(a, a).total_cmp(&dot(b, b)))
+    };
+    let arm = longest(&arms)?;
+    let crosses: Vec<[f64; 3]> = arms.iter().map(|other| cross(&arm, other)).collect();
+    let normal = longest(&crosses)?;
+    let length = dot(&normal, &normal).sqrt();
+    if length <= tolerance_mm * dot(&arm, &arm).sqrt() {
+        return None;
+    }
+    let normal = normal.map(|n| n / length);
+    arms.iter()
+        .all(|arm| dot(&normal, arm).abs() <= tolerance_mm)
+        .then_some(normal)
+}
+
+fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn planes() {
+        let tilted = [
+            [0.0, 0.0, 1.0],
+            [4.0, 0.0, 4.0],
+            [4.0, 2.0, 4.0],
+            [0.0, 2.0, 1.0],
+        ];
+        let [x, y, z] = plane_normal(&tilted, 1e-9).unwrap();
+        assert!((x.abs() - 0.6).abs() < 1e-12 && y.abs() < 1e-12 && (z.abs() - 0.8).abs() < 1e-12);
+        let mut bent = tilted;
+        bent[2][2] += 0.1;
+        assert_eq!(plane_normal(&bent, 1e-3), None);
+        assert!(plane_normal(&bent, 0.2).is_some());
+        let line = [[0.0; 3], [1.0, 2.0, 3.0], [2.0, 4.0, 6.0]];
+        assert_eq!(plane_normal(&line, 1e-9), None);
+        assert_eq!(
+            plane_normal(&[[1.0, 2.0], [3.0, 4.0]], 1e-9),
+            Some([0.0, 0.0, 1.0])
+        );
+        assert_eq!(plane_normal::<3>(&[], 1e-9), None);
+    }
 }
