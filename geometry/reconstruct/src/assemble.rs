@@ -7,6 +7,7 @@ use crate::border::map::PlanarMap;
 use crate::fit::Domain;
 use crate::lift::lift;
 use crate::model::{Coedge, Edge, EdgeId, EdgeKind, Face, Loop, Model, Surface, Vertex, VertexId};
+use crate::polygon::{dot, minus, norm};
 
 /// Places along an edge at which its two surfaces are compared.
 const PROBES: usize = 15;
@@ -14,6 +15,12 @@ const PROBES: usize = 15;
 /// Surfaces that differ by less than this many standard deviations of their residuals
 /// may be continuous.
 const STEP_SIGMAS: f64 = 4.0;
+
+/// Distance inside its face at which a surface is compared, pitches.
+const INSIDE: f64 = 1.5;
+
+/// Difference of slopes granted to surfaces that seem to have none.
+const LEAST_BEND: f64 = 0.1;
 
 /// Margin of a surface around its face, pitches.
 const MARGIN: f64 = 1.0;
@@ -173,25 +180,36 @@ pub(crate) fn model(map: &PlanarMap, carriers: Vec<Carrier>, placement: Placemen
 }
 
 /// A step where the two surfaces part by more than their residuals explain, and more
-/// than a border off by a pitch would make of their different slopes.
+/// than a border off by a pitch would make of their different slopes. Each surface is
+/// judged a little inside its own face, where its data are, and carried on from there.
 fn kind_between(a: &Carrier, b: &Carrier, path: &PiecewiseCubic<2>, pitch_mm: f64) -> EdgeKind {
-    let noise = STEP_SIGMAS * (a.rms_mm * a.rms_mm + b.rms_mm * b.rms_mm).sqrt();
     let (first, last) = path.domain();
-    let mut apart = 0;
+    let (mut gaps, mut bends) = (Vec::new(), Vec::new());
     for k in 0..PROBES {
         let t = first + (last - first) * (k as f64 + 0.5) / PROBES as f64;
-        let [x, y] = path.evaluate(t);
-        let gap = (a.surface.z(x, y) - b.surface.z(x, y)).abs();
-        let slopes = [(1, 0), (0, 1)]
-            .map(|(u, v)| a.surface.z_partial(x, y, u, v) - b.surface.z_partial(x, y, u, v));
-        let slope = (slopes[0] * slopes[0] + slopes[1] * slopes[1]).sqrt();
-        if gap > noise + pitch_mm * slope + 1e-9 {
-            apart += 1;
-        }
+        let (at, along) = (path.evaluate(t), path.derivative(t, 1));
+        let length = norm(along).max(1e-9);
+        let inward = INSIDE * pitch_mm / length;
+        let step = [-along[1] * inward, along[0] * inward];
+        let seen = |surface: &PatchSurface, side: f64| {
+            let (x, y) = (at[0] + side * step[0], at[1] + side * step[1]);
+            let slope = [surface.z_partial(x, y, 1, 0), surface.z_partial(x, y, 0, 1)];
+            (surface.z(x, y) - side * dot(slope, step), slope)
+        };
+        let ((z_left, left), (z_right, right)) = (seen(&a.surface, 1.0), seen(&b.surface, -1.0));
+        gaps.push(z_left - z_right);
+        bends.push(norm(minus(left, right)));
     }
-    if 2 * apart > PROBES {
+    let noise = STEP_SIGMAS * (a.rms_mm * a.rms_mm + b.rms_mm * b.rms_mm).sqrt();
+    let explained = noise + pitch_mm * (median(&mut bends) + LEAST_BEND);
+    if median(&mut gaps).abs() > explained {
         EdgeKind::Step
     } else {
         EdgeKind::Crease
     }
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -54,7 +54,7 @@ impl Default for ReconstructSettings {
             patch_third_nodes: 2,
             corner_angle_rad: 0.35,
             piece_price_pitch2: 7.0,
-            border_bound_pitches: 1.0,
+            border_bound_pitches: 0.6,
             min_piece_nodes: 12,
             min_hole_nodes: 5,
         }

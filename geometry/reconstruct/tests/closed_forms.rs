@@ -59,7 +59,7 @@ fn the_house_keeps_its_corners_outlines_and_areas() {
         for (k, noise_mm) in [(0, 0.0), (1, 0.05), (2, 0.05), (3, 0.05), (4, 0.05)] {
             let parts = house(0.13 * f64::from(k));
             let pitch = 0.45;
-            let (image, map) = scene(&parts, pitch, (240, 256), noise_mm);
+            let (image, map) = scene(&parts, pitch, (264, 256), noise_mm);
             let done = run(&image, &map, method);
             assert_eq!(done.model.faces.len(), 4);
             let (found, truth) = (done.model.vertices.len(), corners(&parts));
@@ -68,7 +68,7 @@ fn the_house_keeps_its_corners_outlines_and_areas() {
                 done.metrics
             );
             assert!(found >= truth && found <= truth + 4, "{found} of {truth}");
-            println!("  {:?}", done.warnings);
+            assert!(done.warnings.is_empty(), "{:?}", done.warnings);
             for face in &done.model.faces {
                 let part = part_of(face, &parts, &image, &map);
                 let drawn = outline(face);
@@ -79,12 +79,13 @@ fn the_house_keeps_its_corners_outlines_and_areas() {
                     off / pitch,
                     area / true_area
                 );
-                if method == Method::Relief {
-                    assert!(off < 0.8 * pitch, "{} {}", face.name, off / pitch);
+                let (limit, share) = if method == Method::Relief {
+                    (0.6, 0.01)
                 } else {
-                    assert!(off < 1.5 * pitch, "{} {}", face.name, off / pitch);
-                }
-                assert!((area / true_area - 1.0).abs() < 0.01);
+                    (1.2, 0.015)
+                };
+                assert!(off < limit * pitch, "{} {}", face.name, off / pitch);
+                assert!((area / true_area - 1.0).abs() < share);
             }
             let creases = done
                 .model

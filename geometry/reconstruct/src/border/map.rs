@@ -18,7 +18,7 @@ pub(crate) struct BorderSettings {
     pub(crate) literal: bool,
     /// Cosine of the least turn that makes a vertex.
     pub(crate) corner_cosine: f64,
-    /// Price of a straight piece in square pitches; a curved one costs 11 to 7 as much.
+    /// Price of a straight piece in square pitches; a curved one costs more.
     pub(crate) piece_price: f64,
     /// How far a cubic may leave its border before it is divided, pitches (literal only).
     pub(crate) bound: f64,
@@ -50,6 +50,10 @@ pub(crate) struct PlanarMap {
 const SMOOTH: usize = 0;
 const CLOSE: usize = 1;
 const TRACED: usize = 2;
+
+/// Price of a curved piece against that of a straight one: dear enough that the three
+/// sides of a small notch stay sides, cheap enough that a small hole stays round.
+const CUBIC_PRICE: f64 = 16.0 / 7.0;
 
 /// Factor of the price of pieces at level [`CLOSE`].
 const CLOSE_PRICE: f64 = 0.2;
@@ -96,26 +100,13 @@ pub(crate) fn build(
         .collect();
     loop {
         monitor.check()?;
-        let junctions = place_junctions(cracks, &borders, settings);
+        let junctions = place_junctions(cracks, &borders);
         let drawn: Vec<Option<Vec<PiecewiseCubic<2>>>> = borders
             .iter()
             .map(|b| b.draw(&junctions, settings))
             .collect();
         let bad = faults(cracks, &borders, &drawn, &junctions);
         let mut raised = false;
-        if std::env::var("DBG").is_ok() {
-            println!(
-                "bad {:?}",
-                bad.iter()
-                    .map(|&k| (
-                        k,
-                        borders[k].level,
-                        borders[k].samples.points.len(),
-                        borders[k].segments.len()
-                    ))
-                    .collect::<Vec<_>>()
-            );
-        }
         for k in bad {
             if borders[k].level < TRACED {
                 borders[k].level = if settings.literal {
@@ -142,7 +133,7 @@ impl Border<'_> {
         };
         let price = Price {
             line: factor,
-            cubic: factor * 11.0 / 7.0,
+            cubic: factor * CUBIC_PRICE,
         };
         self.segments = self.samples.divide(price);
     }
@@ -168,27 +159,25 @@ impl Border<'_> {
         if !settings.literal {
             return Some(stretches);
         }
-        // The corners found stay vertices, at the samples nearest to them.
+        // Between the same vertices, the traced border itself.
         let mut cuts = vec![0];
         for stretch in &stretches[..stretches.len() - 1] {
             let corner = stretch.end();
             let after = cuts[cuts.len() - 1] + 1;
             let near = |k: &usize| norm(minus(points[*k], corner));
             let best = (after..points.len() - 1).min_by(|a, b| near(a).total_cmp(&near(b)));
-            cuts.extend(best);
+            cuts.push(best?);
         }
         cuts.push(points.len() - 1);
+        let open = ends.is_some();
         let mut paths = Vec::new();
-        for (k, cut) in cuts.windows(2).enumerate() {
-            let mut run = points[cut[0]..=cut[1]].to_vec();
-            if let Some((a, b)) = ends {
-                if k == 0 {
-                    run.insert(0, a);
-                }
-                if k + 2 == cuts.len() {
-                    run.push(b);
-                }
-            }
+        for (k, (cut, stretch)) in cuts.windows(2).zip(&stretches).enumerate() {
+            // The sample at a corner cuts it off; at a junction it is a sample like others.
+            let first = cut[0] + usize::from(!(open && k == 0));
+            let end = cut[1] + usize::from(open && k + 2 == cuts.len());
+            let mut run = vec![stretch.start()];
+            run.extend_from_slice(points.get(first..end).unwrap_or_default());
+            run.push(stretch.end());
             paths.push(path::through_thirds(&run, settings.bound)?);
         }
         Some(paths)
@@ -197,11 +186,7 @@ impl Border<'_> {
 
 /// Junctions at the point nearest to the curves that meet there, or on their corner of
 /// the lattice where a traced border ends.
-fn place_junctions(
-    cracks: &CrackMap,
-    borders: &[Border<'_>],
-    settings: &BorderSettings,
-) -> Vec<[f64; 2]> {
+fn place_junctions(cracks: &CrackMap, borders: &[Border<'_>]) -> Vec<[f64; 2]> {
     // Normal equations of squared distances from the lines, held by the corner itself.
     let hold = 0.05;
     let mut sums: Vec<_> = cracks
@@ -211,7 +196,7 @@ fn place_junctions(
             (
                 [[hold, 0.0], [0.0, hold]],
                 [hold * c[0], hold * c[1]],
-                settings.literal,
+                false,
             )
         })
         .collect();
@@ -302,17 +287,11 @@ fn faults(
             strands.push(strand);
         }
         if border.level < TRACED && strays(&border.samples, &outline) {
-            if std::env::var("DBG").is_ok() {
-                println!("strays {k}");
-            }
             bad.insert(k);
         }
         outlines.push(outline);
     }
     for (a, b) in conflicts(&strands) {
-        if std::env::var("DBG").is_ok() {
-            println!("conflict {a} {b}");
-        }
         // The border that is still the smoother of the two gives way.
         let least = borders[a].level.min(borders[b].level);
         bad.extend([a, b].into_iter().filter(|&k| borders[k].level == least));
