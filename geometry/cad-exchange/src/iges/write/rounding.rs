@@ -7,8 +7,8 @@
 
 use nurbs::PiecewiseCubic;
 
-/// Jumps of the tangent up to this part of it are kinks to be rounded, larger ones are
-/// corners to be kept.
+/// Jumps of the tangent's x and y up to this part of them are kinks to be rounded, larger
+/// ones are corners of the border to be kept. A jump of z is always the surface's kink.
 const CORNER: f64 = 0.5;
 
 /// The largest part of a piece that the rounding of one of its ends may take.
@@ -30,9 +30,12 @@ pub(super) fn without_kinks<const D: usize>(
             curve.piece_value(k - 1, width(k - 1), 1),
             curve.piece_value(k, 0.0, 1),
         );
-        let jump = length::<D>(&core::array::from_fn(|d| after[d] - before[d]));
+        let jumps: [f64; D] = core::array::from_fn(|d| after[d] - before[d]);
+        let jump = length(&jumps);
         let narrow = width(k - 1).min(width(k));
-        if jump * narrow <= smooth_mm || jump > CORNER * length(&before).max(length(&after)) {
+        if jump * narrow <= smooth_mm
+            || plan_length(&jumps) > CORNER * plan_length(&before).max(plan_length(&after))
+        {
             return 0.0;
         }
         // Half way, the cubic is a quarter of the reach times the jump off the kink.
@@ -74,8 +77,13 @@ pub(super) fn without_kinks<const D: usize>(
     PiecewiseCubic { breaks, pieces }
 }
 
-fn length<const D: usize>(vector: &[f64; D]) -> f64 {
+fn length(vector: &[f64]) -> f64 {
     vector.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// Length without z.
+fn plan_length<const D: usize>(vector: &[f64; D]) -> f64 {
+    length(vector.get(..2).unwrap_or(vector))
 }
 
 /// The same cubic, its parameter counted from `s`.
@@ -153,6 +161,22 @@ mod tests {
         }
         assert!((0.5 * tolerance..=tolerance).contains(&worst), "{worst:e}");
         assert_eq!((round.start(), round.end()), (curve.start(), curve.end()));
+    }
+
+    #[test]
+    fn a_straight_border_over_a_ridge_is_rounded_however_steep() {
+        let slope = |z0: f64, slope: f64| [[z0, 1.0, 0.0, 0.0], [0.0; 4], [0.0, slope, 0.0, 0.0]];
+        let mut pieces = vec![slope(0.0, 3.0), slope(1.0, -2.0)];
+        pieces[1][2][0] = 3.0;
+        let curve = PiecewiseCubic::new(vec![0.0, 1.0, 2.0], pieces).unwrap();
+        let round = without_kinks(&curve, 1e-9, 1e-4);
+        assert_eq!(round.pieces.len(), 3);
+        let top = round.evaluate(1.0)[2];
+        assert!((top - (3.0 - 1e-4)).abs() < 1e-9, "{top}");
+        // The same turn in the plane is a corner.
+        let flat = curve.pieces.iter().map(|[x, _, z]| [*x, *z]).collect();
+        let flat = PiecewiseCubic::new(curve.breaks.clone(), flat).unwrap();
+        assert_eq!(without_kinks(&flat, 1e-9, 1e-4), flat);
     }
 
     #[test]
