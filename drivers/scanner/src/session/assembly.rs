@@ -146,3 +146,102 @@ impl Assembly {
         Ok(column)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scanner_protocol::events::Laterals;
+    use scanner_protocol::{MAX_COLUMN_FRAGMENTS, MAX_COLUMN_SAMPLES, Reading};
+
+    fn fragment(index: u16, first_sample: u16, count: u16) -> ColumnFragment {
+        let samples = (first_sample..first_sample + count).map(|sample| Sample {
+            lateral_counts: i32::from(sample),
+            reading: Reading::default(),
+        });
+        ColumnFragment {
+            scan_id: 1,
+            column: 0,
+            fragment: index,
+            fragments: MAX_COLUMN_FRAGMENTS,
+            first_sample,
+            table_counts: 7,
+            laterals: Laterals::Listed(samples.collect()),
+        }
+    }
+
+    #[test]
+    fn the_longest_column_comes_together_however_much_is_missing() {
+        let fragments: Vec<ColumnFragment> = (0..MAX_COLUMN_FRAGMENTS)
+            .map(|index| {
+                let first = index * 10;
+                fragment(index, first, 10.min(MAX_COLUMN_SAMPLES - first))
+            })
+            .collect();
+        let mut assembly = Assembly::default();
+        // Every third arrives at first; the rest as it is asked for.
+        for fragment in fragments.iter().step_by(3) {
+            assert_eq!(assembly.fragment(fragment, MAX_COLUMN_SAMPLES), Ok(true));
+        }
+        let mut requests = 0;
+        while !assembly.is_complete() {
+            let missing = assembly.missing();
+            requests += 1;
+            for fragment in fragments.iter().filter(|f| missing.contains(f.fragment)) {
+                assert_eq!(assembly.fragment(fragment, MAX_COLUMN_SAMPLES), Ok(true));
+            }
+        }
+        // One request reaches 512 fragments.
+        assert_eq!(requests, usize::from(MAX_COLUMN_FRAGMENTS).div_ceil(512));
+        let column = assembly.finish(0).unwrap();
+        assert_eq!(column.samples.len(), usize::from(MAX_COLUMN_SAMPLES));
+        assert!(
+            (0..)
+                .zip(&column.samples)
+                .all(|(i, s)| s.lateral_counts == i)
+        );
+    }
+
+    #[test]
+    fn parts_that_contradict_each_other_are_refused() {
+        let check = |change: fn(&mut ColumnFragment)| {
+            let mut assembly = Assembly::default();
+            assert_eq!(
+                assembly.fragment(&fragment(0, 0, 10), 2_000),
+                Err(Contradiction("more fragments than samples"))
+            );
+            assert_eq!(assembly.fragment(&fragment(0, 0, 10), 60_000), Ok(true));
+            assert_eq!(assembly.fragment(&fragment(0, 0, 10), 60_000), Ok(false));
+            let mut next = fragment(1, 10, 10);
+            change(&mut next);
+            assert!(assembly.fragment(&next, 60_000).is_err());
+        };
+        check(|f| f.table_counts += 1);
+        check(|f| f.fragments -= 1);
+        check(|f| f.first_sample = 59_995);
+        check(|f| f.fragment = f.fragments);
+    }
+
+    #[test]
+    fn gaps_and_overlaps_and_wrong_counts_are_noticed() {
+        let column = |second_sample: u16, told: u16| {
+            let mut assembly = Assembly::default();
+            for mut part in [fragment(0, 0, 10), fragment(1, second_sample, 10)] {
+                part.fragments = 2;
+                assembly.fragment(&part, 100)?;
+            }
+            let end = ColumnEnd {
+                scan_id: 1,
+                column: 0,
+                table_counts: 7,
+                fragments: 2,
+                samples: told,
+            };
+            assembly.end(&end, 100)?;
+            assembly.finish(0)
+        };
+        assert!(column(10, 20).is_ok());
+        assert!(column(9, 20).is_err());
+        assert!(column(11, 20).is_err());
+        assert!(column(10, 21).is_err());
+    }
+}

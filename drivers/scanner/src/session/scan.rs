@@ -135,6 +135,11 @@ impl ScanTracker {
         if slot.column.is_none() {
             if let Err(contradiction) = slot.assembly.end(end, max_samples) {
                 slot.restart(end.column, contradiction);
+            } else if slot.attempts == 0 {
+                // The answer to the last request is over, and has brought something: what is
+                // still missing is asked for at once. An answer without anything new is a
+                // sign of a burst of noise, which is better waited out.
+                slot.touched = None;
             }
             self.complete(end.column, now);
         }

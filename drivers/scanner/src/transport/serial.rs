@@ -1,10 +1,11 @@
 //! A serial port as a transport, and the list of ports there are.
 
-use std::io::{self, Read, Write};
+use std::io::{self, Read};
 use std::os::fd::OwnedFd;
 use std::path::Path;
 use std::time::Duration;
 
+use rustix::event::{PollFd, PollFlags, Timespec};
 use rustix::fs::{FlockOperation, Mode, OFlags};
 use rustix::io::Errno;
 use rustix::termios::{ControlModes, OptionalActions};
@@ -106,8 +107,7 @@ impl Connector for SerialConnector {
     }
 
     fn connect(&mut self) -> Result<Box<dyn Transport>, ScannerError> {
-        // Kept until the port is open for good, so that it is not closed in between.
-        let _first = self.prepare().map_err(|errno| self.refused(errno))?;
+        let direct = self.prepare().map_err(|errno| self.refused(errno))?;
         let port = serialport::new(&self.path, self.baud_rate)
             .preserve_dtr_on_open()
             .exclusive(true)
@@ -122,27 +122,15 @@ impl Connector for SerialConnector {
         // What an earlier session left unread is of no use. Failing to drop it does no harm:
         // late frames are told apart by their request ids.
         let _ = port.clear(ClearBuffer::All);
-        Ok(Box::new(SerialTransport { port }))
+        Ok(Box::new(SerialTransport { port, direct }))
     }
 }
 
 struct SerialTransport {
     port: Box<dyn SerialPort>,
-}
-
-/// `Ok(0)` for what only means that nothing could be done in time.
-fn in_time(result: io::Result<usize>) -> io::Result<usize> {
-    match result {
-        Err(error)
-            if matches!(
-                error.kind(),
-                io::ErrorKind::TimedOut | io::ErrorKind::Interrupted | io::ErrorKind::WouldBlock
-            ) =>
-        {
-            Ok(0)
-        }
-        other => other,
-    }
+    /// The same port, opened so that it never blocks. The library's own writes may wait
+    /// without end for a device that does not read, and an abort would wait with them.
+    direct: OwnedFd,
 }
 
 impl Transport for SerialTransport {
@@ -151,13 +139,40 @@ impl Transport for SerialTransport {
         match self.port.read(buffer) {
             // Readable and yet empty: the other end has hung up.
             Ok(0) if !buffer.is_empty() => Err(io::ErrorKind::UnexpectedEof.into()),
-            result => in_time(result),
+            // The library tells of a hang-up before what was sent before it has been read.
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {
+                match rustix::io::read(&self.direct, buffer) {
+                    Ok(count) if count > 0 => Ok(count),
+                    _ => Err(error),
+                }
+            }
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    io::ErrorKind::TimedOut
+                        | io::ErrorKind::Interrupted
+                        | io::ErrorKind::WouldBlock
+                ) =>
+            {
+                Ok(0)
+            }
+            result => result,
         }
     }
 
     fn write(&mut self, bytes: &[u8], timeout: Duration) -> io::Result<usize> {
-        self.port.set_timeout(timeout)?;
-        in_time(self.port.write(bytes))
+        let timeout = Timespec::try_from(timeout).map_err(io::Error::other)?;
+        let mut ready = [PollFd::new(&self.direct, PollFlags::OUT)];
+        match rustix::event::poll(&mut ready, Some(&timeout)) {
+            Ok(0) | Err(Errno::INTR) => return Ok(0),
+            Ok(_) => {}
+            Err(errno) => return Err(errno.into()),
+        }
+        match rustix::io::write(&self.direct, bytes) {
+            Ok(count) => Ok(count),
+            Err(Errno::AGAIN | Errno::INTR) => Ok(0),
+            Err(errno) => Err(errno.into()),
+        }
     }
 }
 

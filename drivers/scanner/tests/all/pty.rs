@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-use scanner_driver::transport::Transport;
-use scanner_driver::transport::serial::{SerialSettings, list_ports, port_holder};
+use scanner_driver::transport::serial::{SerialConnector, SerialSettings, list_ports, port_holder};
+use scanner_driver::transport::{Connector, Transport};
 use scanner_driver::{Scanner, ScannerError, SerialScanner};
 
 use crate::bench::{expected, plan};
@@ -179,6 +179,26 @@ fn a_shell_is_no_scanner() {
         "{error:?}"
     );
     chatter.join().unwrap();
+}
+
+#[test]
+fn a_device_that_does_not_read_blocks_nobody() {
+    let _turn = turn();
+    let (master, path) = pty();
+    let mut connector = SerialConnector::new(&SerialSettings::new(&path));
+    let mut transport = connector.connect().unwrap();
+    let mut taken = 0;
+    loop {
+        match transport.write(&[b'x'; 1_000], Duration::ZERO).unwrap() {
+            0 => break,
+            count => taken += count,
+        }
+        assert!(taken < 1 << 24, "the line takes everything");
+    }
+    assert!(taken > 0);
+    drop(master);
+    let gone = std::iter::repeat_with(|| transport.read(&mut [0; 64], Duration::ZERO));
+    assert!(gone.take(1_000).any(|read| read.is_err()));
 }
 
 #[test]
