@@ -1,9 +1,9 @@
 //! IGES 5.3 in fixed 80-column ASCII.
 //!
-//! [`write`] turns a [`reconstruct::Model`] into trimmed surfaces (entity 144 on 142 on
+//! [`write()`] turns a [`reconstruct::Model`] into trimmed surfaces (entity 144 on 142 on
 //! 114 and 112, or on 128 and 126), one per face, with name, colour and level;
 //! [`read_points`] takes measured points (106, 116) from anybody's file; [`read_model`]
-//! reads back what [`write`] writes.
+//! reads back what [`write()`] writes.
 //!
 //! A file is sections of 80-column lines: Start, Global, Directory entry, Parameter
 //! data, Terminate. Column 73 tells the section, columns 74 to 80 number its lines.

@@ -1,5 +1,5 @@
 //! The reader, in layers: bytes to lines to sections ([`lines`]), the Global section
-//! ([`global`]), directory entries and parameter records ([`file`] on [`values`]), and on
+//! ([`global`]), directory entries and parameter records ([`mod@file`] on [`values`]), and on
 //! top of these what is wanted: points ([`points`]) or trimmed faces ([`model`]).
 //!
 //! Files come from anywhere: nothing is allocated by a count before the values are there.

@@ -1,4 +1,4 @@
-//! Trimmed faces as [`crate::iges::write`] writes them: 144 on 142 on 114 and 112, or on
+//! Trimmed faces as [`crate::iges::write()`] writes them: 144 on 142 on 114 and 112, or on
 //! 128 and 126.
 
 use std::io::Read;
@@ -89,7 +89,7 @@ pub struct TrimmedCurve {
     pub space_curve: SplineCurve<3>,
 }
 
-/// Reads the trimmed faces of a file that [`crate::iges::write`] wrote.
+/// Reads the trimmed faces of a file that [`crate::iges::write()`] wrote.
 ///
 /// # Errors
 /// [`ReadError`], naming line and entity, also for entities that other programs write

@@ -4,7 +4,7 @@ use std::io;
 
 use nurbs::PiecewiseError;
 
-/// Why [`crate::iges::write`] wrote nothing, or not everything.
+/// Why [`crate::iges::write()`] wrote nothing, or not everything.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
