@@ -10,8 +10,12 @@
 //! measured between the two surfaces, each fitted a little inside its own region and carried
 //! on to the border, since what lies on the border itself mixes both sides.
 //!
-//! Faces narrower than about seven nodes cannot be told from the mixture of their neighbours
-//! and are given to these.
+//! # Limits
+//! With the default settings, noise of an eighth of the pitch and creases of 15 degrees or
+//! more, borders lie within 1.5 nodes of the true ones; creases below 10 degrees are smooth
+//! passages. Faces narrower than about five nodes cannot be told from the mixture of their
+//! neighbours and are given to these. Steps below about two pitches may be bridged where
+//! noise hides them.
 
 mod cluster;
 mod components;

@@ -7,10 +7,25 @@ const TERMS: usize = 6;
 const LEAST_FOR_PLANE: f64 = 7.0;
 /// Fewer nodes than this give no quadratic worth carrying on.
 const LEAST_FOR_QUADRATIC: f64 = 18.0;
-/// F ratio from which the quadratic is believed. The 1 % point of F(3, many) is 4, but noise
-/// that is alike in neighbouring nodes passes for shape and raises the ratio about threefold;
-/// and a plane carried on strays less than a quadratic.
-const BELIEF: f64 = 12.0;
+/// From which F ratio the quadratic is believed. The 1 % point of F(3, many) is 4, but noise
+/// that is alike in neighbouring nodes passes for shape and raises the ratio about threefold.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Belief {
+    /// Where a plane that misses a curvature would do more harm than a quadratic that follows
+    /// noise, as when directions are compared at many places.
+    Ready,
+    /// Where the surface is carried on by some nodes, in which a plane strays less.
+    Reluctant,
+}
+
+impl Belief {
+    fn least_ratio(self) -> f64 {
+        match self {
+            Self::Ready => 5.0,
+            Self::Reluctant => 12.0,
+        }
+    }
+}
 
 /// Powers of u and v in each term.
 const POWERS: [(usize, usize); TERMS] = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)];
@@ -83,7 +98,7 @@ impl Sums {
 
     /// The plane, or the quadratic where it is clearly nearer to the nodes; `None` with too
     /// few nodes, or nodes on a line.
-    pub(crate) fn fit(&self) -> Option<LocalFit> {
+    pub(crate) fn fit(&self, belief: Belief) -> Option<LocalFit> {
         let weight = self.moments[0][0];
         if weight < LEAST_FOR_PLANE {
             return None;
@@ -93,7 +108,7 @@ impl Sums {
         terms[..3].copy_from_slice(&plane);
         if weight >= LEAST_FOR_QUADRATIC
             && let Some((quadratic, error)) = self.solve::<TERMS>()
-            && (plane_error - error) * (weight - TERMS as f64) > BELIEF * 3.0 * error
+            && (plane_error - error) * (weight - TERMS as f64) > belief.least_ratio() * 3.0 * error
         {
             terms = quadratic;
         }
@@ -182,7 +197,7 @@ mod tests {
             }
             sums.add(u, &column);
         }
-        let fit = sums.fit().unwrap();
+        let fit = sums.fit(Belief::Ready).unwrap();
         assert!((fit.z_mm(2.0, 1.0) - surface(2.0, 1.0)).abs() < 1e-9);
         let rise = fit.rise_mm(2.0, 1.0);
         assert!((rise[0] - (0.3 + 0.2 - 0.02)).abs() < 1e-9, "{rise:?}");
@@ -198,6 +213,6 @@ mod tests {
             column.add(2.0 * f64::from(k), 1.0, 1.0);
             sums.add(f64::from(k), &column);
         }
-        assert!(sums.fit().is_none());
+        assert!(sums.fit(Belief::Ready).is_none());
     }
 }

@@ -3,12 +3,15 @@
 //! The paper (II.2) prints the condition the wrong way round; Hoffman & Jain 1987, whom it
 //! follows, merge where the border is not a crease.
 
-use crate::local_fit::LocalFit;
+use crate::local_fit::{Belief, LocalFit};
 use crate::scene::{NONE, Scene};
 use range_image::{Cancelled, Monitor};
 
 /// At most so many places of a border are examined.
 const PLACES: usize = 16;
+/// Surfaces whose normal's z is below this (60 degrees of incidence) must turn by more to count
+/// as creased, in proportion.
+const STEEP: f64 = 0.5;
 /// Shorter borders, in pairs of nodes, are no ground for merging.
 const LEAST_PAIRS: usize = 3;
 
@@ -131,23 +134,38 @@ struct Meeting {
     turn_rad: f64,
     /// Distance between the two, millimetres square to the surface.
     jump_mm: f64,
+    /// z of the mean normal: 1 faces the camera, 0 is seen edge on.
+    facing: f64,
 }
 
-/// The border's crease angle and jump, each over what is allowed, the greater of both; of
-/// several reaches the least, as what is truly broken is so at any scale.
+/// How a border measures up.
+#[derive(Debug, Clone, Copy)]
+struct Verdict {
+    /// Crease angle and jump, each over what is allowed, the greater of both.
+    strength: f64,
+    /// z of the mean normal.
+    facing: f64,
+}
+
+/// The border's strength by fits of the first reach. Where surfaces are steep the least by
+/// any reach: what is truly broken is so at any scale, while what only bends away sharply is
+/// smoother the closer one looks. Elsewhere short fits would see no more of an edge than the
+/// narrow chamfer or rounding that it may have.
 fn strength(scene: &Scene<'_>, labels: &[u32], border: &Border, reaches: &[usize]) -> Option<f64> {
-    reaches
-        .iter()
-        .filter_map(|&reach| strength_within(scene, labels, border, reach))
-        .min_by(f64::total_cmp)
+    let mut least = None;
+    for &reach in reaches {
+        let Some(verdict) = verdict(scene, labels, border, reach) else {
+            continue;
+        };
+        least = Some(least.map_or(verdict.strength, |s: f64| s.min(verdict.strength)));
+        if verdict.facing > STEEP {
+            break;
+        }
+    }
+    least
 }
 
-fn strength_within(
-    scene: &Scene<'_>,
-    labels: &[u32],
-    border: &Border,
-    reach: usize,
-) -> Option<f64> {
+fn verdict(scene: &Scene<'_>, labels: &[u32], border: &Border, reach: usize) -> Option<Verdict> {
     let (a, b) = border.regions;
     let pairs = &border.pairs;
     if pairs.len() < LEAST_PAIRS {
@@ -165,7 +183,7 @@ fn strength_within(
             |l| l == a || l == b,
             &mut sums,
         );
-        let fit = |label| sums.iter().find(|s| s.label == label)?.fit();
+        let fit = |label| sums.iter().find(|s| s.label == label)?.fit(Belief::Ready);
         if let (Some(one), Some(other)) = (fit(a), fit(b)) {
             meetings.push(meet(scene, pair, &one, &other));
         }
@@ -182,8 +200,15 @@ fn strength_within(
     // valley there betrays itself by sizes that noise does not explain.
     let one_way = median(&|m| m.turn_rad).abs();
     let either_way = median(&|m| m.turn_rad.abs()) - scene.turn_noise_rad(reach);
+    // Steep surfaces run out of nodes: z over x and y bends ever more sharply there, and a
+    // fit foretells its direction the less.
+    let facing = median(&|m| m.facing);
+    let crease = scene.crease_rad * (STEEP / facing).max(1.0);
     let jump = median(&|m| m.jump_mm);
-    Some((one_way.max(either_way) / scene.crease_rad).max(jump / scene.step_mm))
+    Some(Verdict {
+        strength: (one_way.max(either_way) / crease).max(jump / scene.step_mm),
+        facing,
+    })
 }
 
 fn meet(scene: &Scene<'_>, pair: Pair, one: &LocalFit, other: &LocalFit) -> Meeting {
@@ -198,11 +223,13 @@ fn meet(scene: &Scene<'_>, pair: Pair, one: &LocalFit, other: &LocalFit) -> Meet
     let apart = (n[0] - m[0]) * (other.centroid[0] - one.centroid[0])
         + (n[1] - m[1]) * (other.centroid[1] - one.centroid[1]);
     let turn = angle(m, n);
+    let facing = 0.5 * (m[2] + n[2]);
     // The gap along z, as seen square to the mean surface.
     let gap = (one.z_mm(u, v) - other.z_mm(u, v)).abs();
     Meeting {
         turn_rad: if apart < 0.0 { -turn } else { turn },
-        jump_mm: gap * 0.5 * (m[2] + n[2]),
+        jump_mm: gap * facing,
+        facing,
     }
 }
 

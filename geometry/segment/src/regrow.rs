@@ -1,7 +1,7 @@
 //! Nodes without a region join the one whose surface, carried on, explains them best.
 
 use crate::components::{Border, depths};
-use crate::local_fit::{LocalFit, Sums};
+use crate::local_fit::{Belief, LocalFit, Sums};
 use crate::scene::{NONE, Scene};
 use range_image::{Cancelled, Monitor};
 
@@ -148,7 +148,7 @@ fn rank(scene: &Scene<'_>, sums: &[Sums]) -> Ranking {
     let mut rivals: Vec<(f64, u32, LocalFit)> = sums
         .iter()
         .filter_map(|sums| {
-            let fit = sums.fit()?;
+            let fit = sums.fit(Belief::Reluctant)?;
             Some((miss_mm(scene, &fit), sums.label, fit))
         })
         .filter(|rival| rival.0 < EXPLAINED * scene.step_mm)

@@ -19,6 +19,9 @@ pub const MAX_Z_MM: f64 = 1e9;
 /// A jump below so many deviations of the noise may be noise.
 const STEP_NOISES: f64 = 6.0;
 
+/// Of so many nodes of a region one must lie deep in it, or it is a sliver.
+const LEAST_DEEP: usize = 8;
+
 /// Why an image cannot be segmented.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SegmentError {
@@ -203,8 +206,8 @@ fn clusters(
     Ok((labels, next as usize - 1))
 }
 
-/// Takes the label from pieces that are small, or nowhere as deep as `depth` nodes from a
-/// border, so that their nodes go to a neighbour.
+/// Takes the label from pieces that are small, or hardly anywhere as deep as `depth` nodes from
+/// a border, so that their nodes go to a neighbour.
 fn dissolve_slivers(
     scene: &Scene<'_>,
     labels: &mut [u32],
@@ -214,10 +217,15 @@ fn dissolve_slivers(
 ) {
     let depths = depths(scene, labels, depth, border);
     let sizes = sizes(labels);
-    let mut kept = vec![false; sizes.len()];
+    let mut deep = vec![0_usize; sizes.len()];
     for (&label, depth_here) in labels.iter().zip(depths) {
-        kept[label as usize] |= depth_here >= depth && sizes[label as usize] >= minimum_nodes;
+        deep[label as usize] += usize::from(depth_here >= depth);
     }
+    let kept: Vec<bool> = sizes
+        .iter()
+        .zip(deep)
+        .map(|(&size, deep)| size >= minimum_nodes && deep * LEAST_DEEP >= size)
+        .collect();
     for label in labels {
         if !kept[*label as usize] {
             *label = NONE;

@@ -3,7 +3,7 @@
 mod scenes;
 
 use range_image::Unmonitored;
-use scenes::{Pose, Scene, Spoil, Surface, cylinder, house};
+use scenes::{Pose, Scene, Spoil, Surface, convex, cylinder, house};
 use segment::{Method, SegmentSettings, segment_with_report};
 
 /// Ten seeds: dropouts from none to 20 %, outlines from clean to ragged.
@@ -60,6 +60,60 @@ fn a_cylinder_has_a_disc_and_one_side() {
             &cylinder(pose, radius, 70.0),
             2,
         );
+    }
+}
+
+/// Two planes that meet at a ridge, in a pose that follows no axis.
+fn ridge(tilt_degrees: f64, degrees: f64) -> impl Fn(f64, f64) -> Option<(f64, u16)> {
+    let (s, c) = libm::sincos((0.5 * degrees).to_radians());
+    convex(
+        Pose::new(tilt_degrees, 12.0, 25.0),
+        &[([s, 0.0, c], 0.0), ([-s, 0.0, c], 0.0)],
+    )
+}
+
+#[test]
+fn shallow_creases_stay_and_shallower_ones_are_smooth() {
+    check("ridge 20", &ridge(0.0, 20.0), 2);
+    check("ridge 15", &ridge(30.0, 15.0), 2);
+    for seed in 0..5 {
+        let spoil = Spoil {
+            noise_mm: 0.05,
+            dropouts: 0.02,
+            ragged: 0,
+        };
+        let scene = Scene::new(&ridge(20.0, 8.0), spoil, seed);
+        for method in [Method::Relief, Method::ShimLee] {
+            let settings = SegmentSettings {
+                method,
+                ..SegmentSettings::default()
+            };
+            let done = segment_with_report(&scene.image, &settings, &Unmonitored)
+                .expect("default settings fit any scene");
+            assert_eq!(done.regions.regions(), 1, "{method}, seed {seed}");
+            assert!(
+                (0.04..0.06).contains(&done.report.noise_mm),
+                "{:?}",
+                done.report
+            );
+        }
+    }
+}
+
+#[test]
+fn a_chamfer_is_a_face() {
+    let side = core::f64::consts::FRAC_1_SQRT_2;
+    for nodes in [10.0, 14.0] {
+        let depth = 0.5 * nodes * scenes::PITCH_MM;
+        let edge = convex(
+            Pose::new(10.0, 0.0, 20.0),
+            &[
+                ([side, 0.0, side], 0.0),
+                ([-side, 0.0, side], 0.0),
+                ([0.0, 0.0, 1.0], -depth),
+            ],
+        );
+        check(&format!("chamfer {nodes}"), &edge, 3);
     }
 }
 
