@@ -30,8 +30,9 @@ const IDLE_SLICE: Duration = Duration::from_millis(20);
 /// How long the line may hold up a write before the thread looks after other things.
 const WRITE_SLICE: Duration = Duration::from_millis(20);
 
-/// How long the last abort may take when the driver is dropped.
-const FAREWELL: Duration = Duration::from_millis(500);
+/// How long the last abort may take when the driver is dropped: after that the usual dead-man
+/// time has done the same.
+const FAREWELL: Duration = Duration::from_secs(2);
 
 type Reply = SyncSender<Result<Outcome, ScannerError>>;
 
