@@ -11,7 +11,7 @@ use reconstruct::{EdgeKind, Method};
 /// A house in oblique view: two walls and two roof planes that meet in four
 /// creases; eight corners, one of them inside.
 fn house(angle: f64) -> Vec<Part> {
-    let (sin, cos) = (angle.sin(), angle.cos());
+    let (sin, cos) = libm::sincos(angle);
     let turn = |points: &[Point]| -> Vec<Point> {
         points
             .iter()
@@ -79,10 +79,11 @@ fn the_house_keeps_its_corners_outlines_and_areas() {
                     off / pitch,
                     area / true_area
                 );
-                let (limit, share) = if method == Method::Relief {
-                    (0.6, 0.01)
-                } else {
-                    (1.2, 0.015)
+                let (limit, share) = match (method, k) {
+                    // Outlines along the lattice are known to half a pitch only.
+                    (_, 0) => (0.6, 0.02),
+                    (Method::Relief, _) => (0.3, 0.01),
+                    (Method::ShimLee, _) => (0.8, 0.01),
                 };
                 assert!(off < limit * pitch, "{} {}", face.name, off / pitch);
                 assert!((area / true_area - 1.0).abs() < share);
@@ -127,8 +128,8 @@ fn circle(centre: Point, radius: f64) -> Vec<Point> {
         .map(|k| {
             let angle = f64::from(k) * core::f64::consts::TAU / 720.0;
             [
-                centre[0] + radius * angle.cos(),
-                centre[1] + radius * angle.sin(),
+                centre[0] + radius * libm::cos(angle),
+                centre[1] + radius * libm::sin(angle),
             ]
         })
         .collect()
@@ -165,7 +166,7 @@ fn a_cylinder_seen_from_above_has_two_smooth_faces() {
     // Upright cylinder of radius 30 seen 35 degrees from above.
     let tilt = 35.0_f64.to_radians();
     let (radius, height) = (30.0, 60.0);
-    let (sin, cos) = tilt.sin_cos();
+    let (sin, cos) = libm::sincos(tilt);
     let ellipse: Vec<Point> = circle([0.0, 0.0], radius)
         .iter()
         .map(|p| [p[0], p[1] * sin + height / 2.0 * cos])
@@ -174,16 +175,16 @@ fn a_cylinder_seen_from_above_has_two_smooth_faces() {
     for k in 0..=360 {
         let angle = core::f64::consts::PI * (1.0 + f64::from(k) / 360.0);
         let at = [
-            radius * angle.cos(),
-            radius * angle.sin() * sin - height / 2.0 * cos,
+            radius * libm::cos(angle),
+            radius * libm::sin(angle) * sin - height / 2.0 * cos,
         ];
         side.push(at);
     }
     for k in (0..=360).rev() {
         let angle = core::f64::consts::PI * (1.0 + f64::from(k) / 360.0);
         side.push([
-            radius * angle.cos(),
-            radius * angle.sin() * sin + height / 2.0 * cos,
+            radius * libm::cos(angle),
+            radius * libm::sin(angle) * sin + height / 2.0 * cos,
         ]);
     }
     let mantle = move |x: f64, y: f64| {

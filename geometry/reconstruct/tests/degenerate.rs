@@ -1,5 +1,7 @@
 //! Input at the edge of what can be: nothing, lines, nests, and a caller who gives up.
 
+#![allow(clippy::unwrap_used)]
+
 mod common;
 
 use common::run;

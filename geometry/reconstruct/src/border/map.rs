@@ -48,15 +48,20 @@ pub(crate) struct PlanarMap {
 
 /// How closely a border is followed: each level is tried when the one before fails.
 const SMOOTH: usize = 0;
-const CLOSE: usize = 1;
-const TRACED: usize = 2;
+const TRACED: usize = 3;
+
+/// Factor of the price of pieces at each level before [`TRACED`].
+const PRICES: [f64; TRACED] = [1.0, 0.2, 0.05];
 
 /// Price of a curved piece against that of a straight one: dear enough that the three
 /// sides of a small notch stay sides, cheap enough that a small hole stays round.
 const CUBIC_PRICE: f64 = 16.0 / 7.0;
 
-/// Factor of the price of pieces at level [`CLOSE`].
-const CLOSE_PRICE: f64 = 0.2;
+/// Weight of an outline against a border between faces where they meet.
+const OUTLINE_WEIGHT: f64 = 8.0;
+
+/// Samples of a traced border nearer to its vertices than this do not count, pitches.
+const VERTEX_CLEARANCE: f64 = 1.0;
 
 /// Farthest a junction moves from its corner of the lattice, pitches.
 const JUNCTION_REACH: f64 = 1.0;
@@ -126,11 +131,10 @@ pub(crate) fn build(
 
 impl Border<'_> {
     fn divide(&mut self, settings: &BorderSettings) {
-        let factor = match self.level {
-            SMOOTH => settings.piece_price,
-            CLOSE => settings.piece_price * CLOSE_PRICE,
-            _ => return,
+        let Some(share) = PRICES.get(self.level) else {
+            return;
         };
+        let factor = settings.piece_price * share;
         let price = Price {
             line: factor,
             cubic: factor * CUBIC_PRICE,
@@ -169,15 +173,17 @@ impl Border<'_> {
             cuts.push(best?);
         }
         cuts.push(points.len() - 1);
-        let open = ends.is_some();
         let mut paths = Vec::new();
-        for (k, (cut, stretch)) in cuts.windows(2).zip(&stretches).enumerate() {
-            // The sample at a corner cuts it off; at a junction it is a sample like others.
-            let first = cut[0] + usize::from(!(open && k == 0));
-            let end = cut[1] + usize::from(open && k + 2 == cuts.len());
-            let mut run = vec![stretch.start()];
-            run.extend_from_slice(points.get(first..end).unwrap_or_default());
-            run.push(stretch.end());
+        for (cut, stretch) in cuts.windows(2).zip(&stretches) {
+            // Samples next to a vertex cut its corner off, or lie beyond it.
+            let (start, end) = (stretch.start(), stretch.end());
+            let clear = |p: &&[f64; 2]| {
+                norm(minus(**p, start)) > VERTEX_CLEARANCE
+                    && norm(minus(**p, end)) > VERTEX_CLEARANCE
+            };
+            let mut run = vec![start];
+            run.extend(points[cut[0]..=cut[1]].iter().filter(clear));
+            run.push(end);
             paths.push(path::through_thirds(&run, settings.bound)?);
         }
         Some(paths)
@@ -187,8 +193,10 @@ impl Border<'_> {
 /// Junctions at the point nearest to the curves that meet there, or on their corner of
 /// the lattice where a traced border ends.
 fn place_junctions(cracks: &CrackMap, borders: &[Border<'_>]) -> Vec<[f64; 2]> {
-    // Normal equations of squared distances from the lines, held by the corner itself.
-    let hold = 0.05;
+    // Normal equations of squared distances from the lines, held by the corner itself. A
+    // longer line is better known, and one that a shift at its end would turn off many
+    // nodes; outlines come before creases, which lose no nodes to nothing.
+    let hold = 0.5;
     let mut sums: Vec<_> = cracks
         .junctions
         .iter()
@@ -212,15 +220,22 @@ fn place_junctions(cracks: &CrackMap, borders: &[Border<'_>]) -> Vec<[f64; 2]> {
             continue;
         };
         for (junction, segment, sample) in [(start, first, first.first), (end, last, last.last)] {
+            let length = (segment.last - segment.first) as f64;
+            let outline = border.chain.left == 0 || border.chain.right == 0;
+            let weight = if outline {
+                OUTLINE_WEIGHT * length
+            } else {
+                length
+            };
             let (point, along) = border.samples.at(segment, sample);
             let normal = [-along[1], along[0]];
             let offset = normal[0] * point[0] + normal[1] * point[1];
             let (matrix, rhs, _) = &mut sums[junction];
             for i in 0..2 {
                 for j in 0..2 {
-                    matrix[i][j] += normal[i] * normal[j];
+                    matrix[i][j] += weight * normal[i] * normal[j];
                 }
-                rhs[i] += normal[i] * offset;
+                rhs[i] += weight * normal[i] * offset;
             }
         }
     }

@@ -5,3 +5,4 @@ pub(crate) mod crossing;
 pub(crate) mod map;
 pub(crate) mod path;
 pub(crate) mod segments;
+pub(crate) mod separate;

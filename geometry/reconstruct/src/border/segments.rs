@@ -7,6 +7,7 @@
 //! joints at which the tangents of neighbouring pieces disagree: the local maxima of
 //! curvature change of section IV, found without differentiating a staircase.
 
+use super::separate::{Line, separating, separating_cubic};
 use crate::polygon::{cross, dot, minus, norm};
 
 /// Price of pieces in square pitches, against sums of squared distances.
@@ -20,7 +21,7 @@ pub(crate) struct Price {
 const MIN_CUBIC_STEPS: usize = 8;
 
 /// Greatest turn of a curved piece once cut into arcs, radians.
-const MAX_TURN: f64 = 0.8;
+const MAX_TURN: f64 = 0.5;
 
 /// No piece costs more than this many times the price of a cubic: several would be
 /// cheaper. Costs grow with length, so the search ends there.
@@ -149,19 +150,47 @@ impl Samples {
                 c[0] += by;
                 c
             };
-            return Form::Cubic {
-                x: shift(x, origin[0]),
-                y: shift(y, origin[1]),
+            let reach = self.length[last] - self.length[first];
+            let scaled = |c: [f64; 4]| {
+                [
+                    c[0],
+                    c[1] * reach,
+                    c[2] * reach * reach,
+                    c[3] * reach * reach * reach,
+                ]
             };
+            let whole = [shift(x, origin[0]), shift(y, origin[1])].map(scaled);
+            let inner = first + 1..last;
+            let shares: Vec<f64> = self.length[inner.clone()]
+                .iter()
+                .map(|l| (l - self.length[first]) / reach)
+                .collect();
+            let [x, y] = separating_cubic(&self.points[inner], &shares, whole).map(|c| {
+                [
+                    c[0],
+                    c[1] / reach,
+                    c[2] / (reach * reach),
+                    c[3] / (reach * reach * reach),
+                ]
+            });
+            return Form::Cubic { x, y };
         }
         let (mean, mut along) = sums.line();
         let chord = minus(self.points[last], origin);
         if dot(along, chord) < 0.0 {
             along = [-along[0], -along[1]];
         }
+        let point = [mean[0] + origin[0], mean[1] + origin[1]];
+        // The samples next to a corner cut it off and say nothing about the line.
+        let inner = if last - first >= 6 {
+            first + 1..last
+        } else {
+            first..last + 1
+        };
+        let line = separating(&self.points[inner], Line { point, along });
         Form::Line {
-            point: [mean[0] + origin[0], mean[1] + origin[1]],
-            along,
+            point: line.point,
+            along: line.along,
         }
     }
 
@@ -435,7 +464,7 @@ mod tests {
             .collect();
         let samples = Samples::new(points);
         let segments = samples.divide(PRICE);
-        assert!(segments.len() <= 12, "{}", segments.len());
+        assert!(segments.len() <= 16, "{}", segments.len());
         for s in &segments {
             for k in s.first..=s.last {
                 let radius = norm(samples.at(s, k).0);
