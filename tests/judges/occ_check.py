@@ -296,7 +296,8 @@ def silence():
     Message.DefaultMessenger_s().ChangePrinters().Clear()
 
 
-def main():
+def options(words=None):
+    """The command line `words`, or the program's own."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("file")
     parser.add_argument("--expect-faces", type=int, metavar="N")
@@ -313,7 +314,11 @@ def main():
         help="such as those of surfaces whose patches meet without a common tangent",
     )
     parser.add_argument("--no-points", action="store_true", help="leave out points on loops")
-    arguments = parser.parse_args()
+    return parser.parse_args(words)
+
+
+def main():
+    arguments = options()
     silence()
     report = judge(arguments.file, arguments)
     json.dump(report, sys.stdout, indent=1)

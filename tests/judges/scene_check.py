@@ -11,7 +11,6 @@ code 0 when everything holds, 1 when not. Needs cadquery-ocp and numpy.
 import argparse
 import json
 import sys
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -65,19 +64,8 @@ def main():
     for face in truth["faces"]:
         face["outline"] = densified(np.array(face["outline_mm"]), SPACING_MM)
     occ_check.silence()
-    report = occ_check.judge(
-        arguments.file,
-        SimpleNamespace(
-            spacing_mm=SPACING_MM,
-            sewing_mm=1e-3,
-            allow_warnings=False,
-            expect_faces=len(truth["faces"]),
-            expect=None,
-            area_tolerance=AREA_TOLERANCE,
-            max_free_edges=None,
-            no_points=False,
-        ),
-    )
+    words = ["--spacing-mm", str(SPACING_MM), "--expect-faces", str(len(truth["faces"]))]
+    report = occ_check.judge(arguments.file, occ_check.options([*words, arguments.file]))
     problems = list(report["problems"])
     pitch, vertices, corners = truth["pitch_mm"], 0, 0
     print(f"{'face':<12}{'area mm2':>10}{'of truth':>10}{'loop->true':>12}{'true->loop':>12}"
