@@ -12,6 +12,11 @@ const PLACES: usize = 16;
 /// Surfaces whose normal's z is below this (60 degrees of incidence) must turn by more to count
 /// as creased, in proportion.
 const STEEP: f64 = 0.5;
+/// Reach and margin of a look at the border from further away.
+const AFAR: (usize, usize) = (8, 3);
+/// What counts as a crease or step from afar, in those of close by: surfaces are carried on
+/// over several nodes, which costs certainty.
+const ALLOWANCE: f64 = 2.5;
 /// Shorter borders, in pairs of nodes, are no ground for merging.
 const LEAST_PAIRS: usize = 3;
 
@@ -154,18 +159,25 @@ struct Verdict {
 fn strength(scene: &Scene<'_>, labels: &[u32], border: &Border, reaches: &[usize]) -> Option<f64> {
     let mut least = None;
     for &reach in reaches {
-        let Some(verdict) = verdict(scene, labels, border, reach) else {
+        let Some(near) = verdict(scene, labels, border, (reach, 1)) else {
             continue;
         };
-        least = Some(least.map_or(verdict.strength, |s: f64| s.min(verdict.strength)));
-        if verdict.facing > STEEP {
-            break;
+        least = Some(least.map_or(near.strength, |s: f64| s.min(near.strength)));
+        if near.facing > STEEP {
+            // The sides of a narrow chamfer or rounding meet smoothly in its middle.
+            let afar = verdict(scene, labels, border, AFAR).map(|v| v.strength / ALLOWANCE);
+            return least.map(|s| s.max(afar.unwrap_or(0.0)));
         }
     }
     least
 }
 
-fn verdict(scene: &Scene<'_>, labels: &[u32], border: &Border, reach: usize) -> Option<Verdict> {
+fn verdict(
+    scene: &Scene<'_>,
+    labels: &[u32],
+    border: &Border,
+    (reach, margin): (usize, usize),
+) -> Option<Verdict> {
     let (a, b) = border.regions;
     let pairs = &border.pairs;
     if pairs.len() < LEAST_PAIRS {
@@ -179,7 +191,7 @@ fn verdict(scene: &Scene<'_>, labels: &[u32], border: &Border, reach: usize) -> 
         scene.sums_around(
             labels,
             pair.first as usize,
-            reach,
+            (reach, margin),
             |l| l == a || l == b,
             &mut sums,
         );

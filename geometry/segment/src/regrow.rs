@@ -63,7 +63,7 @@ pub(crate) fn regrow(
         let mut rankings = vec![[NONE; RIVALS]; open.len()];
         let mut sums = Vec::new();
         for (ranking, &node) in rankings.iter_mut().zip(&open) {
-            scene.sums_around(labels, node, REACH, |_| true, &mut sums);
+            scene.sums_around(labels, node, (REACH, 1), |_| true, &mut sums);
             *ranking = rank(scene, &sums);
         }
         if !settle(scene, labels, &open, &rankings) {

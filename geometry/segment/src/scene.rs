@@ -35,12 +35,12 @@ impl Scene<'_> {
     }
 
     /// Sums of the labels in the window around a node, in the order they are met, those that
-    /// `wanted` lets through. z is counted from the middle node's.
+    /// `wanted` lets through. Nodes no further than `margin` from another label hardly count. z is counted from the middle node's.
     pub(crate) fn sums_around(
         &self,
         labels: &[u32],
         node: usize,
-        reach: usize,
+        (reach, margin): (usize, usize),
         wanted: impl Fn(u32) -> bool,
         found: &mut Vec<Sums>,
     ) {
@@ -63,7 +63,7 @@ impl Scene<'_> {
                 if current.0 == NONE {
                     continue;
                 }
-                let weight = if self.is_inside(labels, c, r) {
+                let weight = if self.is_inside(labels, c, r, margin) {
                     1.0
                 } else {
                     BORDER_WEIGHT
@@ -75,15 +75,19 @@ impl Scene<'_> {
         }
     }
 
-    /// Whether no 4-neighbour has another label.
-    fn is_inside(&self, labels: &[u32], column: usize, row: usize) -> bool {
-        let node = column * self.grid.rows + row;
-        let own = labels[node];
-        let same = |node: usize| labels[node] == own || labels[node] == NONE;
-        (row == 0 || same(node - 1))
-            && (row + 1 == self.grid.rows || same(node + 1))
-            && (column == 0 || same(node - self.grid.rows))
-            && (column + 1 == self.grid.columns || same(node + self.grid.rows))
+    /// Whether no node that is 1 or `margin` nodes away along a column or row has another
+    /// label.
+    fn is_inside(&self, labels: &[u32], column: usize, row: usize, margin: usize) -> bool {
+        let (rows, columns) = (self.grid.rows, self.grid.columns);
+        let node = column * rows + row;
+        let same = |other: usize| labels[other] == labels[node] || labels[other] == NONE;
+        let clear = |k: usize| {
+            (row < k || same(node - k))
+                && (row + k >= rows || same(node + k))
+                && (column < k || same(node - k * rows))
+                && (column + k >= columns || same(node + k * rows))
+        };
+        clear(1) && (margin == 1 || clear(margin))
     }
 }
 

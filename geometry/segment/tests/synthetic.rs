@@ -100,20 +100,40 @@ fn shallow_creases_stay_and_shallower_ones_are_smooth() {
     }
 }
 
+/// A right-angled edge with a chamfer about so many nodes wide.
+fn chamfer(nodes: f64) -> impl Fn(f64, f64) -> Option<(f64, u16)> {
+    let side = core::f64::consts::FRAC_1_SQRT_2;
+    let depth = 0.5 * nodes * scenes::PITCH_MM;
+    convex(
+        Pose::new(10.0, 0.0, 20.0),
+        &[
+            ([side, 0.0, side], 0.0),
+            ([-side, 0.0, side], 0.0),
+            ([0.0, 0.0, 1.0], -depth),
+        ],
+    )
+}
+
 #[test]
 fn a_chamfer_is_a_face() {
-    let side = core::f64::consts::FRAC_1_SQRT_2;
-    for nodes in [10.0, 14.0] {
-        let depth = 0.5 * nodes * scenes::PITCH_MM;
-        let edge = convex(
-            Pose::new(10.0, 0.0, 20.0),
-            &[
-                ([side, 0.0, side], 0.0),
-                ([-side, 0.0, side], 0.0),
-                ([0.0, 0.0, 1.0], -depth),
-            ],
-        );
-        check(&format!("chamfer {nodes}"), &edge, 3);
+    check("chamfer 10", &chamfer(10.0), 3);
+    check("chamfer 14", &chamfer(14.0), 3);
+}
+
+#[test]
+fn a_chamfer_too_narrow_to_see_bridges_nothing() {
+    for nodes in [3.0, 5.0] {
+        for seed in 0..3 {
+            let spoil = Spoil {
+                noise_mm: 0.05,
+                dropouts: 0.02,
+                ragged: 0,
+            };
+            let scene = Scene::new(&chamfer(nodes), spoil, seed);
+            let done = segment_with_report(&scene.image, &SegmentSettings::default(), &Unmonitored)
+                .expect("default settings fit any scene");
+            assert_eq!(done.regions.regions(), 2, "{nodes} nodes, seed {seed}");
+        }
     }
 }
 
