@@ -240,6 +240,7 @@ impl Worker {
                 }
             }
         }
+        let was_busy = !self.pending.is_empty();
         let mut wake = None;
         if self.pending.is_empty() {
             let poll = running.device.poll(now);
@@ -255,6 +256,10 @@ impl Worker {
         drop(running);
         shared.notify();
         self.write_out();
+        if was_busy && self.pending.is_empty() {
+            // There is room again, and the device has not been asked since.
+            wake = Some(now);
+        }
         Some(Wait {
             readable: true,
             writable: !self.pending.is_empty(),

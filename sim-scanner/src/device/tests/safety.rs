@@ -1,0 +1,113 @@
+//! What turns the laser off and stops the table.
+
+use super::*;
+
+#[test]
+fn a_silent_host_finds_laser_and_table_stopped() {
+    let mut host = Host::ready();
+    host.link.device().step_columns(Some(2));
+    assert_eq!(columns(&host.scan(64)), [0, 1]);
+    host.link.device().step_columns(Some(1));
+    host.send(&Heartbeat {});
+    host.told();
+    host.link.pass(Duration::from_millis(1999));
+    assert!(!host.link.device().events().contains(&Event::DeadMan));
+    host.link.pass(Duration::from_millis(1));
+    let events = host.link.device().events();
+    assert!(events.contains(&Event::DeadMan));
+    assert_eq!(
+        events.iter().rev().find(|e| matches!(e, Event::Laser(_))),
+        Some(&Event::Laser(false))
+    );
+    let told: Vec<_> = host.told().into_iter().map(|(_, m)| m).collect();
+    let end = end(&told).expect("the scan has ended");
+    assert_eq!(end.reason, ScanEndReason::DeadMan);
+    assert!(end.faults.contains(Faults::DEAD_MAN));
+    assert!(host.status().faults.contains(Faults::DEAD_MAN));
+    host.ask(&ClearFaults {});
+    assert!(host.status().faults.is_empty());
+}
+
+#[test]
+fn a_moving_table_stops_when_the_host_falls_silent() {
+    let mut host = Host::ready();
+    host.greet(500);
+    host.ask(&Move {
+        table_counts: 40_000,
+    });
+    host.link.pass(3 * SECOND);
+    let status = host.status();
+    assert_eq!(status.activity, Activity::Idle);
+    // 200 mm/s for the half second of the dead-man time.
+    assert_eq!(status.table_counts, 10_000);
+}
+
+#[test]
+fn an_idle_device_does_not_mind_silence() {
+    let mut host = Host::ready();
+    host.link.pass(3600 * SECOND);
+    assert!(host.status().faults.is_empty());
+}
+
+#[test]
+fn abort_stops_everything_at_once() {
+    let mut host = Host::ready();
+    host.scan(4);
+    assert!(matches!(host.ask(&Abort {}), DeviceMessage::Aborted(_)));
+    let status = host.status();
+    assert_eq!((status.activity, status.laser_on), (Activity::Idle, false));
+    assert!(
+        columns(&host.grant(4, 60)).is_empty(),
+        "the scan is forgotten"
+    );
+    assert_eq!(columns(&host.scan(64)).len(), 12, "the next one is whole");
+}
+
+#[test]
+fn faults_end_a_scan_and_must_be_mended_before_the_next() {
+    let mut host = Host::ready();
+    host.scan(4);
+    let now = host.link.now();
+    host.link.device().raise_faults(Faults::INTERLOCK, now);
+    host.link.pass(Duration::from_millis(1));
+    let told: Vec<_> = host.told().into_iter().map(|(_, m)| m).collect();
+    let reason = end(&told).map(|end| (end.reason, end.faults));
+    assert_eq!(reason, Some((ScanEndReason::Fault, Faults::INTERLOCK)));
+    host.ask(&CloseScan { scan_id: 9 });
+    assert_eq!(host.refusal(&SetLaser { on: true }), RejectReason::Faulted);
+    let DeviceMessage::FaultsCleared(cleared) = host.ask(&ClearFaults {}) else {
+        panic!("faults are cleared")
+    };
+    assert_eq!(
+        cleared.remaining,
+        Faults::INTERLOCK,
+        "the cause is there still"
+    );
+    host.link.device().mend(Faults::INTERLOCK);
+    host.ask(&ClearFaults {});
+    assert_eq!(host.status().activity, Activity::Idle);
+}
+
+#[test]
+fn a_reset_forgets_session_place_and_scan() {
+    let mut host = Host::ready();
+    let before = host.status().boot_id;
+    host.scan(4);
+    let now = host.link.now();
+    host.link.device().send_garbage(&[7, 0, 0, 9, 9, 9]);
+    host.link.device().reset(ResetCause::BrownOut, now);
+    host.link.pass(Duration::from_millis(1));
+    let told = host.told();
+    assert!(
+        told.iter().any(|(_, message)| matches!(
+            message,
+            DeviceMessage::Banner(banner) if banner.cause == ResetCause::BrownOut
+        )),
+        "found behind the garbage: {told:?}"
+    );
+    assert_eq!(host.refusal(&Heartbeat {}), RejectReason::NoSession);
+    host.greet(1000);
+    let status = host.status();
+    assert!(!status.homed && !status.laser_on);
+    assert_ne!(status.boot_id, before);
+}
