@@ -45,7 +45,8 @@ pub struct Edge {
     /// What the border is.
     pub kind: EdgeKind,
     /// The path in the x-y plane, from `start` to `end`; one or more cubic pieces with
-    /// arc length as parameter (Shim & Lee 1995, equation 7).
+    /// arc length as parameter (Shim & Lee 1995, equation 7), to a few per cent where they
+    /// are curved.
     pub path: PiecewiseCubic<2>,
 }
 

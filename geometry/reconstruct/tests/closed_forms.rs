@@ -220,7 +220,10 @@ fn a_cylinder_seen_from_above_has_two_smooth_faces() {
             one_way(&drawn, &part.outline) / 0.45,
             one_way(&part.outline, &drawn) / 0.45,
         );
-        println!("{}: {beyond} and {short} pitches", face.name);
+        println!(
+            "{}: {beyond} and {short} pitches, {:?}",
+            face.name, done.warnings
+        );
         assert!(beyond < 0.9 && short < 6.0, "{beyond} {short}");
         let ratio = signed_area(&drawn) / signed_area(&part.outline);
         assert!((ratio - 1.0).abs() < 0.01, "{ratio}");

@@ -16,7 +16,7 @@ const CHORDS: usize = 24;
 const CLEARANCE: f64 = 0.02;
 
 /// Cosine of the least angle between two strands that leave a vertex.
-const FOLD_COSINE: f64 = 0.999_5;
+const FOLD_COSINE: f64 = 0.999_9;
 
 /// A path as a fine polyline. Lengths are in pitches.
 #[derive(Debug, Clone)]

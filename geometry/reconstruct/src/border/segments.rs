@@ -7,7 +7,7 @@
 //! joints at which the tangents of neighbouring pieces disagree: the local maxima of
 //! curvature change of section IV, found without differentiating a staircase.
 
-use super::separate::{Line, separating, separating_cubic};
+use super::separate::{Line, is_wrong, separating, separating_cubic};
 use crate::polygon::{cross, dot, minus, norm};
 
 /// Price of pieces in square pitches, against sums of squared distances.
@@ -22,6 +22,14 @@ const MIN_CUBIC_STEPS: usize = 8;
 
 /// Greatest turn of a curved piece once cut into arcs, radians.
 const MAX_TURN: f64 = 0.5;
+
+/// Least steps of the halves of a curved piece.
+const MIN_HALF_STEPS: usize = 16;
+
+/// Nodes on the wrong side of a curved piece are put up with up to this number and one
+/// in [`WRONG_SHARE`] of its samples.
+const WRONG_FREE: usize = 1;
+const WRONG_SHARE: usize = 40;
 
 /// No piece costs more than this many times the price of a cubic: several would be
 /// cheaper. Costs grow with length, so the search ends there.
@@ -105,38 +113,90 @@ impl Samples {
         let mut last = count - 1;
         while last > 0 {
             let (_, first, curved) = best[last];
-            let form = self.form(first, last, curved);
-            segments.extend(self.arcs(Segment {
-                first,
-                last,
-                origin: first,
-                form,
-            }));
+            self.settle(first, last, curved, &mut segments);
             last = first;
         }
         segments.reverse();
         segments
     }
 
-    /// A piece cut into arcs of little turn, the last one first: cubics with unit speed at
-    /// both ends follow only such arcs.
-    fn arcs(&self, whole: Segment) -> impl Iterator<Item = Segment> {
-        let mut turn = 0.0;
-        if matches!(whole.form, Form::Cubic { .. }) {
-            let tangents = (whole.first..=whole.last).map(|k| self.at(&whole, k).1);
-            let tangents: Vec<[f64; 2]> = tangents.collect();
-            for pair in tangents.windows(2) {
-                turn += libm::atan2(cross(pair[0], pair[1]), dot(pair[0], pair[1])).abs();
+    /// Adds the segments of a piece, the last one first. A cubic that leaves too many
+    /// nodes on the wrong side is halved where two cubics do best.
+    fn settle(&self, first: usize, last: usize, curved: bool, segments: &mut Vec<Segment>) {
+        let form = self.form(first, last, curved);
+        let whole = Segment {
+            first,
+            last,
+            origin: first,
+            form,
+        };
+        let steps = last - first;
+        if matches!(form, Form::Cubic { .. }) && steps >= 2 * MIN_HALF_STEPS {
+            let wrong = (first + 1..last)
+                .filter(|&k| {
+                    let (point, along) = self.at(&whole, k);
+                    is_wrong(self.points[k], &Line { point, along })
+                })
+                .count();
+            if wrong > WRONG_FREE + steps / WRONG_SHARE
+                && let Some(middle) = self.halved(first, last)
+            {
+                self.settle(middle, last, true, segments);
+                self.settle(first, middle, true, segments);
+                return;
             }
         }
-        let steps = whole.last - whole.first;
-        let parts = ((turn / MAX_TURN).ceil() as usize).clamp(1, steps);
-        let cut = move |n: usize| whole.first + steps * n / parts;
-        (0..parts).rev().map(move |n| Segment {
-            first: cut(n),
-            last: cut(n + 1),
+        segments.extend(self.arcs(whole));
+    }
+
+    /// The sample at which two cubics instead of one have the least error.
+    fn halved(&self, first: usize, last: usize) -> Option<usize> {
+        let places = first + MIN_HALF_STEPS..=last - MIN_HALF_STEPS;
+        let errors = |end: usize, middles: &mut dyn Iterator<Item = usize>| -> Vec<f64> {
+            let mut sums = Sums::start(self, end);
+            let mut errors = Vec::new();
+            let mut count = 0;
+            for k in middles {
+                sums.push(self, k);
+                count += 1;
+                if count >= MIN_HALF_STEPS {
+                    errors.push(sums.cubic_error());
+                }
+            }
+            errors
+        };
+        let before = errors(first, &mut (first + 1..=last - MIN_HALF_STEPS));
+        let after = errors(last, &mut (first + MIN_HALF_STEPS..last).rev());
+        let total = before.iter().zip(after.iter().rev()).map(|(a, b)| a + b);
+        places
+            .zip(total)
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|p| p.0)
+    }
+
+    /// A piece cut into arcs of little turn, the last one first: cubics with unit speed at
+    /// both ends follow only such arcs.
+    fn arcs(&self, whole: Segment) -> Vec<Segment> {
+        let mut cuts = vec![whole.first];
+        if matches!(whole.form, Form::Cubic { .. }) {
+            let (mut turn, mut before) = (0.0, self.at(&whole, whole.first).1);
+            for k in whole.first + 1..whole.last {
+                let here = self.at(&whole, k).1;
+                turn += libm::atan2(cross(before, here), dot(before, here)).abs();
+                before = here;
+                if turn > MAX_TURN {
+                    cuts.push(k);
+                    turn = 0.0;
+                }
+            }
+        }
+        cuts.push(whole.last);
+        let arc = |pair: &[usize]| Segment {
+            first: pair[0],
+            last: pair[1],
             ..whole
-        })
+        };
+        cuts.windows(2).rev().map(arc).collect()
     }
 
     fn form(&self, first: usize, last: usize, curved: bool) -> Form {
@@ -201,17 +261,27 @@ impl Samples {
                 let t = dot(minus(self.points[sample], point), along);
                 ([point[0] + t * along[0], point[1] + t * along[1]], along)
             }
-            Form::Cubic { x, y } => {
+            Form::Cubic { .. } => {
                 let t = self.length[sample] - self.length[segment.origin];
-                let value = |c: [f64; 4]| c[0] + t * (c[1] + t * (c[2] + t * c[3]));
-                let slope = |c: [f64; 4]| c[1] + t * (2.0 * c[2] + t * 3.0 * c[3]);
-                let tangent = [slope(x), slope(y)];
-                let speed = norm(tangent).max(1e-9);
-                (
-                    [value(x), value(y)],
-                    [tangent[0] / speed, tangent[1] / speed],
-                )
+                let (place, slope) = segment.on_form(t);
+                let speed = norm(slope).max(1e-9);
+                (place, [slope[0] / speed, slope[1] / speed])
             }
+        }
+    }
+}
+
+impl Segment {
+    /// Place and derivative of the form at an arc length from its origin.
+    pub(crate) fn on_form(&self, t: f64) -> ([f64; 2], [f64; 2]) {
+        match self.form {
+            Form::Line { point, along } => {
+                ([point[0] + t * along[0], point[1] + t * along[1]], along)
+            }
+            Form::Cubic { x, y } => (
+                [x, y].map(|c| c[0] + t * (c[1] + t * (c[2] + t * c[3]))),
+                [x, y].map(|c| c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])),
+            ),
         }
     }
 }

@@ -83,12 +83,14 @@ fn pull(off: f64, room: f64) -> (f64, f64) {
     }
 }
 
+/// True when the line leaves one of the two nodes that a crack parts on the wrong side.
+pub(crate) fn is_wrong(middle: [f64; 2], line: &Line) -> bool {
+    let (off, room) = offset(middle, line, 0.5);
+    off.abs() >= room
+}
+
 fn wrong(middles: &[[f64; 2]], line: &Line) -> usize {
-    let is_wrong = |m: &&[f64; 2]| {
-        let (off, room) = offset(**m, line, 0.5);
-        off.abs() >= room
-    };
-    middles.iter().filter(is_wrong).count()
+    middles.iter().filter(|m| is_wrong(**m, line)).count()
 }
 
 /// One round of reweighted least squares over shift and turn.
@@ -127,11 +129,7 @@ pub(crate) fn separating_cubic(middles: &[[f64; 2]], shares: &[f64], cubic: Cubi
     let count = |c: &Cubic| {
         let samples = middles.iter().zip(shares);
         samples
-            .filter(|(m, t)| {
-                let line = tangent_line(c, **t);
-                let (off, room) = offset(**m, &line, 0.5);
-                off.abs() >= room
-            })
+            .filter(|(m, t)| is_wrong(**m, &tangent_line(c, **t)))
             .count()
     };
     let mut best = (count(&cubic), cubic);
@@ -267,10 +265,7 @@ mod tests {
         let count = |c: &Cubic| {
             let pairs = middles.iter().zip(&shares);
             pairs
-                .filter(|(m, t)| {
-                    let (off, room) = offset(**m, &tangent_line(c, **t), 0.5);
-                    off.abs() >= room
-                })
+                .filter(|(m, t)| is_wrong(**m, &tangent_line(c, **t)))
                 .count()
         };
         let end = separating_cubic(&middles, &shares, start);
