@@ -86,13 +86,8 @@ pub(super) fn segment_distance(point: Vec3, from: Vec3, to: Vec3) -> f64 {
 pub(super) fn visible_faces(
     solid: &ConvexSolid,
     optics: &Optics,
-    incidence_max_rad: f64,
 ) -> Result<Vec<VisibleFace>, TruthError> {
-    let viewers = Viewers {
-        laser_mm: optics.laser_mm(0.0),
-        sensor_mm: optics.sensor_mm(0.0),
-        least_cos: libm::cos(incidence_max_rad).max(0.0),
-    };
+    let viewers = [optics.laser_mm(0.0), optics.sensor_mm(0.0)];
     let side = side_of(solid);
     let mut faces = Vec::new();
     for (index, surface) in solid.faces().iter().enumerate() {
@@ -116,29 +111,6 @@ pub(super) fn visible_faces(
     Ok(faces)
 }
 
-/// Laser and sensor, which travel with the column, where they are at x = 0.
-#[derive(Debug, Clone, Copy)]
-struct Viewers {
-    laser_mm: Vec3,
-    sensor_mm: Vec3,
-    /// Cosine of the laser's angle of incidence beyond which no light comes back.
-    least_cos: f64,
-}
-
-impl Viewers {
-    /// How far each is above the tangent plane at a point.
-    fn above(&self, normal: Vec3, point: Vec3) -> [f64; 2] {
-        [self.laser_mm, self.sensor_mm].map(|v| above(v, normal, point))
-    }
-
-    /// Whether light comes back from a point.
-    fn see(&self, normal: Vec3, point: Vec3) -> bool {
-        let [laser, sensor] = self.above(normal, point);
-        let distance_mm = (self.laser_mm + Vec3::X * point.x).distance(point);
-        laser > self.least_cos * distance_mm && laser > 0.0 && sensor > 0.0
-    }
-}
-
 /// How far a viewer that travels with the column is above the tangent plane at a point.
 fn above(viewer_at_0: Vec3, normal: Vec3, point: Vec3) -> f64 {
     normal.dot(viewer_at_0 + Vec3::X * point.x - point)
@@ -154,7 +126,7 @@ fn polygon(
     index: usize,
     normal: Vec3,
     offset_mm: f64,
-    viewers: Viewers,
+    viewers: [Vec3; 2],
     id: FaceId,
 ) -> Result<Option<VisibleFace>, TruthError> {
     let (u, v) = basis(normal);
@@ -174,10 +146,10 @@ fn polygon(
             corners = clip(&corners, |p| limit - across.dot(p));
         }
     }
-    for viewer in [viewers.laser_mm, viewers.sensor_mm] {
+    for viewer in viewers {
         corners = clip(&corners, |p| above(viewer, normal, p));
     }
-    if corners.len() < 3 || !corners.iter().any(|p| viewers.see(normal, *p)) {
+    if corners.len() < 3 {
         return Ok(None);
     }
     let area_mm2 = edges(&corners)
@@ -254,8 +226,8 @@ fn side_of(solid: &ConvexSolid) -> Option<Side> {
 
 impl Side {
     /// The direction across the axis that faces the viewers.
-    fn facing(&self, viewers: Viewers) -> Vec3 {
-        let towards = (viewers.laser_mm + viewers.sensor_mm) / 2.0 - self.base_mm;
+    fn facing(&self, viewers: [Vec3; 2]) -> Vec3 {
+        let towards = (viewers[0] + viewers[1]) / 2.0 - self.base_mm;
         let flat = Vec3::new(0.0, towards.y, towards.z);
         (flat - self.axis * self.axis.dot(flat)).normalize_or_zero()
     }
@@ -270,11 +242,11 @@ impl Side {
     }
 
     /// The angle to one side of `facing` up to which both viewers see the side at a height.
-    fn limit(&self, facing: Vec3, viewers: Viewers, height_mm: f64, sign: f64) -> f64 {
+    fn limit(&self, facing: Vec3, viewers: [Vec3; 2], height_mm: f64, sign: f64) -> f64 {
         let seen = |angle: f64| {
             let normal = self.normal(facing, angle);
             let point = self.point(facing, angle, height_mm);
-            viewers.see(normal, point)
+            viewers.iter().all(|v| above(*v, normal, point) > 0.0)
         };
         let (mut inside, mut outside) = (0.0, sign * PI);
         for _ in 0..60 {
@@ -288,12 +260,12 @@ impl Side {
         inside
     }
 
-    fn visible(&self, viewers: Viewers, id: FaceId) -> Option<VisibleFace> {
+    fn visible(&self, viewers: [Vec3; 2], id: FaceId) -> Option<VisibleFace> {
         const STEPS: usize = 256;
         let facing = self.facing(viewers);
         let normal = self.normal(facing, 0.0);
         let middle = self.point(facing, 0.0, (self.low_mm + self.high_mm) / 2.0);
-        if !viewers.see(normal, middle) {
+        if viewers.iter().any(|v| above(*v, normal, middle) <= 0.0) {
             return None;
         }
         let height =
@@ -360,7 +332,7 @@ fn disc(
     index: usize,
     normal: Vec3,
     offset_mm: f64,
-    viewers: Viewers,
+    viewers: [Vec3; 2],
     id: FaceId,
 ) -> Result<Option<VisibleFace>, TruthError> {
     let turn = normal.dot(side.axis);
