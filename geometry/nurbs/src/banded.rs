@@ -47,6 +47,18 @@ impl BandedMatrix {
         self.lower[row * (self.bandwidth + 1) + self.bandwidth + column - row] += value;
     }
 
+    /// Adds `factor` times each value to the element in its column of one row.
+    ///
+    /// # Panics
+    /// When an element lies outside the band or above the diagonal.
+    pub fn add_to_row(&mut self, row: usize, factor: f64, elements: &[(usize, f64)]) {
+        let w = self.bandwidth;
+        let of_row = &mut self.lower[row * (w + 1)..(row + 1) * (w + 1)];
+        for &(column, value) in elements {
+            of_row[w + column - row] += factor * value;
+        }
+    }
+
     /// The element in this row and column of the lower band.
     fn get(&self, row: usize, column: usize) -> f64 {
         self.lower[row * (self.bandwidth + 1) + self.bandwidth + column - row]

@@ -183,8 +183,15 @@ impl TensorSpline {
         let mut matrix = BandedMatrix::zero(columns * rows, bandwidth);
         let mut coefficients = vec![0.0; columns * rows];
         let mut terms: Vec<(usize, f64)> = Vec::with_capacity((p + 1) * (q + 1));
-        for observation in observations {
-            let (a, b) = (u_knots.basis(observation.u), v_knots.basis(observation.v));
+        // Observations of a grid come line by line, with one u for many.
+        let mut line: Option<(f64, Basis)> = None;
+        for observation in observations.iter().filter(|o| o.weight > 0.0) {
+            let a = match line {
+                Some((u, basis)) if u == observation.u => basis,
+                _ => u_knots.basis(observation.u),
+            };
+            line = Some((observation.u, a));
+            let b = v_knots.basis(observation.v);
             terms.clear();
             for i in 0..=p {
                 for j in 0..=q {
@@ -195,9 +202,7 @@ impl TensorSpline {
             for (k, &(row, wr)) in terms.iter().enumerate() {
                 let weighted = wr * observation.weight;
                 coefficients[row] += weighted * observation.value;
-                for &(column, wc) in &terms[..=k] {
-                    matrix.add(row, column, weighted * wc);
-                }
+                matrix.add_to_row(row, weighted, &terms[..=k]);
             }
         }
         let scale = bending * matrix.trace() / (columns * rows) as f64;
