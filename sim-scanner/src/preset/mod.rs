@@ -128,7 +128,9 @@ impl Preset {
                     speckle_share: 0.3,
                     mixed: 0.1,
                     dropouts: 0.001,
-                    incidence_max_rad: 1.48,
+                    // 75 degrees: plaster and drawing paper send too little light back
+                    // beyond.
+                    incidence_max_rad: 1.309,
                     ..none
                 },
             },

@@ -51,9 +51,13 @@ pub enum TruthError {
     /// A face of a kind that is not traced.
     #[error("face {0} is not a plane between planes, a disc, or the side of a right cylinder")]
     Surface(usize),
+    /// Light comes back from a part of a plane only.
+    #[error("the laser grazes face {0} so that light comes back from a part of it only")]
+    Grazed(usize),
 }
 
-/// A face of the object as far as laser and sensor both see it.
+/// A face of the object as far as light comes back from it: laser and sensor both see it,
+/// and the beam does not graze it beyond the angle at which the scanner goes blind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VisibleFace {
     /// Which face.
@@ -106,7 +110,7 @@ pub fn faces(scanner: &Scanner) -> Result<Vec<VisibleFace>, TruthError> {
     let (1, Some((Body::Solid(solid), _))) = (scene.object_bodies, scene.bodies.first()) else {
         return Err(TruthError::NotConvex);
     };
-    outline::visible_faces(solid, &scanner.optics)
+    outline::visible_faces(solid, &scanner.optics, scanner.noise.incidence_max_rad)
 }
 
 /// What stands at (x, y), if anything does.
@@ -168,6 +172,17 @@ mod tests {
         let faces = faces(&scanner).expect("the house is convex");
         assert_eq!(faces.len(), 4);
         let nodes = counted(&scanner, 0.5);
+        for face in &faces {
+            let seen = nodes[&Some(face.id)]
+                .iter()
+                .filter(|(_, seen)| *seen)
+                .count();
+            assert_eq!(
+                seen,
+                nodes[&Some(face.id)].len(),
+                "all of a face is lit and seen"
+            );
+        }
         let all: usize = nodes.values().map(Vec::len).sum();
         for face in &faces {
             let share = nodes[&Some(face.id)].len() as f64 / all as f64;

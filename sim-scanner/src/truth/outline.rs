@@ -86,8 +86,13 @@ pub(super) fn segment_distance(point: Vec3, from: Vec3, to: Vec3) -> f64 {
 pub(super) fn visible_faces(
     solid: &ConvexSolid,
     optics: &Optics,
+    incidence_max_rad: f64,
 ) -> Result<Vec<VisibleFace>, TruthError> {
-    let viewers = [optics.laser_mm(0.0), optics.sensor_mm(0.0)];
+    let viewers = Viewers {
+        laser_mm: optics.laser_mm(0.0),
+        sensor_mm: optics.sensor_mm(0.0),
+        least_cos: libm::cos(incidence_max_rad).max(0.0),
+    };
     let side = side_of(solid);
     let mut faces = Vec::new();
     for (index, surface) in solid.faces().iter().enumerate() {
@@ -111,6 +116,34 @@ pub(super) fn visible_faces(
     Ok(faces)
 }
 
+/// Laser and sensor, which travel with the column, where they are at x = 0.
+#[derive(Debug, Clone, Copy)]
+struct Viewers {
+    laser_mm: Vec3,
+    sensor_mm: Vec3,
+    /// Cosine of the laser's angle of incidence beyond which no light comes back.
+    least_cos: f64,
+}
+
+impl Viewers {
+    /// Whether light comes back from a point.
+    fn see(&self, normal: Vec3, point: Vec3) -> bool {
+        let laser = above(self.laser_mm, normal, point);
+        let distance_mm = (self.laser_mm + Vec3::X * point.x).distance(point);
+        laser > self.least_cos * distance_mm && above(self.sensor_mm, normal, point) > 0.0
+    }
+
+    /// Whether light comes back from a plane face; from part of one is not foreseen, since
+    /// where it ends is no straight line.
+    fn light(&self, index: usize, normal: Vec3, outline: &[Vec3]) -> Result<bool, TruthError> {
+        match outline.iter().filter(|p| self.see(normal, **p)).count() {
+            0 => Ok(false),
+            all if all == outline.len() => Ok(true),
+            _ => Err(TruthError::Grazed(index)),
+        }
+    }
+}
+
 /// How far a viewer that travels with the column is above the tangent plane at a point.
 fn above(viewer_at_0: Vec3, normal: Vec3, point: Vec3) -> f64 {
     normal.dot(viewer_at_0 + Vec3::X * point.x - point)
@@ -126,7 +159,7 @@ fn polygon(
     index: usize,
     normal: Vec3,
     offset_mm: f64,
-    viewers: [Vec3; 2],
+    viewers: Viewers,
     id: FaceId,
 ) -> Result<Option<VisibleFace>, TruthError> {
     let (u, v) = basis(normal);
@@ -146,10 +179,10 @@ fn polygon(
             corners = clip(&corners, |p| limit - across.dot(p));
         }
     }
-    for viewer in viewers {
+    for viewer in [viewers.laser_mm, viewers.sensor_mm] {
         corners = clip(&corners, |p| above(viewer, normal, p));
     }
-    if corners.len() < 3 {
+    if corners.len() < 3 || !viewers.light(index, normal, &corners)? {
         return Ok(None);
     }
     let area_mm2 = edges(&corners)
@@ -226,8 +259,8 @@ fn side_of(solid: &ConvexSolid) -> Option<Side> {
 
 impl Side {
     /// The direction across the axis that faces the viewers.
-    fn facing(&self, viewers: [Vec3; 2]) -> Vec3 {
-        let towards = (viewers[0] + viewers[1]) / 2.0 - self.base_mm;
+    fn facing(&self, viewers: Viewers) -> Vec3 {
+        let towards = (viewers.laser_mm + viewers.sensor_mm) / 2.0 - self.base_mm;
         let flat = Vec3::new(0.0, towards.y, towards.z);
         (flat - self.axis * self.axis.dot(flat)).normalize_or_zero()
     }
@@ -242,11 +275,11 @@ impl Side {
     }
 
     /// The angle to one side of `facing` up to which both viewers see the side at a height.
-    fn limit(&self, facing: Vec3, viewers: [Vec3; 2], height_mm: f64, sign: f64) -> f64 {
+    fn limit(&self, facing: Vec3, viewers: Viewers, height_mm: f64, sign: f64) -> f64 {
         let seen = |angle: f64| {
             let normal = self.normal(facing, angle);
             let point = self.point(facing, angle, height_mm);
-            viewers.iter().all(|v| above(*v, normal, point) > 0.0)
+            viewers.see(normal, point)
         };
         let (mut inside, mut outside) = (0.0, sign * PI);
         for _ in 0..60 {
@@ -260,12 +293,12 @@ impl Side {
         inside
     }
 
-    fn visible(&self, viewers: [Vec3; 2], id: FaceId) -> Option<VisibleFace> {
+    fn visible(&self, viewers: Viewers, id: FaceId) -> Option<VisibleFace> {
         const STEPS: usize = 256;
         let facing = self.facing(viewers);
         let normal = self.normal(facing, 0.0);
         let middle = self.point(facing, 0.0, (self.low_mm + self.high_mm) / 2.0);
-        if viewers.iter().any(|v| above(*v, normal, middle) <= 0.0) {
+        if !viewers.see(normal, middle) {
             return None;
         }
         let height =
@@ -332,7 +365,7 @@ fn disc(
     index: usize,
     normal: Vec3,
     offset_mm: f64,
-    viewers: [Vec3; 2],
+    viewers: Viewers,
     id: FaceId,
 ) -> Result<Option<VisibleFace>, TruthError> {
     let turn = normal.dot(side.axis);
@@ -344,10 +377,10 @@ fn disc(
     let rim = |i: usize| side.point(facing, TAU * i as f64 / CHORDS as f64, height_mm);
     let circle: Vec<Vec3> = (0..CHORDS).map(rim).collect();
     let mut outline_mm = circle.clone();
-    for viewer in viewers {
+    for viewer in [viewers.laser_mm, viewers.sensor_mm] {
         outline_mm = clip(&outline_mm, |p| above(viewer, normal, p));
     }
-    if outline_mm.len() < 3 {
+    if outline_mm.len() < 3 || !viewers.light(index, normal, &outline_mm)? {
         return Ok(None);
     }
     let (u, v) = basis(normal);
