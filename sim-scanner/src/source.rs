@@ -188,6 +188,9 @@ impl Source {
             },
             Self::Replay(replay) => {
                 let (first, columns) = replay.select(plan);
+                if columns == 0 {
+                    return Err((RejectReason::TableLimit, 0));
+                }
                 Accepted {
                     columns,
                     spacing_um: replay.spacing_um(),

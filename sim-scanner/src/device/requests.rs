@@ -24,10 +24,10 @@ impl Device {
             HostMessage::Abort(_) => {
                 self.halt(ScanEndReason::Closed, now);
                 self.scan = None;
-                self.once.forget();
                 self.log.push(Event::Aborted);
                 return self.send(&Frame::new(packet.tag, &Aborted {}));
             }
+            HostMessage::Grant(_) | HostMessage::Resend(_) if self.session.is_none() => return,
             _ if self.session.is_none() => {
                 return self.reject(&packet, RejectReason::NoSession, 0);
             }

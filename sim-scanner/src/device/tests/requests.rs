@@ -11,6 +11,12 @@ fn a_banner_comes_first_and_nothing_is_done_without_a_session() {
         "{told:?}"
     );
     assert_eq!(host.refusal(&Identify {}), RejectReason::NoSession);
+    host.send(&Grant {
+        scan_id: 9,
+        acknowledged_below: 0,
+        send_below: 5,
+    });
+    assert!(host.told().is_empty(), "a grant is never answered");
     assert!(matches!(host.ask(&Abort {}), DeviceMessage::Aborted(_)));
     let DeviceMessage::HelloReply(reply) = host.greet(1) else {
         panic!("a session opens")

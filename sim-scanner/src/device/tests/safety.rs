@@ -64,6 +64,22 @@ fn abort_stops_everything_at_once() {
 }
 
 #[test]
+fn a_late_copy_of_the_scan_request_starts_nothing_after_an_abort() {
+    let mut host = Host::ready();
+    let plan = host.plan();
+    let scan = ScanRequest {
+        scan_id: 9,
+        credits: 2,
+        plan,
+    };
+    let request = Frame::new(777, &scan);
+    host.link.send(request.as_bytes());
+    host.ask(&Abort {});
+    host.link.send(request.as_bytes());
+    assert_eq!(host.status().activity, Activity::Idle);
+}
+
+#[test]
 fn faults_end_a_scan_and_must_be_mended_before_the_next() {
     let mut host = Host::ready();
     host.scan(4);
