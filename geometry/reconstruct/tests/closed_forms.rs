@@ -230,3 +230,24 @@ fn a_cylinder_seen_from_above_has_two_smooth_faces() {
     }
     assert!(done.metrics.snr_db > 25.0);
 }
+
+#[test]
+fn ragged_labels_keep_the_house_plain() {
+    // Each node is classified where it is displaced to, by a third of a pitch in each
+    // direction: what noise does to segmentation along outlines and creases.
+    for k in 1..4 {
+        let (parts, pitch) = (house(0.17 * f64::from(k)), 0.45);
+        let (image, map) = common::ragged_scene(&parts, pitch, (264, 256), 0.05, 0.33 * pitch);
+        let done = run(&image, &map, Method::Relief);
+        assert_eq!(done.model.faces.len(), 4);
+        let found = done.model.vertices.len();
+        println!("{found} vertices, {:?}, {:?}", done.metrics, done.warnings);
+        assert!(found <= corners(&parts) + 4, "{found}");
+        for face in &done.model.faces {
+            let part = part_of(face, &parts, &image, &map);
+            let off = hausdorff(&outline(face), &part.outline) / pitch;
+            println!("  {off}");
+            assert!(off < 0.5, "{off}");
+        }
+    }
+}

@@ -66,8 +66,8 @@ const VERTEX_CLEARANCE: f64 = 1.0;
 /// Farthest a junction moves from its corner of the lattice, pitches.
 const JUNCTION_REACH: f64 = 1.0;
 
-/// Farthest the middle of a crack may lie from the drawn border, pitches: half a pitch
-/// is the width of a digital line, the rest is for uneven borders.
+/// Farthest the filtered border may lie from the drawn one, pitches. Filtering cuts a
+/// right angle by less; single nodes that stick out do not count.
 const FARTHEST: f64 = 1.25;
 
 /// A border with the samples and division its present level asks for.
@@ -328,7 +328,7 @@ fn faults(
     bad
 }
 
-/// True when a drawn border leaves its samples.
+/// True when a drawn border leaves the traced one.
 fn strays(samples: &Samples, outline: &[[f64; 2]]) -> bool {
     let mut length = vec![0.0];
     for pair in outline.windows(2) {
@@ -344,7 +344,7 @@ fn strays(samples: &Samples, outline: &[[f64; 2]]) -> bool {
     let total = total.max(1e-9);
     let reach = 6.0 + 0.1 * drawn;
     samples
-        .points
+        .smooth
         .iter()
         .zip(&samples.length)
         .any(|(point, at)| {

@@ -6,3 +6,4 @@ pub(crate) mod map;
 pub(crate) mod path;
 pub(crate) mod segments;
 pub(crate) mod separate;
+pub(crate) mod sums;

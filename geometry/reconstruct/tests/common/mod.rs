@@ -55,8 +55,19 @@ pub(crate) fn noise(column: usize, row: usize, seed: u64) -> f64 {
 pub(crate) fn scene(
     parts: &[Part],
     pitch_mm: f64,
+    size: (usize, usize),
+    noise_mm: f64,
+) -> (RangeImage, RegionMap) {
+    ragged_scene(parts, pitch_mm, size, noise_mm, 0.0)
+}
+
+/// The same with nodes displaced at random before it is decided which part has them.
+pub(crate) fn ragged_scene(
+    parts: &[Part],
+    pitch_mm: f64,
     (columns, rows): (usize, usize),
     noise_mm: f64,
+    jitter_mm: f64,
 ) -> (RangeImage, RegionMap) {
     let origin = (-(columns as i64) / 2, -(rows as i64) / 2);
     let mut image = RangeImage::masked(Lattice { pitch_mm }, origin.0, origin.1, columns, rows);
@@ -64,7 +75,9 @@ pub(crate) fn scene(
     for column in 0..columns {
         for row in 0..rows {
             let p = [image.x_mm(column), image.y_mm(row)];
-            if let Some(k) = parts.iter().position(|part| contains(&part.outline, p)) {
+            let shift = [21, 22].map(|s| jitter_mm * noise(column, row, s));
+            let seen = [p[0] + shift[0], p[1] + shift[1]];
+            if let Some(k) = parts.iter().position(|part| contains(&part.outline, seen)) {
                 let z = (parts[k].height)(p[0], p[1]) + noise_mm * noise(column, row, 5);
                 image.set_z_mm(column, row, Some(z));
                 labels[column * rows + row] = k as u16 + 1;
@@ -157,14 +170,18 @@ pub(crate) fn part_of<'a>(
     image: &RangeImage,
     map: &RegionMap,
 ) -> &'a Part {
-    let node = map
+    let mut votes = vec![0; parts.len()];
+    for (node, _) in map
         .raw_labels()
         .iter()
-        .position(|&l| l == face.region)
-        .unwrap();
-    let p = [image.x_mm(node / map.rows()), image.y_mm(node % map.rows())];
-    parts
-        .iter()
-        .find(|part| contains(&part.outline, p))
-        .unwrap()
+        .enumerate()
+        .filter(|n| *n.1 == face.region)
+    {
+        let p = [image.x_mm(node / map.rows()), image.y_mm(node % map.rows())];
+        if let Some(k) = parts.iter().position(|part| contains(&part.outline, p)) {
+            votes[k] += 1;
+        }
+    }
+    let most = (0..parts.len()).max_by_key(|&k| votes[k]).unwrap();
+    &parts[most]
 }
