@@ -1,12 +1,26 @@
 //! What a processed scan leaves behind: CAD file, pictures, report, manifest.
+//!
+//! [`write`](fn@write) fills a directory that nobody looks at yet and syncs it; the caller
+//! puts it in place by one rename. [`write_atomically`] is for a single file.
+//!
+//! The bytes follow from the arguments alone, timings in the report apart: the time of
+//! the scan is given by the caller.
 
-pub mod file;
-pub mod manifest;
+mod export;
+mod file;
+mod manifest;
 pub mod picture;
 pub mod report;
 mod stopwatch;
+mod summary;
+mod write;
 
+pub use export::{CadOptions, Entities, WriteError, file_stem, write_iges};
 pub use file::{sha256_of, sync_directory, write_atomically};
 pub use manifest::{MANIFEST_NAME, Manifest, ManifestFile};
-pub use report::Report;
+pub use report::{Report, ScanReport};
 pub use stopwatch::Stopwatch;
+pub use write::{
+    DeliverError, Delivered, Inputs, RANGE_PICTURE_NAME, REGIONS_PICTURE_NAME, REPORT_NAME, write,
+    write_pictures,
+};

@@ -81,6 +81,12 @@ pub struct SettingsReport {
     pub estimator: String,
     /// Clusters the segmentation begins with.
     pub clusters: usize,
+    /// Change of direction at which two surfaces are kept apart.
+    pub crease_angle_rad: f64,
+    /// Offset at which two surfaces are kept apart, in pitches.
+    pub step_factor: f64,
+    /// Smaller regions are left out.
+    pub minimum_nodes: usize,
     /// How far a fitted surface may lie from the nodes.
     pub tolerance_mm: f64,
     /// IGES entities of the surfaces: 114 or 128.
@@ -118,10 +124,12 @@ pub struct RegionsReport {
 pub struct RegionReport {
     /// Its label, from 1.
     pub label: u16,
-    /// Name of its face in the CAD file; `null` where no face could be made of it.
-    pub face: Option<String>,
-    /// What its surface is.
+    /// What its surface is; `none` where no face could be made of it.
     pub kind: String,
+    /// Names of its faces in the CAD file.
+    pub faces: Vec<String>,
+    /// Patches of its surfaces, in all.
+    pub patches: usize,
     /// Its nodes in the range image.
     pub nodes: usize,
     /// Root mean square distance of the nodes from the surface, along z.
@@ -141,9 +149,4 @@ pub struct ModelReport {
     pub edges_shared: usize,
     /// Edges that bound one face only.
     pub free_edges: usize,
-}
-
-/// The number, if it is one that JSON can carry.
-pub(crate) fn finite(number: f64) -> Option<f64> {
-    number.is_finite().then_some(number)
 }

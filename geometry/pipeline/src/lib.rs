@@ -1,5 +1,19 @@
 //! The whole road from a range image to a model, stage by stage.
+//!
+//! ```text
+//! columns --> regrid --> RangeImage --> segment --> RegionMap --> reconstruct --> Model
+//!             (process_columns)         (process ............................)
+//! ```
+//!
+//! Everything is pure: the caller brings a monitor for progress and cancellation, and an
+//! [`Observer`] learns when each stage begins, so that time is measured outside.
 
+mod method;
 mod observer;
+mod process;
+mod settings;
 
+pub use method::{Method, UnknownMethod};
 pub use observer::{Observer, Stage};
+pub use process::{Outcome, PipelineError, process, process_columns};
+pub use settings::{Settings, SettingsError};

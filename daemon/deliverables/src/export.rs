@@ -1,0 +1,104 @@
+//! The model as a CAD file.
+
+use std::io::Write;
+
+use cad_exchange::iges;
+use jiff::Timestamp;
+use jiff::tz::TimeZone;
+use reconstruct::Model;
+
+pub use cad_exchange::iges::{Entities, WriteError};
+
+/// What the user may say about the CAD file.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct CadOptions {
+    /// Which IGES entities carry the shape.
+    pub entities: Entities,
+    /// Who made the model; may be empty.
+    pub author: String,
+    /// The author's organisation; may be empty.
+    pub organisation: String,
+}
+
+impl CadOptions {
+    /// Number of the surfaces' entity type.
+    #[must_use]
+    pub fn entity_number(&self) -> u16 {
+        match self.entities {
+            Entities::Parametric114 => 114,
+            Entities::Rational128 => 128,
+        }
+    }
+}
+
+/// Writes a model as IGES. The bytes depend on nothing but the arguments: the service and
+/// `relief convert` both come through here.
+///
+/// # Errors
+/// As [`iges::write`].
+pub fn write_iges(
+    model: &Model,
+    name: &str,
+    timestamp: Timestamp,
+    cad: &CadOptions,
+    mut sink: impl Write,
+) -> Result<(), WriteError> {
+    let stem = file_stem(name);
+    let time = timestamp
+        .to_zoned(TimeZone::UTC)
+        .strftime("%Y%m%d.%H%M%S")
+        .to_string();
+    let mut options = iges::WriteOptions::new(stem.clone(), time);
+    options.file_name = format!("{stem}.igs");
+    options.entities = cad.entities;
+    options.author.clone_from(&cad.author);
+    options.organization.clone_from(&cad.organisation);
+    iges::write(model, &options, &mut sink)?;
+    Ok(())
+}
+
+/// A name made fit for a file: no separators, no control characters, no leading dot or
+/// dash, not empty, at most 100 characters.
+#[must_use]
+pub fn file_stem(name: &str) -> String {
+    let cleaned: String = name
+        .trim()
+        .chars()
+        .map(|c| {
+            if c.is_control() || "/\\:*?\"<>|".contains(c) {
+                '_'
+            } else {
+                c
+            }
+        })
+        .take(100)
+        .collect();
+    let stem = cleaned.trim_start_matches(['.', '-', ' ']).trim_end();
+    if stem.is_empty() {
+        "scan".to_owned()
+    } else {
+        stem.to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_become_fit_for_files() {
+        for (name, stem) in [
+            ("house", "house"),
+            (" front cover 7 ", "front cover 7"),
+            ("../../etc/passwd", "_.._etc_passwd"),
+            ("a/b\\c:d\u{7}", "a_b_c_d_"),
+            ("", "scan"),
+            ("...", "scan"),
+            ("-rf", "rf"),
+            ("geh\u{e4}use", "geh\u{e4}use"),
+        ] {
+            assert_eq!(file_stem(name), stem, "{name:?}");
+        }
+        assert_eq!(file_stem(&"x".repeat(500)).len(), 100);
+    }
+}

@@ -1,0 +1,130 @@
+//! The report's figures, taken from an outcome.
+
+use std::collections::BTreeMap;
+
+use pipeline::{Outcome, Settings};
+use range_image::RangeImage;
+use reconstruct::{Face, Model, Surface};
+use regrid::Estimator;
+
+use crate::export::CadOptions;
+use crate::report::{
+    ModelReport, RangeImageReport, RegionReport, RegionsReport, Report, SettingsReport,
+};
+use crate::write::Inputs;
+
+impl Report {
+    /// The report of an outcome; `timings_s` as the stopwatch read.
+    #[must_use]
+    pub fn new(inputs: &Inputs<'_>, timings_s: BTreeMap<String, f64>) -> Self {
+        let reconstruction = &inputs.outcome.reconstruction;
+        let mut warnings = inputs.warnings.clone();
+        warnings.extend(reconstruction.warnings.iter().cloned());
+        let mut versions = inputs.versions.clone();
+        versions.insert("relief".into(), env!("CARGO_PKG_VERSION").into());
+        Self {
+            name: inputs.name.to_owned(),
+            timestamp: inputs.timestamp.to_string(),
+            scan: inputs.scan.clone(),
+            settings: settings(inputs.settings, inputs.cad),
+            range_image: range_image(inputs.image),
+            regions: regions(inputs.outcome),
+            model: model(&reconstruction.model),
+            snr_db: finite(reconstruction.metrics.snr_db),
+            lost_nodes: reconstruction.metrics.lost_nodes,
+            invented_nodes: reconstruction.metrics.invented_nodes,
+            timings_s,
+            warnings,
+            versions,
+        }
+    }
+}
+
+/// The number, if it is one that JSON can carry.
+fn finite(number: f64) -> Option<f64> {
+    number.is_finite().then_some(number)
+}
+
+fn settings(settings: &Settings, cad: &CadOptions) -> SettingsReport {
+    SettingsReport {
+        method: settings.method().as_str().to_owned(),
+        seed: settings.regrid.seed,
+        pitch_mm: settings.regrid.pitch_mm,
+        neighbours: settings.regrid.neighbours,
+        draws: settings.regrid.draws,
+        reach_columns: settings.regrid.reach_columns,
+        estimator: match settings.regrid.estimator {
+            Estimator::LeastMedian => "least-median",
+            Estimator::LeastSquares => "least-squares",
+        }
+        .to_owned(),
+        clusters: settings.segment.clusters,
+        crease_angle_rad: settings.segment.crease_angle_rad,
+        step_factor: settings.segment.step_factor,
+        minimum_nodes: settings.segment.minimum_nodes,
+        tolerance_mm: settings.reconstruct.tolerance_mm,
+        iges_entities: cad.entity_number(),
+    }
+}
+
+fn range_image(image: &RangeImage) -> RangeImageReport {
+    let extent = image.z_extent_mm();
+    RangeImageReport {
+        pitch_mm: image.pitch_mm(),
+        columns: image.columns(),
+        rows: image.rows(),
+        nodes: image.valid_nodes(),
+        z_min_mm: extent.map(|(low, _)| low),
+        z_max_mm: extent.map(|(_, high)| high),
+    }
+}
+
+fn regions(outcome: &Outcome) -> RegionsReport {
+    let faces = &outcome.reconstruction.model.faces;
+    let list: Vec<RegionReport> = outcome
+        .reconstruction
+        .regions
+        .iter()
+        .map(|fit| {
+            let own = || faces.iter().filter(|face| face.region == fit.label);
+            RegionReport {
+                label: fit.label,
+                kind: own().next().map_or("none", kind).to_owned(),
+                faces: own().map(|face| face.name.clone()).collect(),
+                patches: fit.patches,
+                nodes: fit.nodes,
+                rms_mm: finite(fit.rms_mm),
+                max_mm: finite(fit.max_mm),
+                psnr_db: finite(fit.psnr_db),
+            }
+        })
+        .collect();
+    RegionsReport {
+        count: usize::from(outcome.regions.regions()),
+        list,
+    }
+}
+
+fn kind(face: &Face) -> &'static str {
+    match face.surface {
+        Surface::Patches(_) => "bicubic patches",
+    }
+}
+
+fn model(model: &Model) -> ModelReport {
+    let mut uses = vec![0_usize; model.edges.len()];
+    let loops = model
+        .faces
+        .iter()
+        .flat_map(|face| std::iter::once(&face.outer).chain(&face.inner));
+    for coedge in loops.flat_map(|l| &l.coedges) {
+        if let Some(count) = uses.get_mut(coedge.edge.0) {
+            *count += 1;
+        }
+    }
+    ModelReport {
+        faces: model.faces.len(),
+        edges_shared: uses.iter().filter(|&&count| count > 1).count(),
+        free_edges: uses.iter().filter(|&&count| count == 1).count(),
+    }
+}

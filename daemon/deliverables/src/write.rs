@@ -1,0 +1,170 @@
+//! From an outcome to the files of a directory.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::path::Path;
+
+use jiff::Timestamp;
+use pipeline::{Observer, Outcome, Settings, Stage};
+use range_image::{Cancelled, Monitor, RangeImage};
+
+use crate::export::{CadOptions, WriteError, file_stem, write_iges};
+use crate::file::{sync_directory, write_synced};
+use crate::manifest::{MANIFEST_NAME, Manifest, ManifestFile};
+use crate::picture;
+use crate::report::{Report, ScanReport};
+use crate::stopwatch::Stopwatch;
+
+/// Everything that is told about one processed scan.
+#[derive(Debug, Clone)]
+pub struct Inputs<'a> {
+    /// Name of the part or scan.
+    pub name: &'a str,
+    /// When the scan was taken; stands in every file instead of the present time.
+    pub timestamp: Timestamp,
+    /// The range image.
+    pub image: &'a RangeImage,
+    /// What became of it.
+    pub outcome: &'a Outcome,
+    /// The settings that were used.
+    pub settings: &'a Settings,
+    /// About the CAD file.
+    pub cad: &'a CadOptions,
+    /// Where the samples came from.
+    pub scan: ScanReport,
+    /// What the user should know about the source, before the pipeline's own warnings.
+    pub warnings: Vec<String>,
+    /// Versions of further programs that took part, by name (the scanner's firmware).
+    pub versions: BTreeMap<String, String>,
+}
+
+/// Deliverables could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum DeliverError {
+    /// The caller asked for an end.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// The CAD file could not be written.
+    #[error("the CAD file cannot be written: {0}")]
+    Export(#[from] WriteError),
+    /// The file system refused.
+    #[error("cannot write the deliverables: {0}")]
+    Io(#[from] io::Error),
+    /// A document could not be put into JSON.
+    #[error("cannot write the report: {0}")]
+    Json(#[from] serde_json::Error),
+}
+
+/// What was written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Delivered {
+    /// The report, as it stands in `report.json`.
+    pub report: Report,
+    /// The manifest, as it stands in `manifest.json`.
+    pub manifest: Manifest,
+    /// Every file, the manifest last.
+    pub files: Vec<ManifestFile>,
+}
+
+/// Name of the report in a directory of deliverables.
+pub const REPORT_NAME: &str = "report.json";
+/// Name of the range image's picture.
+pub const RANGE_PICTURE_NAME: &str = "range.png";
+/// Name of the regions' picture.
+pub const REGIONS_PICTURE_NAME: &str = "regions.png";
+
+/// Writes `<name>.igs`, `range.png`, `regions.png`, `report.json` and `manifest.json` into
+/// an existing directory that nobody else looks at, and syncs them and it. The caller
+/// then puts the directory in its place by one rename.
+///
+/// The stopwatch that has timed the pipeline goes on with the stages here, so that the
+/// report holds them all; only the time of writing the report itself is missing from it.
+///
+/// # Errors
+/// [`DeliverError`]. What was already written stays for the caller to remove.
+pub fn write(
+    directory: &Path,
+    inputs: &Inputs<'_>,
+    watch: &Stopwatch<'_>,
+) -> Result<Delivered, DeliverError> {
+    let model = &inputs.outcome.reconstruction.model;
+    let mut files = Vec::new();
+
+    watch.check()?;
+    watch.stage(Stage::Export);
+    let cad_name = format!("{}.igs", file_stem(inputs.name));
+    files.push(write_synced::<DeliverError>(
+        directory,
+        &cad_name,
+        |sink| {
+            Ok(write_iges(
+                model,
+                inputs.name,
+                inputs.timestamp,
+                inputs.cad,
+                sink,
+            )?)
+        },
+    )?);
+    watch.progress(1.0);
+
+    watch.check()?;
+    watch.stage(Stage::Pictures);
+    files.extend(write_pictures(directory, inputs)?);
+    watch.progress(1.0);
+
+    let report = Report::new(inputs, watch.read());
+    files.push(write_json(directory, REPORT_NAME, &report)?);
+    let manifest = Manifest {
+        name: report.name.clone(),
+        timestamp: report.timestamp.clone(),
+        files: files.clone(),
+        versions: report.versions.clone(),
+        seed: report.settings.seed,
+        settings: report.settings.clone(),
+    };
+    files.push(write_json(directory, MANIFEST_NAME, &manifest)?);
+    sync_directory(directory)?;
+    Ok(Delivered {
+        report,
+        manifest,
+        files,
+    })
+}
+
+/// Writes the two pictures only.
+///
+/// # Errors
+/// What the file system reports.
+pub fn write_pictures(directory: &Path, inputs: &Inputs<'_>) -> io::Result<[ManifestFile; 2]> {
+    let (image, outcome) = (inputs.image, inputs.outcome);
+    let range = write_synced::<io::Error>(directory, RANGE_PICTURE_NAME, |sink| {
+        picture::write_range(image, inputs.name, sink)
+    })?;
+    let notes: Vec<picture::RegionNote> = outcome
+        .reconstruction
+        .regions
+        .iter()
+        .map(|fit| picture::RegionNote {
+            label: fit.label,
+            text: format!("{:>6} nodes, rms {:.3} mm", fit.nodes, fit.rms_mm),
+        })
+        .collect();
+    let regions = write_synced::<io::Error>(directory, REGIONS_PICTURE_NAME, |sink| {
+        let model = &outcome.reconstruction.model;
+        picture::write_regions(image, &outcome.regions, model, &notes, inputs.name, sink)
+    })?;
+    Ok([range, regions])
+}
+
+fn write_json(
+    directory: &Path,
+    name: &str,
+    document: &impl serde::Serialize,
+) -> Result<ManifestFile, DeliverError> {
+    write_synced(directory, name, |sink| {
+        serde_json::to_writer_pretty(&mut *sink, document)?;
+        sink.write_all(b"\n")?;
+        Ok(())
+    })
+}

@@ -1,0 +1,166 @@
+//! The stages in their order.
+
+use range_image::{Cancelled, Column, RangeImage, RegionMap};
+use reconstruct::{ReconstructError, Reconstruction};
+use regrid::RegridError;
+use segment::SegmentError;
+
+use crate::{Observer, Settings, SettingsError, Stage};
+
+/// What became of a range image.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// Its regions.
+    pub regions: RegionMap,
+    /// The model made of them, and how well it fits.
+    pub reconstruction: Reconstruction,
+    /// The stages that ran, in order.
+    pub stages: Vec<Stage>,
+}
+
+/// Why there is no model.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PipelineError {
+    /// The caller asked for an end.
+    #[error("cancelled")]
+    Cancelled,
+    /// A setting lies outside its limits.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// No node of the grid has a value.
+    #[error("nothing was measured: no node of the grid has a value")]
+    NothingMeasured,
+    /// The grid has values, but no surface.
+    #[error("no surface was found among the {nodes} nodes measured, at a pitch of {pitch_mm} mm")]
+    NoSurface {
+        /// Nodes with a value.
+        nodes: usize,
+        /// Distance of the nodes.
+        pitch_mm: f64,
+    },
+    /// Surfaces were found, but none could be made into a trimmed face.
+    #[error("none of the {regions} regions found could be made into a trimmed face")]
+    NoFace {
+        /// Regions found.
+        regions: usize,
+    },
+    /// The columns could not be regridded.
+    #[error("regridding failed: {0}")]
+    Regrid(RegridError),
+    /// The range image could not be segmented.
+    #[error("segmentation failed: {0}")]
+    Segment(SegmentError),
+    /// The regions could not be reconstructed.
+    #[error("reconstruction failed: {0}")]
+    Reconstruct(ReconstructError),
+}
+
+impl PipelineError {
+    /// What the user can do about it, in plain language; `None` where there is nothing
+    /// to add to the message.
+    #[must_use]
+    pub fn hint(&self) -> Option<&'static str> {
+        match self {
+            Self::NothingMeasured => Some(
+                "check that the part stands in view, that the laser reaches it, and that no \
+                 region of interest excludes it; if samples are there, choose a larger pitch",
+            ),
+            Self::NoSurface { .. } => Some(
+                "what was measured is too scattered or too small; choose a larger pitch or a \
+                 smaller minimum region, or scan with a finer column pitch",
+            ),
+            Self::NoFace { .. } => Some(
+                "the regions are too narrow for their borders to be followed; scan with a finer \
+                 column pitch or choose a smaller grid pitch",
+            ),
+            _ => None,
+        }
+    }
+}
+
+impl From<RegridError> for PipelineError {
+    fn from(error: RegridError) -> Self {
+        match error {
+            RegridError::Cancelled(_) => Self::Cancelled,
+            other => Self::Regrid(other),
+        }
+    }
+}
+
+impl From<SegmentError> for PipelineError {
+    fn from(error: SegmentError) -> Self {
+        match error {
+            SegmentError::Cancelled(_) => Self::Cancelled,
+            other => Self::Segment(other),
+        }
+    }
+}
+
+impl From<ReconstructError> for PipelineError {
+    fn from(error: ReconstructError) -> Self {
+        match error {
+            ReconstructError::Cancelled(_) => Self::Cancelled,
+            ReconstructError::NoFaces { regions, .. } => Self::NoFace { regions },
+            other => Self::Reconstruct(other),
+        }
+    }
+}
+
+impl From<Cancelled> for PipelineError {
+    fn from(_: Cancelled) -> Self {
+        Self::Cancelled
+    }
+}
+
+/// From columns to a model: [`regrid::regrid`], then [`process`].
+///
+/// # Errors
+/// As [`process`], and [`PipelineError::Regrid`].
+pub fn process_columns(
+    columns: impl IntoIterator<Item = Column>,
+    settings: &Settings,
+    observer: &dyn Observer,
+) -> Result<(RangeImage, Outcome), PipelineError> {
+    settings.validate()?;
+    observer.stage(Stage::Regrid);
+    let image = regrid::regrid(columns, &settings.regrid, observer)?;
+    let mut outcome = process(&image, settings, observer)?;
+    outcome.stages.insert(0, Stage::Regrid);
+    Ok((image, outcome))
+}
+
+/// From a range image to a model. The image need not come from `settings.regrid`; that
+/// part is only checked.
+///
+/// # Errors
+/// Any [`PipelineError`] but [`PipelineError::Regrid`]. [`PipelineError::hint`] says what
+/// to do.
+pub fn process(
+    image: &RangeImage,
+    settings: &Settings,
+    observer: &dyn Observer,
+) -> Result<Outcome, PipelineError> {
+    settings.validate()?;
+    observer.check()?;
+    let nodes = image.valid_nodes();
+    if nodes == 0 {
+        return Err(PipelineError::NothingMeasured);
+    }
+
+    observer.stage(Stage::Segment);
+    let regions = segment::segment(image, &settings.segment, observer)?;
+    if regions.regions() == 0 {
+        let pitch_mm = image.pitch_mm();
+        return Err(PipelineError::NoSurface { nodes, pitch_mm });
+    }
+
+    observer.stage(Stage::Reconstruct);
+    let reconstruction =
+        reconstruct::reconstruct(image, &regions, &settings.reconstruct, observer)?;
+    Ok(Outcome {
+        regions,
+        reconstruction,
+        stages: vec![Stage::Segment, Stage::Reconstruct],
+    })
+}

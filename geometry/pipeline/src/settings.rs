@@ -1,0 +1,83 @@
+//! The settings of every stage, and their agreement with each other.
+
+use reconstruct::ReconstructSettings;
+use regrid::RegridSettings;
+use segment::SegmentSettings;
+
+use crate::Method;
+
+/// The settings of every stage that can change the result.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// From columns to the range image.
+    pub regrid: RegridSettings,
+    /// From the range image to regions.
+    pub segment: SegmentSettings,
+    /// From regions to the model.
+    pub reconstruct: ReconstructSettings,
+}
+
+/// A setting that cannot be used. The message says which, its limits, and its value.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{stage}: {message}")]
+pub struct SettingsError {
+    /// The stage it belongs to: `regrid`, `segment` or `reconstruct`.
+    pub stage: &'static str,
+    /// What is wrong with it, and its limits.
+    pub message: String,
+}
+
+impl Settings {
+    /// Defaults for a grid of this pitch, millimetres, with seed 1.
+    #[must_use]
+    pub fn new(pitch_mm: f64) -> Self {
+        Self {
+            regrid: RegridSettings::with_pitch(pitch_mm),
+            segment: SegmentSettings::default(),
+            reconstruct: ReconstructSettings::default(),
+        }
+        .with_seed(1)
+    }
+
+    /// The same settings on one road throughout.
+    #[must_use]
+    pub fn with_method(mut self, method: Method) -> Self {
+        self.segment.method = method.into();
+        self.reconstruct.method = method.into();
+        self
+    }
+
+    /// The same settings with this seed for every random draw.
+    #[must_use]
+    pub fn with_seed(mut self, seed: u64) -> Self {
+        self.regrid.seed = seed;
+        self.segment.seed = seed;
+        self
+    }
+
+    /// The road taken in reconstruction, which names the whole.
+    #[must_use]
+    pub fn method(&self) -> Method {
+        self.reconstruct.method.into()
+    }
+
+    /// Checks every setting against its limits.
+    ///
+    /// # Errors
+    /// The first setting that lies outside.
+    pub fn validate(&self) -> Result<(), SettingsError> {
+        let wrong = |stage, error: &dyn core::error::Error| SettingsError {
+            stage,
+            message: error.to_string(),
+        };
+        self.regrid
+            .validate()
+            .map_err(|error| wrong("regrid", &error))?;
+        self.segment
+            .validate()
+            .map_err(|error| wrong("segment", &error))?;
+        self.reconstruct
+            .validate()
+            .map_err(|error| wrong("reconstruct", &error))
+    }
+}
