@@ -38,7 +38,8 @@ pub struct GraphNode {
     pub z_mm: f64,
     /// The face met.
     pub face: FaceId,
-    /// Whether that point is seen by both laser and sensor along their perspective rays.
+    /// Whether light comes back from that point: laser and sensor both see it along their
+    /// perspective rays, and the beam does not graze it.
     pub seen: bool,
 }
 
@@ -123,10 +124,12 @@ pub fn graph_node(scanner: &Scanner, x_mm: f64, y_mm: f64) -> Option<GraphNode> 
         return None;
     }
     let sees = |viewer| scanner.scene.sees(hit.point_mm, hit.normal, viewer);
+    let beam = (optics.laser_mm(x_mm) - hit.point_mm).normalize_or_zero();
+    let lit = hit.normal.dot(beam) > libm::cos(scanner.noise.incidence_max_rad);
     Some(GraphNode {
         z_mm: hit.point_mm.z,
         face: hit.face,
-        seen: sees(optics.laser_mm(x_mm)) && sees(optics.sensor_mm(x_mm)),
+        seen: lit && sees(optics.laser_mm(x_mm)) && sees(optics.sensor_mm(x_mm)),
     })
 }
 
