@@ -11,6 +11,9 @@ const CORNER_REACH: f64 = 1.5;
 /// Reach of the arc that rounds a joint of two lines too blunt for a vertex, pitches.
 const BLEND_REACH: f64 = 2.0;
 
+/// Share of the shorter side of a polyline's corner that its rounding takes.
+const ROUNDED_SHARE: f64 = 0.3;
+
 /// Shorter pieces are dropped, pitches.
 const NEGLIGIBLE: f64 = 1e-6;
 
@@ -292,8 +295,24 @@ pub(crate) fn polyline(points: &[[f64; 2]]) -> Option<PiecewiseCubic<2>> {
         }
         corners.push(p);
     }
-    for pair in corners.windows(2) {
-        path.line(pair[0], pair[1]);
+    // Corners are rounded a little, inside the triangle that they cut off: readers split
+    // a curve where its tangent jumps.
+    let mut from = *corners.first()?;
+    for (k, pair) in corners.windows(2).enumerate() {
+        let length = norm(minus(pair[1], pair[0]));
+        let along = minus(pair[1], pair[0]).map(|d| d / length);
+        let Some(&next) = corners.get(k + 2) else {
+            path.line(from, pair[1]);
+            break;
+        };
+        let beyond = norm(minus(next, pair[1]));
+        let onward = minus(next, pair[1]).map(|d| d / beyond);
+        let reach = ROUNDED_SHARE * length.min(beyond);
+        let end = [0, 1].map(|d| pair[1][d] - reach * along[d]);
+        let begin = [0, 1].map(|d| pair[1][d] + reach * onward[d]);
+        path.line(from, end);
+        path.arc(end, along, begin, onward);
+        from = begin;
     }
     path.finish()
 }
@@ -472,6 +491,8 @@ mod tests {
     #[test]
     fn a_polyline_merges_straight_runs() {
         let path = polyline(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.5, 0.5]]).unwrap();
-        assert_eq!(path.pieces.len(), 2);
+        // Two lines and the arc between them.
+        assert_eq!(path.pieces.len(), 3);
+        assert!(norm(minus(path.end(), [2.5, 0.5])) < 1e-12);
     }
 }
