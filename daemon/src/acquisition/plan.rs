@@ -1,0 +1,259 @@
+//! From millimetres and degrees to what the scanner is asked for, within its limits.
+
+use range_image::calibration::Head;
+use relief_api::PlanRequest;
+use scanner_protocol::{Identity, Limits, ScanPlan};
+
+/// The scan asked for is not possible on this scanner.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct PlanError(String);
+
+/// A plan and what follows from it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ResolvedPlan {
+    pub(crate) plan: ScanPlan,
+    /// Distance of neighbouring columns, positive.
+    pub(crate) column_pitch_mm: f64,
+}
+
+/// An axis of the scanner in the user's unit.
+struct Axis {
+    name: &'static str,
+    unit: &'static str,
+    origin: f64,
+    per_count: f64,
+    low_counts: i32,
+    high_counts: i32,
+}
+
+impl Axis {
+    fn value(&self, counts: i32) -> f64 {
+        self.origin + f64::from(counts) * self.per_count
+    }
+
+    /// Position in counts; half a count beyond a limit still counts as on it.
+    fn counts(&self, value: f64) -> Result<i32, PlanError> {
+        let counts = ((value - self.origin) / self.per_count).round();
+        if counts >= f64::from(self.low_counts) && counts <= f64::from(self.high_counts) {
+            return Ok(counts as i32);
+        }
+        Err(PlanError(format!(
+            "{value} {unit} is beyond the scanner's {}, which goes from {:.3} to {:.3} {unit}",
+            self.name,
+            self.value(self.low_counts),
+            self.value(self.high_counts),
+            unit = self.unit,
+        )))
+    }
+
+    /// First and last position, each as asked for or else as proposed.
+    fn range(
+        &self,
+        asked: (Option<f64>, Option<f64>),
+        proposed: (i32, i32),
+    ) -> Result<(i32, i32), PlanError> {
+        Ok((
+            asked.0.map_or(Ok(proposed.0), |value| self.counts(value))?,
+            asked.1.map_or(Ok(proposed.1), |value| self.counts(value))?,
+        ))
+    }
+}
+
+/// The scan that is asked for, in this scanner's counts.
+pub(crate) fn resolve(
+    request: &PlanRequest,
+    identity: &Identity,
+) -> Result<ResolvedPlan, PlanError> {
+    let limits = &identity.limits;
+    let calibration = super::calibration(identity);
+    let table = Axis {
+        name: "table",
+        unit: "mm",
+        origin: calibration.table_origin_mm,
+        per_count: calibration.table_count_mm,
+        low_counts: limits.table_min_counts,
+        high_counts: limits.table_max_counts,
+    };
+    let proposed = &limits.proposed;
+    let (first, pitch, columns) = columns(request, &table, limits.max_columns, proposed)?;
+    let lateral = Axis {
+        low_counts: limits.lateral_min_counts,
+        high_counts: limits.lateral_max_counts,
+        ..lateral_axis(request, &calibration.head)?
+    };
+    let asked = match calibration.head {
+        Head::Polar { .. } => (request.angle_first_deg, request.angle_last_deg),
+        Head::Cartesian { .. } => (request.y_first_mm, request.y_last_mm),
+    };
+    let exposure_us = request.exposure_us.unwrap_or(proposed.exposure_us);
+    if exposure_us != 0 && !(limits.min_exposure_us..=limits.max_exposure_us).contains(&exposure_us)
+    {
+        return Err(PlanError(format!(
+            "an exposure of {exposure_us} us is not possible: this scanner takes {} to {} us",
+            limits.min_exposure_us, limits.max_exposure_us
+        )));
+    }
+    let (low, step, samples) = if asked == (None, None) && request.samples.is_none() {
+        (
+            proposed.first_angle_counts,
+            proposed.angle_step_counts,
+            proposed.samples,
+        )
+    } else {
+        laterals(&lateral, asked, request.samples, limits)?
+    };
+    Ok(ResolvedPlan {
+        plan: ScanPlan {
+            first_table_counts: first,
+            pitch_counts: pitch,
+            columns,
+            first_angle_counts: low,
+            angle_step_counts: step,
+            samples,
+            exposure_us,
+        },
+        column_pitch_mm: f64::from(pitch.unsigned_abs()) * calibration.table_count_mm.abs(),
+    })
+}
+
+/// First sample, step and number of samples, when some of it is asked for.
+fn laterals(
+    lateral: &Axis,
+    asked: (Option<f64>, Option<f64>),
+    samples: Option<u16>,
+    limits: &Limits,
+) -> Result<(i32, i32, u16), PlanError> {
+    let proposed = &limits.proposed;
+    let (low, high) = lateral.range(
+        asked,
+        ends(
+            proposed.first_angle_counts,
+            proposed.angle_step_counts,
+            proposed.samples.into(),
+        ),
+    )?;
+    let samples = samples.unwrap_or(proposed.samples);
+    if samples < 2 || samples > limits.max_samples {
+        return Err(PlanError(format!(
+            "{samples} samples in a column are not possible: this scanner takes 2 to {}",
+            limits.max_samples
+        )));
+    }
+    let step = (i64::from(high) - i64::from(low)) / (i64::from(samples) - 1);
+    if step == 0 {
+        return Err(PlanError(format!(
+            "{samples} samples between {:.4} and {:.4} {} are closer than this scanner's \
+             counts: ask for fewer samples or a wider range",
+            lateral.value(low),
+            lateral.value(high),
+            lateral.unit
+        )));
+    }
+    // Between two counts of 32 bits, divided by at least 1.
+    Ok((low, saturated(step), samples))
+}
+
+/// First and last of evenly spaced positions.
+fn ends(first: i32, step: i32, count: u32) -> (i32, i32) {
+    let last = i64::from(first) + i64::from(step) * (i64::from(count) - 1);
+    (first, saturated(last))
+}
+
+fn saturated(counts: i64) -> i32 {
+    counts.clamp(i32::MIN.into(), i32::MAX.into()) as i32
+}
+
+/// First position, pitch and number of columns.
+fn columns(
+    request: &PlanRequest,
+    table: &Axis,
+    max_columns: u32,
+    proposed: &ScanPlan,
+) -> Result<(i32, i32, u32), PlanError> {
+    let asked = (request.x_first_mm, request.x_last_mm);
+    let own = (proposed.first_table_counts, proposed.pitch_counts);
+    if asked == (None, None) && request.pitch_mm.is_none() && request.columns.is_none() {
+        return Ok((own.0, own.1, proposed.columns));
+    }
+    let (first, last) = table.range(asked, ends(own.0, own.1, proposed.columns))?;
+    let span = i64::from(last) - i64::from(first);
+    let pitch_mm = match (request.pitch_mm, request.columns) {
+        // Another range alone keeps the scanner's pitch.
+        (None, None) => Some(f64::from(own.1.unsigned_abs()) * table.per_count),
+        (pitch_mm, _) => pitch_mm,
+    };
+    let (pitch, columns) = match (pitch_mm, request.columns) {
+        (None, columns) => {
+            let columns = i64::from(columns.unwrap_or(proposed.columns));
+            (span / (columns - 1).max(1), columns)
+        }
+        (Some(pitch_mm), columns) => {
+            let counts = (pitch_mm / table.per_count).round();
+            if !(counts >= 1.0 && counts <= f64::from(i32::MAX)) {
+                return Err(PlanError(format!(
+                    "a column pitch of {pitch_mm} mm is not possible: the table's finest step \
+                     is {} mm",
+                    table.per_count
+                )));
+            }
+            let pitch = counts as i64 * if span < 0 { -1 } else { 1 };
+            let columns = columns.map_or(span / pitch + 1, i64::from);
+            // The end must lie on the table too.
+            let end = i64::from(first) + pitch * (columns - 1).max(0);
+            table.counts(table.origin + end as f64 * table.per_count)?;
+            (pitch, columns)
+        }
+    };
+    if columns < 1 || columns > i64::from(max_columns) {
+        return Err(PlanError(format!(
+            "{columns} columns are not possible: this scanner takes 1 to {max_columns}; choose \
+             another range or pitch"
+        )));
+    }
+    if pitch == 0 {
+        return Err(PlanError(format!(
+            "{columns} columns between {:.4} and {:.4} mm are closer than the table's counts: \
+             ask for fewer columns or a wider range",
+            table.value(first),
+            table.value(last)
+        )));
+    }
+    Ok((first, saturated(pitch), columns as u32))
+}
+
+/// The axis along a column; its limits are those of the table until set.
+fn lateral_axis(request: &PlanRequest, head: &Head) -> Result<Axis, PlanError> {
+    let (name, unit, per_count) = match *head {
+        Head::Polar {
+            angle_count_rad, ..
+        } => {
+            if request.y_first_mm.or(request.y_last_mm).is_some() {
+                return Err(PlanError(
+                    "this scanner turns its ray: give angle_first_deg and angle_last_deg \
+                     instead of y_first_mm and y_last_mm"
+                        .into(),
+                ));
+            }
+            ("field of view", "degrees", angle_count_rad.to_degrees())
+        }
+        Head::Cartesian { count_mm } => {
+            if request.angle_first_deg.or(request.angle_last_deg).is_some() {
+                return Err(PlanError(
+                    "this scanner is a profile sensor: give y_first_mm and y_last_mm instead \
+                     of angle_first_deg and angle_last_deg"
+                        .into(),
+                ));
+            }
+            ("field of view", "mm", count_mm)
+        }
+    };
+    Ok(Axis {
+        name,
+        unit,
+        origin: 0.0,
+        per_count,
+        low_counts: 0,
+        high_counts: 0,
+    })
+}

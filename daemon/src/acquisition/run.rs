@@ -1,0 +1,354 @@
+//! One scan from its start to its end.
+//!
+//! ```text
+//! driver --> feed thread --> bounded channel --> this thread: journal, sync,
+//!                                                acknowledge, regrid, tell
+//! ```
+//!
+//! Everything behind the channel may block for a moment without the scanner noticing;
+//! when it blocks for longer, the scanner's credit runs out and the table waits.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::time::Instant;
+
+use range_image::Calibration;
+use regrid::Regridder;
+use relief_api::{Event, LiveColumn, Scan, ScanState, ScannerLink};
+use scan_record::{EndCause, Header, JournalWriter, RawColumn, RawSample};
+use scanner_driver::{ScanStream, ScannerError};
+use scanner_protocol::Identity;
+
+use super::grid_file::GridFile;
+use super::plan::ResolvedPlan;
+use super::{AbortRequest, calibration};
+use crate::config::{JournalConfig, Processing};
+use crate::service::{KeptGrid, Service};
+
+/// Columns between the driver and the journal.
+const CHANNEL_COLUMNS: usize = 64;
+
+/// Everything a scan needs to know at its start.
+pub(crate) struct Ticket {
+    pub(crate) scan: Scan,
+    pub(crate) plan: ResolvedPlan,
+    pub(crate) identity: Identity,
+    pub(crate) processing: Processing,
+    pub(crate) abort: Arc<AbortRequest>,
+}
+
+/// Takes the scan, keeps it, and queues its job. Never fails: what goes wrong becomes the
+/// scan's state.
+pub(crate) fn run(service: &Arc<Service>, ticket: Ticket) {
+    let id = ticket.scan.id.clone();
+    let outcome = take(service, &ticket);
+    let (state, reason) = match (outcome, ticket.abort.reason()) {
+        (Ok(()), _) => (ScanState::Complete, None),
+        (Err(_), Some(reason)) => (ScanState::Aborted, Some(reason)),
+        (Err(problem), None) => (ScanState::Failed, Some(problem)),
+    };
+    match &reason {
+        None => tracing::info!(scan = %id, "scan complete"),
+        Some(reason) => {
+            tracing::warn!(scan = %id, state = state.as_str(), %reason, "scan ended early")
+        }
+    }
+    service.end_scan(&id, state, reason);
+}
+
+/// The text of an error is the scan's reason.
+fn take(service: &Arc<Service>, ticket: &Ticket) -> Result<(), String> {
+    let text = |error: ScannerError| error.to_string();
+    let check_abort = || match ticket.abort.reason() {
+        Some(reason) => Err(reason),
+        None => Ok(()),
+    };
+    let scanner = &*service.scanner;
+    check_abort()?;
+    if !scanner.status().map_err(text)?.homed {
+        scanner.home().map_err(text)?;
+    }
+    check_abort()?;
+    let stream = scanner.start_scan(&ticket.plan.plan).map_err(text)?;
+    let info = stream.info();
+    tracing::info!(scan = %ticket.scan.id, columns = info.columns, "scan begins");
+    service.note_scanner(ScannerLink::Scanning, None);
+    let scan = service.update_active(|scan| {
+        scan.columns_planned = info.columns;
+        scan.state = ScanState::Scanning;
+    });
+    if let Some(scan) = scan {
+        service.keep_scan(&scan).map_err(|e| e.to_string())?;
+    }
+    let header = header(ticket, f64::from(info.spacing_um) * 1e-3);
+    // Dropped on the way out if there is no place to keep its columns, the stream itself
+    // turns the laser off.
+    Keeper::new(service, ticket, &header)?.keep_all(stream)
+}
+
+/// What stands at the head of the journal.
+fn header(ticket: &Ticket, sample_spacing_mm: f64) -> Header {
+    let identity = &ticket.identity;
+    let plan = &ticket.plan.plan;
+    let json = |value: &serde_json::Value| value.to_string().into_bytes();
+    Header {
+        calibration: calibration(identity),
+        column_pitch_mm: ticket.plan.column_pitch_mm,
+        sample_spacing_mm,
+        identity: json(&serde_json::json!({
+            "model": identity.model.as_str(),
+            "serial": identity.serial.as_str(),
+            "firmware": identity.firmware.as_str(),
+        })),
+        plan: json(&serde_json::json!({
+            "first_table_counts": plan.first_table_counts,
+            "pitch_counts": plan.pitch_counts,
+            "columns": plan.columns,
+            "first_angle_counts": plan.first_angle_counts,
+            "angle_step_counts": plan.angle_step_counts,
+            "samples": plan.samples,
+            "exposure_us": plan.exposure_us,
+        })),
+        // These types serialise to JSON whatever they hold.
+        settings: serde_json::to_vec(&ticket.processing).unwrap_or_default(),
+        metadata: serde_json::to_vec(&ticket.scan).unwrap_or_default(),
+    }
+}
+
+/// What a column meets on its way.
+struct Keeper<'a> {
+    service: &'a Service,
+    id: &'a str,
+    abort: &'a AbortRequest,
+    policy: JournalConfig,
+    calibration: Calibration,
+    journal: JournalWriter,
+    live: Option<Live>,
+}
+
+/// The regridding that runs along; a scan is kept even when this fails.
+struct Live {
+    regridder: Regridder,
+    grid: KeptGrid,
+    file: GridFile,
+}
+
+enum Fed {
+    Column(RawColumn),
+    End(Result<(), ScannerError>),
+}
+
+impl<'a> Keeper<'a> {
+    fn new(service: &'a Service, ticket: &'a Ticket, header: &Header) -> Result<Self, String> {
+        let id = ticket.scan.id.as_str();
+        let path = service.journal_path(id);
+        let journal = JournalWriter::create(&path, header)
+            .map_err(|error| format!("{}: {error}", path.display()))?;
+        let settings = ticket
+            .processing
+            .pipeline_settings(header.column_pitch_mm, header.sample_spacing_mm)
+            .regrid;
+        let live = Regridder::new(settings.clone())
+            .map_err(|error| error.to_string())
+            .and_then(|regridder| {
+                Ok(Live {
+                    regridder,
+                    file: GridFile::create(&service.grid_path(id)).map_err(|e| e.to_string())?,
+                    grid: KeptGrid { settings },
+                })
+            })
+            .inspect_err(|problem| tracing::warn!(scan = id, %problem, "no live range image"))
+            .ok();
+        Ok(Self {
+            service,
+            id,
+            abort: &ticket.abort,
+            policy: service.config().journal,
+            calibration: header.calibration,
+            journal,
+            live,
+        })
+    }
+
+    fn keep_all(mut self, stream: ScanStream) -> Result<(), String> {
+        let acknowledger = stream.acknowledger();
+        let (sender, receiver) = sync_channel(CHANNEL_COLUMNS);
+        let result = std::thread::scope(|scope| {
+            let feeder = std::thread::Builder::new()
+                .name("scan-feed".into())
+                .spawn_scoped(scope, move || feed(stream, &sender))
+                .map_err(|error| format!("cannot start a thread: {error}"))?;
+            let result = self.drain(&receiver, &|index| acknowledger.acknowledge(index));
+            // With the receiver gone the feeder ends at its next column; an abort wakes a
+            // feeder that waits for one.
+            drop(receiver);
+            if result.is_err()
+                && !feeder.is_finished()
+                && let Err(error) = self.service.scanner.abort()
+            {
+                tracing::warn!(%error, "cannot tell the scanner to stop");
+            }
+            result
+        });
+        let cause = match (&result, self.abort.reason()) {
+            (Ok(()), _) => EndCause::Complete,
+            (Err(_), Some(reason)) => EndCause::Aborted(reason),
+            (Err(problem), None) => EndCause::Fault(problem.clone()),
+        };
+        let closed = self.journal.finish(&cause).map_err(|e| e.to_string());
+        let result = result.and(closed.map(drop));
+        if let Some(live) = self.live.take() {
+            finish_live(self.service, self.id, live, result.is_ok());
+        }
+        result
+    }
+
+    /// Keeps column after column until the end. One sync serves all columns that came
+    /// while the one before was under way, or within the configured interval.
+    fn drain(&mut self, receiver: &Receiver<Fed>, acknowledge: &dyn Fn(u32)) -> Result<(), String> {
+        let mut batch: Vec<RawColumn> = Vec::new();
+        let mut due = Instant::now();
+        loop {
+            let fed = if batch.is_empty() {
+                receiver.recv().map_err(|_| RecvTimeoutError::Disconnected)
+            } else {
+                receiver.recv_timeout(due.saturating_duration_since(Instant::now()))
+            };
+            match fed {
+                Ok(Fed::Column(column)) => {
+                    if batch.is_empty() {
+                        due = Instant::now() + self.policy.interval();
+                    }
+                    self.journal.append(&column).map_err(|e| e.to_string())?;
+                    batch.push(column);
+                    if batch.len() >= self.policy.sync_columns as usize {
+                        self.commit(&mut batch, acknowledge)?;
+                    }
+                }
+                Ok(Fed::End(end)) => {
+                    self.commit(&mut batch, acknowledge)?;
+                    return end.map_err(|e| e.to_string());
+                }
+                Err(RecvTimeoutError::Timeout) => self.commit(&mut batch, acknowledge)?,
+                Err(RecvTimeoutError::Disconnected) => {
+                    self.commit(&mut batch, acknowledge)?;
+                    return Err("the scanner's driver ended without a word".into());
+                }
+            }
+        }
+    }
+
+    /// Syncs, and only then acknowledges and passes on.
+    fn commit(
+        &mut self,
+        batch: &mut Vec<RawColumn>,
+        acknowledge: &dyn Fn(u32),
+    ) -> Result<(), String> {
+        if batch.is_empty() {
+            return Ok(());
+        }
+        self.journal.sync().map_err(|e| e.to_string())?;
+        for column in batch.iter() {
+            acknowledge(column.index);
+        }
+        let before = self.journal.columns() - batch.len() as u32;
+        for (column, kept) in batch.drain(..).zip(before + 1..) {
+            let scan = self.service.update_active(|scan| scan.columns = kept);
+            let columns_planned = scan.map_or(0, |scan| scan.columns_planned);
+            let live = self.regrid(&column);
+            if self.service.hub.has_listeners() {
+                self.service.hub.tell(Event::Column {
+                    scan: self.id.to_owned(),
+                    columns: kept,
+                    columns_planned,
+                    samples: column.samples.len() as u32,
+                    x_mm: self.calibration.x_mm(column.table_counts),
+                    pitch_mm: self
+                        .live
+                        .as_ref()
+                        .map_or(0.0, |live| live.grid.settings.pitch_mm),
+                    live,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The grid columns that this column finished, for showing.
+    fn regrid(&mut self, column: &RawColumn) -> Vec<LiveColumn> {
+        let Some(live) = &mut self.live else {
+            return Vec::new();
+        };
+        let finished = live
+            .regridder
+            .push(column.calibrated(&self.calibration))
+            .map_err(|error| error.to_string())
+            .and_then(|finished| {
+                for column in &finished {
+                    live.file.append(column).map_err(|e| e.to_string())?;
+                }
+                Ok(finished)
+            });
+        match finished {
+            Ok(finished) => finished
+                .iter()
+                .map(|column| LiveColumn::new(column.i, column.j_first, &column.z_mm))
+                .collect(),
+            Err(problem) => {
+                // The job regrids from the journal and reports what is wrong.
+                tracing::warn!(scan = self.id, %problem, "the live range image ends here");
+                self.live = None;
+                Vec::new()
+            }
+        }
+    }
+}
+
+/// Puts the rest of the grid aside for the job, or forgets it for a scan without one.
+fn finish_live(service: &Service, id: &str, mut live: Live, wanted: bool) {
+    let path = service.grid_path(id);
+    let rest = live.regridder.finish();
+    let written = rest
+        .iter()
+        .try_for_each(|column| live.file.append(column))
+        .and_then(|()| live.file.finish());
+    match written {
+        Ok(()) if wanted => service.keep_grid(id, live.grid),
+        _ => service.forget_grid(id),
+    }
+    tracing::debug!(scan = id, grid = %path.display(), wanted, "live range image finished");
+}
+
+/// Moves columns from the driver to the channel until either ends.
+fn feed(mut stream: ScanStream, sender: &SyncSender<Fed>) {
+    loop {
+        let fed = match stream.next() {
+            Ok(Some(column)) => Fed::Column(raw(column)),
+            Ok(None) => Fed::End(Ok(())),
+            Err(error) => Fed::End(Err(error)),
+        };
+        let last = matches!(fed, Fed::End(_));
+        if sender.send(fed).is_err() || last {
+            return;
+        }
+    }
+}
+
+/// The driver's column as the journal keeps it.
+fn raw(column: scanner_driver::RawColumn) -> RawColumn {
+    RawColumn {
+        index: column.index,
+        table_counts: column.table_counts,
+        dropouts: column.dropouts,
+        samples: column
+            .samples
+            .into_iter()
+            .map(|sample| RawSample {
+                lateral_counts: sample.lateral_counts,
+                range_counts: sample.range_counts,
+                intensity: sample.intensity,
+                saturated: sample.saturated,
+            })
+            .collect(),
+    }
+}

@@ -1,0 +1,125 @@
+//! From a file's text to a configuration, or to an error that a person can act on.
+
+use std::path::{Path, PathBuf};
+
+use super::Config;
+
+/// The configuration cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("cannot read the configuration {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// Something in the file is wrong.
+    #[error("{}, line {line}, column {column}: {message}", path.display())]
+    Wrong {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Column in characters, from 1.
+        column: usize,
+        /// What is wrong and what to do.
+        message: String,
+    },
+    /// Values that are each possible do not go together.
+    #[error("{}, section [{section}]: {message}", path.display())]
+    Inconsistent {
+        /// The file.
+        path: PathBuf,
+        /// The section.
+        section: &'static str,
+        /// What is wrong and what to do.
+        message: String,
+    },
+}
+
+impl Config {
+    /// Reads a configuration file.
+    ///
+    /// # Errors
+    /// Any [`ConfigError`].
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::parse(&text, path)
+    }
+
+    /// Reads a configuration from text; `path` is for the messages.
+    ///
+    /// # Errors
+    /// [`ConfigError::Wrong`] and [`ConfigError::Inconsistent`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self, ConfigError> {
+        let config: Self = toml::from_str(text).map_err(|error| {
+            let start = error.span().map_or(0, |span| span.start).min(text.len());
+            let before = text.get(..start).unwrap_or_default();
+            let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+            let mut message = with_nearest_name(error.message());
+            if error.message().starts_with("unknown field")
+                && let Some(section) = section_of(before)
+            {
+                message =
+                    message.replacen("unknown key", &format!("in [{section}] unknown key"), 1);
+            }
+            ConfigError::Wrong {
+                path: path.to_owned(),
+                line: before.matches('\n').count() + 1,
+                column: before[line_start..].chars().count() + 1,
+                message,
+            }
+        })?;
+        config
+            .processing()
+            .check()
+            .map_err(|(section, message)| ConfigError::Inconsistent {
+                path: path.to_owned(),
+                section,
+                message,
+            })?;
+        Ok(config)
+    }
+}
+
+/// The section that a place in the file belongs to; `None` on a section's own line.
+fn section_of(before: &str) -> Option<&str> {
+    let (lines, last) = before.rsplit_once('\n')?;
+    if last.trim_start().starts_with('[') {
+        return None;
+    }
+    lines
+        .lines()
+        .rev()
+        .find_map(|line| line.trim().strip_prefix('[')?.split_once(']'))
+        .map(|(name, _)| name.trim())
+}
+
+/// Serde's message about an unknown name, with the nearest known one put forward.
+pub(super) fn with_nearest_name(message: &str) -> String {
+    for (kind, ours) in [("unknown field", "key"), ("unknown variant", "value")] {
+        let Some(rest) = message.strip_prefix(kind) else {
+            continue;
+        };
+        let mut quoted = rest.split('`').skip(1).step_by(2);
+        let Some(given) = quoted.next() else {
+            continue;
+        };
+        let known: Vec<&str> = quoted.collect();
+        let nearest = known
+            .iter()
+            .map(|name| (strsim::damerau_levenshtein(given, name), name))
+            .min_by_key(|(distance, _)| *distance)
+            .filter(|(distance, name)| *distance <= 1 + name.len() / 3);
+        return match nearest {
+            Some((_, name)) => format!("unknown {ours} `{given}`; did you mean `{name}`?"),
+            None => format!("unknown {ours} `{given}`; known are: {}", known.join(", ")),
+        };
+    }
+    message.to_owned()
+}

@@ -1,0 +1,305 @@
+//! Settings that decide what a job makes of a scan. They are kept with the scan.
+
+use pipeline::Settings;
+use relief_api::SettingOverrides;
+use scan_files::recommended_pitch_mm;
+use serde::{Deserialize, Serialize};
+
+use super::load::with_nearest_name;
+use super::value;
+
+/// Settings that decide what a job makes of a scan. Whatever is left out follows the
+/// default of its stage.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Processing {
+    /// From samples to the uniform range image.
+    pub regrid: RegridConfig,
+    /// From the range image to regions.
+    pub segment: SegmentConfig,
+    /// From regions to trimmed surfaces.
+    pub reconstruct: ReconstructConfig,
+    /// What is left in the spool.
+    pub deliverables: DeliverablesConfig,
+}
+
+/// From samples to the uniform range image.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RegridConfig {
+    /// Distance of the grid's nodes; fitted to the scan's density if left out.
+    #[serde(
+        deserialize_with = "value::positive",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub pitch_mm: Option<f64>,
+    /// Samples looked at for a node (M).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub neighbours: Option<usize>,
+    /// Planes tried for a node (N_s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub draws: Option<usize>,
+    /// Columns to either side in which a node's samples are sought.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reach_columns: Option<usize>,
+    /// How z at a node is estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub estimator: Option<Estimator>,
+    /// Seed of every random draw, those of the segmentation included.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
+    /// Samples with x outside of these limits are ignored.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub roi_x_mm: Option<[f64; 2]>,
+    /// Samples with y outside of these limits are ignored.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub roi_y_mm: Option<[f64; 2]>,
+    /// Samples with z outside of these limits are ignored, such as a back plane.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub roi_z_mm: Option<[f64; 2]>,
+}
+
+/// How z at a node is estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Estimator {
+    /// The plane with the least median of squared residuals: withstands outliers.
+    LeastMedian,
+    /// The plane with the least sum of squared residuals, for comparison.
+    LeastSquares,
+}
+
+/// Which road is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Ours.
+    Relief,
+    /// Shim & Lee 1995 as printed.
+    ShimLee,
+}
+
+/// From the range image to regions.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SegmentConfig {
+    /// Which road is taken; that of `reconstruct.method` if left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub method: Option<Method>,
+    /// Clusters before merging (B).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clusters: Option<usize>,
+    /// Change of direction at which two surfaces are kept apart.
+    #[serde(
+        deserialize_with = "value::positive",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub crease_angle_rad: Option<f64>,
+    /// Offset at which two surfaces are kept apart, in pitches.
+    #[serde(
+        deserialize_with = "value::positive",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub step_factor: Option<f64>,
+    /// Smaller regions are left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub minimum_nodes: Option<usize>,
+}
+
+/// From regions to trimmed surfaces.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ReconstructConfig {
+    /// Which road is taken.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub method: Option<Method>,
+    /// How far a surface may lie off the range image.
+    #[serde(
+        deserialize_with = "value::positive",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub tolerance_mm: Option<f64>,
+    /// Most knots of a fitted spline along the longer side of a region.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub knots_per_side: Option<usize>,
+    /// Width of a patch in thirds, in grid pitches; method `shim-lee` only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub patch_third_nodes: Option<usize>,
+    /// Least turn of a border that makes a vertex.
+    #[serde(
+        deserialize_with = "value::positive",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub corner_angle_rad: Option<f64>,
+}
+
+/// What is left in the spool.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DeliverablesConfig {
+    /// IGES entities of the surfaces: 114 (parametric splines) or 128 (rational B-splines).
+    #[serde(deserialize_with = "entities", skip_serializing_if = "Option::is_none")]
+    pub entities: Option<u16>,
+    /// Author in the CAD file's header; the scan's operator if left out.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub author: String,
+    /// Organisation in the CAD file's header.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub organisation: String,
+}
+
+fn entities<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<u16>, D::Error> {
+    match Option::<i64>::deserialize(deserializer)? {
+        None => Ok(None),
+        Some(114) => Ok(Some(114)),
+        Some(128) => Ok(Some(128)),
+        Some(other) => Err(serde::de::Error::custom(format!(
+            "{other} is no surface entity that can be written: use 114 or 128"
+        ))),
+    }
+}
+
+/// Overrides that cannot be.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("setting `{key}`: {message}")]
+pub struct OverrideError {
+    /// The key as it was given.
+    pub key: String,
+    /// What is wrong and what to do.
+    pub message: String,
+}
+
+impl Processing {
+    /// These settings with some replaced, keyed `section.key` as in the file.
+    ///
+    /// # Errors
+    /// An unknown key, or a value that cannot be, is refused by its name.
+    pub fn with_overrides(&self, overrides: &SettingOverrides) -> Result<Self, OverrideError> {
+        let mut settings = self.clone();
+        for (key, value) in overrides {
+            let wrong = |message: String| OverrideError {
+                key: key.clone(),
+                message,
+            };
+            let Some((section, name)) = key.split_once('.') else {
+                return Err(wrong(
+                    "keys are written `section.key`, such as `regrid.pitch_mm`".into(),
+                ));
+            };
+            // By way of a tree, so that serde checks overrides exactly as it does the file.
+            let mut tree = serde_json::to_value(&settings).map_err(|e| wrong(e.to_string()))?;
+            let sections = tree.as_object_mut();
+            let Some(table) = sections.and_then(|s| s.get_mut(section)?.as_object_mut()) else {
+                return Err(wrong(format!(
+                    "there is no section [{section}] that a scan can override; there are \
+                     regrid, segment, reconstruct and deliverables"
+                )));
+            };
+            table.insert(name.to_owned(), value.clone());
+            settings = serde_json::from_value(tree)
+                .map_err(|error| wrong(with_nearest_name(&error.to_string())))?;
+        }
+        settings
+            .check()
+            .map_err(|(section, message)| OverrideError {
+                key: section.to_owned(),
+                message,
+            })?;
+        Ok(settings)
+    }
+}
+
+impl Processing {
+    /// The settings of every stage, for a scan of this density. Spacings in millimetres,
+    /// 0 where unknown.
+    #[must_use]
+    pub fn pipeline_settings(&self, column_pitch_mm: f64, sample_spacing_mm: f64) -> Settings {
+        let pitch_mm = self.regrid.pitch_mm.unwrap_or_else(|| {
+            let known = [column_pitch_mm, sample_spacing_mm].map(|mm| mm > 0.0 && mm.is_finite());
+            match known {
+                [false, false] => FALLBACK_PITCH_MM,
+                [false, true] => recommended_pitch_mm(sample_spacing_mm, sample_spacing_mm),
+                _ => recommended_pitch_mm(column_pitch_mm, sample_spacing_mm.max(0.0)),
+            }
+        });
+        let mut settings = Settings::new(pitch_mm);
+        if let Some(method) = self.reconstruct.method {
+            settings = settings.with_method(method.into());
+        }
+        if let Some(seed) = self.regrid.seed {
+            settings = settings.with_seed(seed);
+        }
+        self.regrid.apply(&mut settings.regrid);
+        self.segment.apply(&mut settings.segment);
+        self.reconstruct.apply(&mut settings.reconstruct);
+        settings
+    }
+
+    /// The first section that cannot be used, and why.
+    pub(super) fn check(&self) -> Result<(), (&'static str, String)> {
+        // The pitch is checked where it is read; any other serves here.
+        self.pipeline_settings(FALLBACK_PITCH_MM, FALLBACK_PITCH_MM)
+            .validate()
+            .map_err(|error| (error.stage, error.message))
+    }
+}
+
+/// Pitch where nothing is known of a scan's density; a tenth of a 5 mm feature.
+const FALLBACK_PITCH_MM: f64 = 0.5;
+
+fn set<T>(place: &mut T, value: Option<T>) {
+    if let Some(value) = value {
+        *place = value;
+    }
+}
+
+impl RegridConfig {
+    fn apply(&self, settings: &mut regrid::RegridSettings) {
+        set(&mut settings.neighbours, self.neighbours);
+        set(&mut settings.draws, self.draws);
+        set(&mut settings.reach_columns, self.reach_columns);
+        set(
+            &mut settings.estimator,
+            self.estimator.map(|estimator| match estimator {
+                Estimator::LeastMedian => regrid::Estimator::LeastMedian,
+                Estimator::LeastSquares => regrid::Estimator::LeastSquares,
+            }),
+        );
+        let roi = &mut settings.roi;
+        set(&mut roi.x_mm, self.roi_x_mm.map(Into::into));
+        set(&mut roi.y_mm, self.roi_y_mm.map(Into::into));
+        set(&mut roi.z_mm, self.roi_z_mm.map(Into::into));
+    }
+}
+
+impl SegmentConfig {
+    fn apply(&self, settings: &mut segment::SegmentSettings) {
+        set(
+            &mut settings.method,
+            self.method
+                .map(|method| pipeline::Method::from(method).into()),
+        );
+        set(&mut settings.clusters, self.clusters);
+        set(&mut settings.crease_angle_rad, self.crease_angle_rad);
+        set(&mut settings.step_factor, self.step_factor);
+        set(&mut settings.minimum_nodes, self.minimum_nodes);
+    }
+}
+
+impl ReconstructConfig {
+    fn apply(&self, settings: &mut reconstruct::ReconstructSettings) {
+        set(&mut settings.tolerance_mm, self.tolerance_mm);
+        set(&mut settings.knots_per_side, self.knots_per_side);
+        set(&mut settings.patch_third_nodes, self.patch_third_nodes);
+        set(&mut settings.corner_angle_rad, self.corner_angle_rad);
+    }
+}
+
+impl From<Method> for pipeline::Method {
+    fn from(method: Method) -> Self {
+        match method {
+            Method::Relief => Self::Relief,
+            Method::ShimLee => Self::ShimLee,
+        }
+    }
+}

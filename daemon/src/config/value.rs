@@ -1,0 +1,110 @@
+//! Values that are checked while they are read, so that a refusal knows its line.
+
+use std::net::SocketAddr;
+
+use serde::{Deserialize, Deserializer, de::Error};
+
+/// A whole number within bounds; the text names what is counted.
+fn bounded<'de, D: Deserializer<'de>>(
+    deserializer: D,
+    low: u32,
+    high: u32,
+    unit: &str,
+) -> Result<u32, D::Error> {
+    let number = i64::deserialize(deserializer)?;
+    u32::try_from(number)
+        .ok()
+        .filter(|n| (low..=high).contains(n))
+        .ok_or_else(|| {
+            D::Error::custom(format!(
+                "{number} is out of range: {low} to {high}{unit} are possible"
+            ))
+        })
+}
+
+pub(super) fn baud<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    bounded(deserializer, 1_200, 12_000_000, " bits per second")
+}
+
+pub(super) fn milliseconds<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<u32>, D::Error> {
+    bounded(deserializer, 10, 600_000, " ms").map(Some)
+}
+
+pub(super) fn attempts<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<u32>, D::Error> {
+    bounded(deserializer, 1, 100, "").map(Some)
+}
+
+pub(super) fn credits<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u32>, D::Error> {
+    bounded(deserializer, 2, 1_024, " columns").map(Some)
+}
+
+pub(super) fn sync_columns<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    bounded(deserializer, 1, 1_024, " columns")
+}
+
+pub(super) fn sync_ms<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    bounded(deserializer, 0, 1_000, " ms")
+}
+
+pub(super) fn workers<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
+    bounded(deserializer, 1, 64, " workers").map(|n| n as usize)
+}
+
+pub(super) fn threads<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
+    bounded(deserializer, 0, 256, " threads").map(|n| n as usize)
+}
+
+/// A positive finite number, where one is given.
+pub(super) fn positive<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<f64>, D::Error> {
+    let Some(number) = Option::<f64>::deserialize(deserializer)? else {
+        return Ok(None);
+    };
+    if number > 0.0 && number.is_finite() {
+        Ok(Some(number))
+    } else {
+        Err(D::Error::custom(format!(
+            "{number} is out of range: a positive number is needed"
+        )))
+    }
+}
+
+/// An address that only this machine can reach: the API knows no passwords.
+pub(super) fn loopback<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<SocketAddr>, D::Error> {
+    let Some(text) = Option::<String>::deserialize(deserializer)? else {
+        return Ok(None);
+    };
+    let address: SocketAddr = text.parse().map_err(|_| {
+        D::Error::custom(format!(
+            "\"{text}\" is no address with a port, such as \"127.0.0.1:7437\""
+        ))
+    })?;
+    if super::is_loopback(&address) {
+        Ok(Some(address))
+    } else {
+        Err(D::Error::custom(format!(
+            "{address} can be reached from other machines, and the API asks for no password: \
+             use a loopback address such as \"127.0.0.1:{}\"",
+            address.port()
+        )))
+    }
+}
+
+/// A filter that `tracing` understands.
+pub(super) fn log_filter<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    match tracing_subscriber::EnvFilter::try_new(&text) {
+        Ok(_) if !text.trim().is_empty() => Ok(text),
+        _ => Err(D::Error::custom(format!(
+            "\"{text}\" is no log level: use error, warn, info, debug or trace, \
+             or a filter such as \"info,reliefd=debug\""
+        ))),
+    }
+}

@@ -1,0 +1,286 @@
+//! The service as a whole: started, reloaded, and brought to an orderly end.
+
+use std::io;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use axum::Router;
+use scanner_driver::{LinkSettings, Scanner, ScannerError, SerialScanner, SerialSettings};
+use tokio_util::sync::CancellationToken;
+
+use crate::acquisition::watch;
+use crate::config::{Config, Reloaded, ScannerConfig, Transport};
+use crate::error::ServiceError;
+use crate::http::{Context, ListenError, bind_loopback, bind_socket, local_callers_only, router};
+use crate::jobs::work;
+use crate::service::{Service, remove_if_there};
+use crate::spool::{Spool, SpoolError};
+use crate::store::{Store, StoreError};
+
+/// How long connections may take to end once the service stops.
+const DRAIN: Duration = Duration::from_secs(5);
+
+/// The service cannot start.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// The folder of the kept scans does not work.
+    #[error(
+        "cannot use the folder {} (service.state_dir): {source}; it must be writable for the \
+         user of reliefd",
+        path.display()
+    )]
+    StateDir {
+        /// The folder.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The records do not work.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The spool does not work.
+    #[error("{0}; {hint}", hint = .0.hint())]
+    Spool(#[from] SpoolError),
+    /// The API cannot be offered.
+    #[error(transparent)]
+    Listen(#[from] ListenError),
+    /// The link to the scanner cannot be set up.
+    #[error("cannot set up the scanner: {0}")]
+    Scanner(#[from] ScannerError),
+    /// What an earlier run left cannot be taken up.
+    #[error("cannot take up where the service last ended: {0}")]
+    Recover(ServiceError),
+    /// The system has no more threads.
+    #[error("cannot start a thread: {0}")]
+    Thread(io::Error),
+}
+
+/// A running service.
+///
+/// Call [`Daemon::shutdown`]; a handle that is merely dropped leaves the service running
+/// until the runtime ends.
+pub struct Daemon {
+    service: Arc<Service>,
+    stop: CancellationToken,
+    servers: Vec<tokio::task::JoinHandle<()>>,
+    threads: Vec<JoinHandle<()>>,
+    socket: PathBuf,
+    listen: Option<SocketAddr>,
+}
+
+impl std::fmt::Debug for Daemon {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Daemon")
+            .field("socket", &self.socket)
+            .field("listen", &self.listen)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Daemon {
+    /// Starts the service with the scanner that the configuration names. The scanner need
+    /// not be there yet.
+    ///
+    /// # Errors
+    /// Any [`StartError`].
+    pub async fn start(config: Config) -> Result<Self, StartError> {
+        let scanner = open_scanner(&config.scanner)?;
+        Self::start_with(config, scanner).await
+    }
+
+    /// Starts the service with any scanner.
+    ///
+    /// # Errors
+    /// Any [`StartError`] but [`StartError::Scanner`].
+    pub async fn start_with(config: Config, scanner: Arc<dyn Scanner>) -> Result<Self, StartError> {
+        let scans_dir = prepare_state(&config.service.state_dir)?;
+        let store = Store::open(&config.service.state_dir.join("reliefd.redb"))?;
+        remove_grids(&scans_dir);
+        let spool = Spool::open(&config.service.spool_dir)?;
+        let unix = bind_socket(&config.service.socket).await?;
+        let tcp = match config.service.listen {
+            Some(address) => Some(bind_loopback(address).await?),
+            None => None,
+        };
+        let listen = tcp.as_ref().and_then(|tcp| tcp.local_addr().ok());
+        let socket = config.service.socket.clone();
+        let workers = config.queue.workers;
+        let service = Arc::new(Service::new(config, scanner, store, spool, scans_dir));
+        service.recover_scans().map_err(StartError::Recover)?;
+        service.recover_jobs().map_err(StartError::Recover)?;
+
+        let stop = CancellationToken::new();
+        let app = router(Context {
+            service: Arc::clone(&service),
+            stop: stop.clone(),
+        });
+        let mut daemon = Self {
+            service,
+            stop,
+            servers: Vec::new(),
+            threads: Vec::new(),
+            socket,
+            listen,
+        };
+        daemon.start_threads(workers).map_err(StartError::Thread)?;
+        daemon.serve(unix, app.clone());
+        if let Some(tcp) = tcp {
+            daemon.serve(
+                tcp,
+                app.layer(axum::middleware::from_fn(local_callers_only)),
+            );
+        }
+        tracing::info!(socket = %daemon.socket.display(), "reliefd {} is ready", env!("CARGO_PKG_VERSION"));
+        Ok(daemon)
+    }
+
+    fn start_threads(&mut self, workers: usize) -> io::Result<()> {
+        for number in 1..=workers {
+            let service = Arc::clone(&self.service);
+            self.threads.push(
+                std::thread::Builder::new()
+                    .name(format!("worker-{number}"))
+                    .spawn(move || work(&service))?,
+            );
+        }
+        let service = Arc::clone(&self.service);
+        self.threads.push(
+            std::thread::Builder::new()
+                .name("scanner-watch".into())
+                .spawn(move || watch(&service))?,
+        );
+        Ok(())
+    }
+
+    fn serve<L>(&mut self, listener: L, app: Router)
+    where
+        L: axum::serve::Listener,
+        L::Addr: std::fmt::Debug,
+    {
+        let stopped = self.stop.clone().cancelled_owned();
+        self.servers.push(tokio::spawn(async move {
+            if let Err(error) = axum::serve(listener, app)
+                .with_graceful_shutdown(stopped)
+                .await
+            {
+                tracing::error!(%error, "the API ended");
+            }
+        }));
+    }
+
+    /// The Unix socket of the API.
+    #[must_use]
+    pub fn socket(&self) -> &Path {
+        &self.socket
+    }
+
+    /// The loopback address of the API, if it is offered on one.
+    #[must_use]
+    pub fn listen(&self) -> Option<SocketAddr> {
+        self.listen
+    }
+
+    /// The spool's folder.
+    #[must_use]
+    pub fn spool_dir(&self) -> &Path {
+        self.service.spool.root()
+    }
+
+    /// Takes over what may change in service; says what became of it.
+    #[must_use = "some changes need a restart, which the user should be told"]
+    pub fn reload(&self, config: &Config) -> Reloaded {
+        self.service.reload(config)
+    }
+
+    /// Brings the service to an orderly end: a scan under way is aborted and kept, with
+    /// the laser off; running jobs stop at their next opportunity and are taken up by the
+    /// next start; connections are drained.
+    pub async fn shutdown(self) {
+        let service = Arc::clone(&self.service);
+        service.begin_stop();
+        service.queue.stop();
+        let threads = self.threads;
+        let ended = tokio::task::spawn_blocking(move || {
+            if service.active_scan().is_some()
+                && let Err(error) = service.abort_scan(None, "the service was stopped")
+            {
+                // It ended by itself in this very moment.
+                tracing::debug!(%error, "no scan to abort");
+            }
+            service.join_scan();
+            for thread in threads {
+                let name = thread.thread().name().unwrap_or("?").to_owned();
+                if thread.join().is_err() {
+                    tracing::error!(thread = name, "a thread ended by a panic");
+                }
+            }
+        })
+        .await;
+        if ended.is_err() {
+            tracing::error!("the orderly end was cut short");
+        }
+        self.stop.cancel();
+        let drain = async {
+            for server in self.servers {
+                // A server that panicked has ended too.
+                let _ = server.await;
+            }
+        };
+        if tokio::time::timeout(DRAIN, drain).await.is_err() {
+            tracing::warn!("some connections were cut");
+        }
+        remove_if_there(&self.socket);
+        tracing::info!("reliefd has ended");
+    }
+}
+
+/// Makes the state folder; gives that of the scans.
+fn prepare_state(state_dir: &Path) -> Result<PathBuf, StartError> {
+    let scans_dir = state_dir.join("scans");
+    std::fs::create_dir_all(&scans_dir).map_err(|source| StartError::StateDir {
+        path: state_dir.to_owned(),
+        source,
+    })?;
+    Ok(scans_dir)
+}
+
+/// Range images that were put aside are not trusted across a restart.
+fn remove_grids(scans_dir: &Path) {
+    let Ok(entries) = std::fs::read_dir(scans_dir) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        if entry.path().extension().is_some_and(|e| e == "grid") {
+            remove_if_there(&entry.path());
+        }
+    }
+}
+
+fn open_scanner(config: &ScannerConfig) -> Result<Arc<dyn Scanner>, StartError> {
+    let Transport::Serial = config.transport;
+    let mut link = LinkSettings::default();
+    let ms = |ms: Option<u32>, default: Duration| {
+        ms.map_or(default, |ms| Duration::from_millis(ms.into()))
+    };
+    link.request_timeout = ms(config.request_timeout_ms, link.request_timeout);
+    link.request_attempts = config.request_attempts.unwrap_or(link.request_attempts);
+    link.motion_timeout = ms(config.motion_timeout_ms, link.motion_timeout);
+    link.column_timeout = ms(config.column_timeout_ms, link.column_timeout);
+    link.dead_man = ms(config.dead_man_ms, link.dead_man);
+    // What follows from these, unless the user likes to count: several heartbeats fit into
+    // the dead-man time, and silence is longer than all attempts at one request.
+    link.heartbeat_interval = link.heartbeat_interval.min(link.dead_man / 4);
+    link.silence = link
+        .silence
+        .max(link.request_timeout * link.request_attempts * 2);
+    if let Some(credits) = config.credits {
+        link.credits = u16::try_from(credits).unwrap_or(u16::MAX);
+    }
+    let mut settings = SerialSettings::new(config.port.display().to_string());
+    settings.baud_rate = config.baud;
+    settings.link = link;
+    Ok(Arc::new(SerialScanner::open(settings)?))
+}

@@ -1,0 +1,107 @@
+//! Why the service refuses something.
+
+use std::io;
+
+use relief_api::{JobId, JobState, ScanState};
+use scanner_driver::ScannerError;
+
+use crate::acquisition::PlanError;
+use crate::config::OverrideError;
+use crate::spool::SpoolError;
+use crate::store::StoreError;
+
+/// Why the service refuses a request.
+#[derive(Debug, thiserror::Error)]
+pub enum ServiceError {
+    /// It is about to end.
+    #[error("the service is stopping")]
+    Stopping,
+    /// One scan at a time.
+    #[error("{}", match .scan {
+        Some(scan) => format!("the scanner is taking the scan {scan}"),
+        None => "another scan is just being started".to_owned(),
+    })]
+    ScannerBusy {
+        /// The other scan.
+        scan: Option<String>,
+    },
+    /// The scanner does not do it.
+    #[error("{0}")]
+    Scanner(ScannerError),
+    /// The scanner cannot do it.
+    #[error("{0}")]
+    Plan(#[from] PlanError),
+    /// A setting is wrong.
+    #[error("{0}")]
+    Setting(#[from] OverrideError),
+    /// There is no such scan.
+    #[error("there is no scan {id}")]
+    NoSuchScan {
+        /// As it was given.
+        id: String,
+    },
+    /// It ended before.
+    #[error("the scan {id} is over ({})", state.as_str())]
+    ScanIsOver {
+        /// The scan.
+        id: String,
+        /// How it ended.
+        state: ScanState,
+    },
+    /// It has not ended yet.
+    #[error("the scan {id} is still being taken")]
+    ScanNotOver {
+        /// The scan.
+        id: String,
+    },
+    /// There is nothing to process.
+    #[error("nothing is kept of the scan {id}: {why}")]
+    NothingKept {
+        /// The scan.
+        id: String,
+        /// Why not.
+        why: String,
+    },
+    /// No scan is under way.
+    #[error("no scan is under way")]
+    NothingToAbort,
+    /// There is no such job.
+    #[error("there is no job {id}")]
+    NoSuchJob {
+        /// As it was given.
+        id: JobId,
+    },
+    /// It cannot be cancelled, or retried, any more or yet.
+    #[error("the job {id} is {} and cannot be {action}", state.as_str())]
+    WrongJobState {
+        /// The job.
+        id: JobId,
+        /// Where it stands.
+        state: JobState,
+        /// What was asked for.
+        action: &'static str,
+    },
+    /// There is no such file in the spool.
+    #[error("there is no {what} in the spool")]
+    NotInSpool {
+        /// The folder or file.
+        what: String,
+    },
+    /// The records do not work.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The spool does not work.
+    #[error(transparent)]
+    Spool(#[from] SpoolError),
+    /// A file does not work.
+    #[error("cannot read {what}: {source}")]
+    Io {
+        /// The file.
+        what: String,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The system has no more threads.
+    #[error("cannot start a thread: {0}")]
+    Thread(io::Error),
+}

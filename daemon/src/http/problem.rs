@@ -1,0 +1,225 @@
+//! From the service's refusals to HTTP: the only place that knows both.
+
+use axum::extract::rejection::{JsonRejection, PathRejection};
+use axum::extract::{FromRequest, Request};
+use axum::http::{HeaderValue, Method, StatusCode, Uri, header};
+use axum::response::{IntoResponse, Json, Response};
+use relief_api::Problem;
+use scanner_driver::ScannerError;
+use serde::de::DeserializeOwned;
+
+use crate::error::ServiceError;
+
+/// A refused request.
+#[derive(Debug)]
+pub(crate) struct Refusal(Problem);
+
+impl Refusal {
+    pub(crate) fn new(
+        status: StatusCode,
+        kind: &str,
+        detail: impl Into<String>,
+        hint: Option<&str>,
+    ) -> Self {
+        let title = {
+            let words = kind.replace('-', " ");
+            let mut letters = words.chars();
+            letters.next().map_or_else(String::new, |first| {
+                first.to_uppercase().chain(letters).collect()
+            })
+        };
+        Self(Problem {
+            kind: kind.to_owned(),
+            title,
+            status: status.as_u16(),
+            detail: detail.into(),
+            hint: hint.map(str::to_owned),
+        })
+    }
+
+    pub(crate) fn internal(detail: impl Into<String>) -> Self {
+        Self::new(
+            StatusCode::INTERNAL_SERVER_ERROR,
+            "internal-error",
+            detail,
+            Some("the service's log says more"),
+        )
+    }
+}
+
+impl IntoResponse for Refusal {
+    fn into_response(self) -> Response {
+        let status =
+            StatusCode::from_u16(self.0.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+        let mut response = (status, Json(self.0)).into_response();
+        response.headers_mut().insert(
+            header::CONTENT_TYPE,
+            HeaderValue::from_static(Problem::MEDIA_TYPE),
+        );
+        response
+    }
+}
+
+impl From<ServiceError> for Refusal {
+    fn from(error: ServiceError) -> Self {
+        use StatusCode as S;
+        let (status, kind, hint): (_, _, Option<String>) = match &error {
+            ServiceError::Stopping => (
+                S::SERVICE_UNAVAILABLE,
+                "service-stopping",
+                Some("try again once it runs again".into()),
+            ),
+            ServiceError::ScannerBusy { .. } => (
+                S::CONFLICT,
+                "scanner-busy",
+                Some("wait for its end, or abort it".into()),
+            ),
+            ServiceError::Scanner(scanner) => {
+                let (status, kind, hint) = scanner_problem(scanner);
+                (status, kind, hint.map(str::to_owned))
+            }
+            ServiceError::Plan(_) => (S::BAD_REQUEST, "impossible-scan", None),
+            ServiceError::Setting(_) => (S::BAD_REQUEST, "wrong-setting", None),
+            ServiceError::NoSuchScan { .. } => (
+                S::NOT_FOUND,
+                "no-such-scan",
+                Some("`relief scans` lists the scans there are".into()),
+            ),
+            ServiceError::ScanIsOver { .. } => (S::CONFLICT, "scan-is-over", None),
+            ServiceError::ScanNotOver { .. } => (
+                S::CONFLICT,
+                "scan-not-over",
+                Some("wait for its end, or abort it".into()),
+            ),
+            ServiceError::NothingKept { .. } => (S::CONFLICT, "nothing-kept", None),
+            ServiceError::NothingToAbort => (S::CONFLICT, "nothing-to-abort", None),
+            ServiceError::NoSuchJob { .. } => (
+                S::NOT_FOUND,
+                "no-such-job",
+                Some("`relief jobs` lists the jobs there are".into()),
+            ),
+            ServiceError::WrongJobState { .. } => (S::CONFLICT, "wrong-job-state", None),
+            ServiceError::NotInSpool { .. } => (S::NOT_FOUND, "not-in-spool", None),
+            ServiceError::Store(_) => (S::INTERNAL_SERVER_ERROR, "records-unusable", None),
+            ServiceError::Spool(spool) => (
+                S::INTERNAL_SERVER_ERROR,
+                "spool-unusable",
+                Some(spool.hint()),
+            ),
+            ServiceError::Io { .. } => (S::INTERNAL_SERVER_ERROR, "file-unreadable", None),
+            ServiceError::Thread(_) => (S::INTERNAL_SERVER_ERROR, "no-thread", None),
+        };
+        Self::new(status, kind, error.to_string(), hint.as_deref())
+    }
+}
+
+/// 503 while the scanner cannot be reached, 502 where it answers with trouble.
+fn scanner_problem(error: &ScannerError) -> (StatusCode, &'static str, Option<&'static str>) {
+    use StatusCode as S;
+    match error {
+        ScannerError::NoSuchPort { .. } => (
+            S::SERVICE_UNAVAILABLE,
+            "no-such-port",
+            Some("set scanner.port in the configuration to the port it is on"),
+        ),
+        ScannerError::PortBusy { .. } => (
+            S::SERVICE_UNAVAILABLE,
+            "port-busy",
+            Some("end the other program, or set scanner.port to another port"),
+        ),
+        ScannerError::Permission { .. } => (S::SERVICE_UNAVAILABLE, "no-permission", None),
+        ScannerError::NotAPort { .. } | ScannerError::Port { .. } => (
+            S::SERVICE_UNAVAILABLE,
+            "port-unusable",
+            Some("set scanner.port in the configuration to the port the scanner is on"),
+        ),
+        ScannerError::WrongDevice { .. } => (
+            S::BAD_GATEWAY,
+            "wrong-device",
+            Some("set scanner.port in the configuration to the port the scanner is on"),
+        ),
+        ScannerError::Timeout { .. } => (
+            S::GATEWAY_TIMEOUT,
+            "scanner-silent",
+            Some("is it switched on, and do scanner.port and scanner.baud fit it?"),
+        ),
+        ScannerError::Refused { .. } => (S::BAD_GATEWAY, "scanner-refused", None),
+        ScannerError::Fault(_) => (
+            S::BAD_GATEWAY,
+            "scanner-fault",
+            Some("mend the fault at the scanner, then try again"),
+        ),
+        ScannerError::ScanRunning => (S::CONFLICT, "scanner-busy", None),
+        ScannerError::Aborted => (S::CONFLICT, "aborted", None),
+        _ => (S::BAD_GATEWAY, "scanner-trouble", None),
+    }
+}
+
+pub(crate) async fn no_such_path(uri: Uri) -> Refusal {
+    Refusal::new(
+        StatusCode::NOT_FOUND,
+        "no-such-path",
+        format!("there is nothing at {}", uri.path()),
+        Some("the API begins at /v1/status"),
+    )
+}
+
+pub(crate) async fn no_such_method(method: Method, uri: Uri) -> Refusal {
+    Refusal::new(
+        StatusCode::METHOD_NOT_ALLOWED,
+        "method-not-allowed",
+        format!("{} does not take {method}", uri.path()),
+        None,
+    )
+}
+
+/// A JSON body, whose faults are told like any other problem. No body at all stands for
+/// a request without wishes.
+pub(crate) struct Body<T>(pub(crate) T);
+
+impl<S: Send + Sync, T: DeserializeOwned + Default> FromRequest<S> for Body<T> {
+    type Rejection = Refusal;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
+        let bare = !request.headers().contains_key(header::CONTENT_TYPE)
+            && request
+                .headers()
+                .get(header::CONTENT_LENGTH)
+                .is_none_or(|length| length == "0")
+            && !request.headers().contains_key(header::TRANSFER_ENCODING);
+        if bare {
+            return Ok(Self(T::default()));
+        }
+        match Json::<T>::from_request(request, state).await {
+            Ok(Json(body)) => Ok(Self(body)),
+            Err(rejection) => Err(wrong_body(&rejection)),
+        }
+    }
+}
+
+fn wrong_body(rejection: &JsonRejection) -> Refusal {
+    let (status, hint) = match rejection {
+        JsonRejection::MissingJsonContentType(_) => (
+            StatusCode::UNSUPPORTED_MEDIA_TYPE,
+            Some("send JSON with `Content-Type: application/json`"),
+        ),
+        other => (
+            match other.status() {
+                StatusCode::PAYLOAD_TOO_LARGE => StatusCode::PAYLOAD_TOO_LARGE,
+                _ => StatusCode::BAD_REQUEST,
+            },
+            None,
+        ),
+    };
+    Refusal::new(status, "wrong-body", rejection.body_text(), hint)
+}
+
+/// A path that does not parse, such as a job's number with letters in it.
+pub(crate) fn wrong_path(rejection: &PathRejection) -> Refusal {
+    Refusal::new(
+        StatusCode::NOT_FOUND,
+        "no-such-path",
+        rejection.body_text(),
+        None,
+    )
+}

@@ -1,0 +1,182 @@
+//! The job queue: what is to be made of kept scans, across restarts.
+//!
+//! A job is begun at least once and published exactly once: the records say what is
+//! waiting, and the result's folder, which appears by one rename, says what is done.
+
+mod process;
+mod progress;
+mod queue;
+mod worker;
+
+use relief_api::{Event, Job, JobId, JobState, Rerun, Scan};
+use scan_record::JournalReader;
+
+use crate::config::Processing;
+use crate::error::ServiceError;
+use crate::ids::{now, shown_name};
+use crate::service::Service;
+
+pub(crate) use queue::Queue;
+pub(crate) use worker::work;
+
+impl Service {
+    /// Queues the job of a scan that has just been completed, and keeps the scan with it.
+    pub(crate) fn queue_first_job(&self, scan: &mut Scan) -> Result<Job, ServiceError> {
+        let job = new_job(scan, scan.id.clone(), scan.name.clone());
+        self.add_job(job, scan)
+    }
+
+    /// Queues a kept scan to be processed again.
+    pub(crate) fn rerun(&self, id: &str, request: &Rerun) -> Result<Job, ServiceError> {
+        self.check_running()?;
+        let mut scan = self.scan(id)?;
+        if !scan.state.is_over() {
+            return Err(ServiceError::ScanNotOver { id: id.to_owned() });
+        }
+        let nothing = |why: String| ServiceError::NothingKept {
+            id: id.to_owned(),
+            why,
+        };
+        let mut journal =
+            JournalReader::open(&self.journal_path(id)).map_err(|e| nothing(e.to_string()))?;
+        // Refuses wrong settings now and not when the job's turn comes.
+        kept_processing(&journal.header().settings)
+            .map_err(&nothing)?
+            .with_overrides(&request.settings)?;
+        if !matches!(journal.next_column(), Ok(Some(_))) {
+            return Err(nothing("it ended before its first column".into()));
+        }
+        let name = if request.name.is_empty() {
+            scan.name.clone()
+        } else {
+            shown_name(&request.name)
+        };
+        let result = self.ids.next(&name, |id| {
+            self.spool.has(id) || self.journal_path(id).exists()
+        });
+        let mut job = new_job(&scan, result, name);
+        job.settings.clone_from(&request.settings);
+        self.add_job(job, &mut scan)
+    }
+
+    fn add_job(&self, job: Job, scan: &mut Scan) -> Result<Job, ServiceError> {
+        let job = self.store.add_job(job, scan)?;
+        self.hub.tell(Event::Job(job.clone()));
+        self.queue.add(job.id);
+        Ok(job)
+    }
+
+    /// One job.
+    pub(crate) fn job(&self, id: JobId) -> Result<Job, ServiceError> {
+        self.store.job(id)?.ok_or(ServiceError::NoSuchJob { id })
+    }
+
+    /// All jobs, newest first.
+    pub(crate) fn jobs(&self) -> Result<Vec<Job>, ServiceError> {
+        let mut jobs = self.store.jobs()?;
+        jobs.reverse();
+        Ok(jobs)
+    }
+
+    /// Queues a job again that failed or was cancelled.
+    pub(crate) fn retry_job(&self, id: JobId) -> Result<Job, ServiceError> {
+        self.check_running()?;
+        let _order = self.queue.changing();
+        let mut job = self.job(id)?;
+        if !matches!(job.state, JobState::Failed | JobState::Cancelled) {
+            return Err(ServiceError::WrongJobState {
+                id,
+                state: job.state,
+                action: "retried",
+            });
+        }
+        job.state = JobState::Queued;
+        job.error = None;
+        job.hint = None;
+        job.ended_at = None;
+        job.timings.clear();
+        self.keep_job(&job)?;
+        self.queue.add(id);
+        Ok(job)
+    }
+
+    /// Cancels a job: at once if it waits, at its next opportunity if it runs.
+    pub(crate) fn cancel_job(&self, id: JobId) -> Result<Job, ServiceError> {
+        let _order = self.queue.changing();
+        let mut job = self.job(id)?;
+        if self.queue.remove(id) {
+            job.state = JobState::Cancelled;
+            job.ended_at = Some(now());
+            self.keep_job(&job)?;
+            return Ok(job);
+        }
+        if self.queue.cancel_running(id) {
+            return Ok(job);
+        }
+        Err(ServiceError::WrongJobState {
+            id,
+            state: job.state,
+            action: "cancelled",
+        })
+    }
+
+    /// Keeps a job's record and tells of it.
+    pub(crate) fn keep_job(&self, job: &Job) -> Result<(), ServiceError> {
+        self.store.put_job(job)?;
+        self.hub.tell(Event::Job(job.clone()));
+        Ok(())
+    }
+
+    /// After a restart: queues what waited or was under way, and notes as done what was
+    /// published just before the service ended.
+    pub(crate) fn recover_jobs(&self) -> Result<(), ServiceError> {
+        for mut job in self.store.jobs()? {
+            if job.state.is_over() {
+                continue;
+            }
+            if self.spool.has(&job.result) {
+                job.state = JobState::Done;
+                job.stage = None;
+                job.ended_at = Some(now());
+                job.directory = Some(self.spool.directory(&job.result).display().to_string());
+                self.store.put_job(&job)?;
+                continue;
+            }
+            if job.state == JobState::Running {
+                tracing::info!(job = job.id, scan = %job.scan, "taking up a job that was cut short");
+                job.state = JobState::Queued;
+                job.stage = None;
+                self.store.put_job(&job)?;
+            }
+            self.queue.add(job.id);
+        }
+        Ok(())
+    }
+}
+
+/// A job as it is queued; its number is given when it is kept.
+fn new_job(scan: &Scan, result: String, name: String) -> Job {
+    Job {
+        id: 0,
+        scan: scan.id.clone(),
+        result,
+        name,
+        state: JobState::Queued,
+        error: None,
+        hint: None,
+        attempts: 0,
+        queued_at: now(),
+        started_at: None,
+        ended_at: None,
+        stage: None,
+        timings: Vec::new(),
+        directory: None,
+        settings: relief_api::SettingOverrides::new(),
+    }
+}
+
+/// The settings that were kept with a scan.
+fn kept_processing(settings: &[u8]) -> Result<Processing, String> {
+    serde_json::from_slice(settings)
+        .map_err(|error| format!("the settings kept with it cannot be read ({error})"))
+}

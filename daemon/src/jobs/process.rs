@@ -1,0 +1,278 @@
+//! One attempt at a job: from the kept columns to a folder in the spool.
+
+use std::collections::BTreeMap;
+
+use deliverables::{CadOptions, DeliverError, Entities, Inputs, ScanReport, Stopwatch};
+use pipeline::{Observer, PipelineError, Stage};
+use range_image::{Cancelled, Column, Lattice, Monitor, RangeImage};
+use relief_api::{Job, Scan};
+use scan_record::{Ending, Header, JournalReader, ReadError};
+
+use super::kept_processing;
+use super::progress::Progress;
+use super::worker::JobOutcome;
+use crate::acquisition::grid_file;
+use crate::config::Processing;
+use crate::service::{KeptGrid, Service};
+use crate::spool::SpoolError;
+
+/// Why an attempt led to nothing.
+enum Stop {
+    Asked,
+    Failed { error: String, hint: Option<String> },
+}
+
+impl Stop {
+    fn failed(error: impl std::fmt::Display, hint: Option<&str>) -> Self {
+        Self::Failed {
+            error: error.to_string(),
+            hint: hint.map(str::to_owned),
+        }
+    }
+}
+
+impl From<Cancelled> for Stop {
+    fn from(_: Cancelled) -> Self {
+        Self::Asked
+    }
+}
+
+impl From<PipelineError> for Stop {
+    fn from(error: PipelineError) -> Self {
+        match error {
+            PipelineError::Cancelled => Self::Asked,
+            other => Self::failed(&other, other.hint()),
+        }
+    }
+}
+
+impl From<DeliverError> for Stop {
+    fn from(error: DeliverError) -> Self {
+        match error {
+            DeliverError::Cancelled(_) => Self::Asked,
+            other => Self::failed(
+                other,
+                Some("see that the spool can be written and has room, then retry the job"),
+            ),
+        }
+    }
+}
+
+impl From<SpoolError> for Stop {
+    fn from(error: SpoolError) -> Self {
+        let hint = error.hint();
+        Self::failed(error, Some(&hint))
+    }
+}
+
+impl From<ReadError> for Stop {
+    fn from(error: ReadError) -> Self {
+        Self::failed(error, None)
+    }
+}
+
+/// Makes the job's result and publishes it.
+pub(super) fn process(service: &Service, job: &Job, progress: &Progress<'_>) -> JobOutcome {
+    match attempt(service, job, progress) {
+        Ok(directory) => JobOutcome::Published(directory),
+        Err(Stop::Asked) => JobOutcome::Stopped,
+        Err(Stop::Failed { error, hint }) => JobOutcome::Failed { error, hint },
+    }
+}
+
+fn attempt(
+    service: &Service,
+    job: &Job,
+    progress: &Progress<'_>,
+) -> Result<std::path::PathBuf, Stop> {
+    if service.spool.has(&job.result) {
+        return Ok(service.spool.directory(&job.result));
+    }
+    // First, so that an unwritable spool is told at once and not after minutes.
+    let incoming = service.spool.begin(&job.result)?;
+    let scan = service
+        .scan(&job.scan)
+        .map_err(|error| Stop::failed(error, None))?;
+    let mut journal = JournalReader::open(&service.journal_path(&job.scan))?;
+    let header = journal.header().clone();
+    let processing = kept_processing(&header.settings)
+        .and_then(|kept| {
+            kept.with_overrides(&job.settings)
+                .map_err(|e| e.to_string())
+        })
+        .map_err(|error| Stop::failed(error, None))?;
+    let mut settings =
+        processing.pipeline_settings(header.column_pitch_mm, header.sample_spacing_mm);
+    settings.regrid.threads = service.config().queue.threads;
+
+    let watch = Stopwatch::new(progress);
+    let (image, kept) = match streamed(service, job, &settings.regrid) {
+        Some(image) => (image, count(&mut journal, progress)?),
+        None => {
+            watch.stage(Stage::Regrid);
+            regrid(&mut journal, &header, &settings.regrid, &scan, &watch)?
+        }
+    };
+    let outcome = pipeline::process(&image, &settings, &watch)?;
+    let timestamp = scan
+        .started_at
+        .parse()
+        .map_err(|error| Stop::failed(format!("the scan's time is damaged: {error}"), None))?;
+    let cad = cad_options(&processing, &scan);
+    let inputs = Inputs {
+        name: &job.name,
+        timestamp,
+        image: &image,
+        outcome: &outcome,
+        settings: &settings,
+        cad: &cad,
+        scan: scan_report(&scan, &header, &kept),
+        warnings: kept.warnings,
+        versions: versions(&header),
+    };
+    deliverables::write(&incoming, &inputs, &watch)?;
+    // The last moment at which a cancelled job leaves nothing behind.
+    progress.check()?;
+    progress.begin("publish");
+    Ok(service.spool.publish(&job.result)?)
+}
+
+/// What the journal held.
+#[derive(Default, Clone)]
+struct Kept {
+    columns: u64,
+    samples: u64,
+    dropouts: u64,
+    warnings: Vec<String>,
+}
+
+impl Kept {
+    fn add(&mut self, column: &scan_record::RawColumn) {
+        self.columns += 1;
+        self.samples += column.samples.len() as u64;
+        self.dropouts += u64::from(column.dropouts);
+    }
+
+    fn end(&mut self, ending: Option<&Ending>) {
+        match ending {
+            Some(Ending::Closed(scan_record::EndCause::Complete)) | None => {}
+            Some(other) => self.warnings.push(format!("the scan is {other}")),
+        }
+    }
+}
+
+type Journal = JournalReader<std::io::BufReader<std::fs::File>>;
+
+/// The range image that was made while the scanner moved, if it is the one wanted. It is
+/// the same, bit for bit, as regridding would give.
+fn streamed(service: &Service, job: &Job, settings: &regrid::RegridSettings) -> Option<RangeImage> {
+    let KeptGrid { settings: made } = service.kept_grid(&job.scan)?;
+    // The number of threads leaves no trace in the result.
+    let same = regrid::RegridSettings {
+        threads: settings.threads,
+        ..made
+    } == *settings;
+    if !same {
+        return None;
+    }
+    let lattice = Lattice {
+        pitch_mm: settings.pitch_mm,
+    };
+    grid_file::read(&service.grid_path(&job.scan), lattice)
+        .inspect_err(|error| tracing::warn!(scan = %job.scan, %error, "regridding anew"))
+        .ok()
+}
+
+/// Counts what the journal holds, and whether it is whole.
+fn count(journal: &mut Journal, progress: &Progress<'_>) -> Result<Kept, Stop> {
+    let mut kept = Kept::default();
+    while let Some(column) = journal.next_column()? {
+        kept.add(&column);
+        progress.check()?;
+    }
+    kept.end(journal.ending());
+    Ok(kept)
+}
+
+/// The range image of the journal's columns.
+fn regrid(
+    journal: &mut Journal,
+    header: &Header,
+    settings: &regrid::RegridSettings,
+    scan: &Scan,
+    watch: &Stopwatch<'_>,
+) -> Result<(RangeImage, Kept), Stop> {
+    let mut kept = Kept::default();
+    let mut failure = None;
+    let columns = std::iter::from_fn(|| match journal.next_column() {
+        Ok(column) => column.map(|raw| {
+            kept.add(&raw);
+            raw.calibrated(&header.calibration)
+        }),
+        Err(error) => {
+            failure = Some(error);
+            None
+        }
+    });
+    // The iterator tells where it is, not how far the estimation has come.
+    let columns: Vec<Column> = columns.collect();
+    if let Some(error) = failure {
+        return Err(error.into());
+    }
+    kept.end(journal.ending());
+    tracing::debug!(scan = %scan.id, columns = columns.len(), "regridding");
+    let image = regrid::regrid(columns, settings, watch).map_err(|error| {
+        if watch.is_cancelled() {
+            Stop::Asked
+        } else {
+            Stop::from(PipelineError::Regrid(error))
+        }
+    })?;
+    Ok((image, kept))
+}
+
+fn cad_options(processing: &Processing, scan: &Scan) -> CadOptions {
+    let wanted = &processing.deliverables;
+    CadOptions {
+        entities: match wanted.entities {
+            Some(128) => Entities::Rational128,
+            Some(_) => Entities::Parametric114,
+            None => Entities::default(),
+        },
+        author: if wanted.author.is_empty() {
+            scan.operator.clone()
+        } else {
+            wanted.author.clone()
+        },
+        organisation: wanted.organisation.clone(),
+    }
+}
+
+/// What the journal's header says about the scanner, as far as it can be read.
+fn identity(header: &Header) -> BTreeMap<String, String> {
+    serde_json::from_slice(&header.identity).unwrap_or_default()
+}
+
+fn scan_report(scan: &Scan, header: &Header, kept: &Kept) -> ScanReport {
+    let text = |text: &String| Some(text.clone()).filter(|text| !text.is_empty());
+    let identity = identity(header);
+    let field = |name: &str| identity.get(name).map_or("?", String::as_str);
+    ScanReport {
+        id: Some(scan.id.clone()),
+        source: format!("{}, serial number {}", field("model"), field("serial")),
+        operator: text(&scan.operator),
+        part: text(&scan.part),
+        note: text(&scan.note),
+        columns: kept.columns,
+        samples: kept.samples,
+        dropouts: Some(kept.dropouts),
+    }
+}
+
+fn versions(header: &Header) -> BTreeMap<String, String> {
+    identity(header)
+        .remove("firmware")
+        .map(|firmware| ("scanner firmware".to_owned(), firmware))
+        .into_iter()
+        .collect()
+}

@@ -1,0 +1,111 @@
+//! Telling how far a job is, stage by stage.
+
+use std::sync::Mutex;
+use std::time::Instant;
+
+use pipeline::{Observer, Stage};
+use range_image::Monitor;
+use relief_api::{Event, Job, StageTiming};
+
+use super::queue::StopFlag;
+use crate::events::Hub;
+use crate::service::lock;
+
+/// Progress is told in steps of this share of a stage.
+const STEP: f64 = 0.02;
+
+/// Watches over one attempt at a job.
+pub(crate) struct Progress<'a> {
+    hub: &'a Hub,
+    job: &'a Job,
+    flag: &'a StopFlag,
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
+    running: Option<Running>,
+    finished: Vec<StageTiming>,
+}
+
+struct Running {
+    stage: String,
+    since: Instant,
+    told: f64,
+}
+
+impl<'a> Progress<'a> {
+    pub(crate) fn new(hub: &'a Hub, job: &'a Job, flag: &'a StopFlag) -> Self {
+        Self {
+            hub,
+            job,
+            flag,
+            state: Mutex::default(),
+        }
+    }
+
+    /// A stage begins that the pipeline does not know, such as the publication.
+    pub(crate) fn begin(&self, stage: &str) {
+        let mut state = lock(&self.state);
+        self.close(&mut state);
+        state.running = Some(Running {
+            stage: stage.to_owned(),
+            since: Instant::now(),
+            told: 0.0,
+        });
+        self.tell(stage, 0.0, None);
+    }
+
+    /// Ends the stage under way; gives all stages and how long they took.
+    pub(crate) fn finish(&self) -> Vec<StageTiming> {
+        let mut state = lock(&self.state);
+        self.close(&mut state);
+        state.finished.clone()
+    }
+
+    fn close(&self, state: &mut State) {
+        if let Some(running) = state.running.take() {
+            let seconds = running.since.elapsed().as_secs_f64();
+            self.tell(&running.stage, 1.0, Some(seconds));
+            state.finished.push(StageTiming {
+                stage: running.stage,
+                seconds,
+            });
+        }
+    }
+
+    fn tell(&self, stage: &str, fraction: f64, seconds: Option<f64>) {
+        self.hub.tell(Event::Progress {
+            job: self.job.id,
+            scan: self.job.scan.clone(),
+            stage: stage.to_owned(),
+            fraction,
+            seconds,
+        });
+    }
+}
+
+impl Monitor for Progress<'_> {
+    fn is_cancelled(&self) -> bool {
+        self.flag.is_set()
+    }
+
+    fn progress(&self, fraction: f64) {
+        let mut state = lock(&self.state);
+        if let Some(running) = &mut state.running
+            && fraction >= running.told + STEP
+            && fraction < 1.0
+        {
+            running.told = fraction;
+            let stage = running.stage.clone();
+            drop(state);
+            self.tell(&stage, fraction, None);
+        }
+    }
+}
+
+impl Observer for Progress<'_> {
+    fn stage(&self, stage: Stage) {
+        self.begin(stage.as_str());
+    }
+}

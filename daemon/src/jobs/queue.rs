@@ -1,0 +1,120 @@
+//! Which jobs wait and which run, in memory; the records say the same on disk.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+use relief_api::JobId;
+
+use crate::service::lock;
+
+/// Which jobs wait and which run.
+#[derive(Debug, Default)]
+pub(crate) struct Queue {
+    state: Mutex<State>,
+    wake: Condvar,
+    /// Held while a job's state is read, judged and changed.
+    order: Mutex<()>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    waiting: BTreeSet<JobId>,
+    running: BTreeMap<JobId, Arc<StopFlag>>,
+    stopping: bool,
+}
+
+/// Why a running job should stop, if it should.
+#[derive(Debug, Default)]
+pub(crate) struct StopFlag(AtomicU8);
+
+const RUN: u8 = 0;
+const CANCELLED: u8 = 1;
+const SERVICE_STOPS: u8 = 2;
+
+impl StopFlag {
+    /// True once the job should stop, for whatever reason.
+    pub(crate) fn is_set(&self) -> bool {
+        self.0.load(Ordering::Relaxed) != RUN
+    }
+
+    /// True when somebody cancelled the job, which outlasts the service's own end.
+    pub(crate) fn is_cancelled(&self) -> bool {
+        self.0.load(Ordering::Relaxed) == CANCELLED
+    }
+
+    fn set(&self, why: u8) {
+        // The first reason stays.
+        let _ = self
+            .0
+            .compare_exchange(RUN, why, Ordering::Relaxed, Ordering::Relaxed);
+    }
+}
+
+impl Queue {
+    /// Serialises changes of job states.
+    pub(crate) fn changing(&self) -> MutexGuard<'_, ()> {
+        lock(&self.order)
+    }
+
+    /// A job waits.
+    pub(crate) fn add(&self, id: JobId) {
+        lock(&self.state).waiting.insert(id);
+        self.wake.notify_one();
+    }
+
+    /// Takes a job out; false if it does not wait.
+    pub(crate) fn remove(&self, id: JobId) -> bool {
+        lock(&self.state).waiting.remove(&id)
+    }
+
+    /// Asks a running job to stop; false if it does not run.
+    pub(crate) fn cancel_running(&self, id: JobId) -> bool {
+        let state = lock(&self.state);
+        let flag = state.running.get(&id);
+        if let Some(flag) = flag {
+            flag.set(CANCELLED);
+        }
+        flag.is_some()
+    }
+
+    /// The oldest waiting job, now running; waits for one. `None` once the service stops.
+    pub(crate) fn take(&self) -> Option<(JobId, Arc<StopFlag>)> {
+        let mut state = lock(&self.state);
+        loop {
+            if state.stopping {
+                return None;
+            }
+            if let Some(id) = state.waiting.pop_first() {
+                let flag = Arc::new(StopFlag::default());
+                state.running.insert(id, Arc::clone(&flag));
+                return Some((id, flag));
+            }
+            state = self
+                .wake
+                .wait(state)
+                .unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// A job runs no more.
+    pub(crate) fn end(&self, id: JobId) {
+        lock(&self.state).running.remove(&id);
+    }
+
+    /// No job is begun any more, and those that run are asked to stop.
+    pub(crate) fn stop(&self) {
+        let mut state = lock(&self.state);
+        state.stopping = true;
+        for flag in state.running.values() {
+            flag.set(SERVICE_STOPS);
+        }
+        self.wake.notify_all();
+    }
+
+    /// Jobs waiting and running.
+    pub(crate) fn counts(&self) -> (usize, usize) {
+        let state = lock(&self.state);
+        (state.waiting.len(), state.running.len())
+    }
+}

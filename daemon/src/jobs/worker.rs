@@ -1,0 +1,135 @@
+//! A worker: takes job after job, until the service stops.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use relief_api::{Event, Job, JobState};
+
+use super::process::process;
+use super::progress::Progress;
+use super::queue::StopFlag;
+use crate::ids::now;
+use crate::service::Service;
+
+/// What became of an attempt.
+#[derive(Debug)]
+pub(crate) enum JobOutcome {
+    /// The result is in the spool.
+    Published(PathBuf),
+    /// It was asked to stop.
+    Stopped,
+    /// It cannot be done, or not now.
+    Failed {
+        /// Why not.
+        error: String,
+        /// What to do about it.
+        hint: Option<String>,
+    },
+}
+
+/// Works until the service stops. Runs on a thread of its own.
+pub(crate) fn work(service: &Arc<Service>) {
+    while let Some((id, flag)) = service.queue.take() {
+        if let Err(error) = attempt(service, id, &flag) {
+            // The record still says that the job waits or runs, so the next start of the
+            // service takes it up again.
+            tracing::error!(job = id, %error, "cannot keep the record of a job");
+        }
+        service.queue.end(id);
+    }
+}
+
+fn attempt(
+    service: &Service,
+    id: relief_api::JobId,
+    flag: &StopFlag,
+) -> Result<(), crate::error::ServiceError> {
+    let mut job = {
+        let _order = service.queue.changing();
+        let mut job = service.job(id)?;
+        job.state = JobState::Running;
+        job.attempts += 1;
+        job.started_at = Some(now());
+        job.ended_at = None;
+        service.keep_job(&job)?;
+        job
+    };
+    tracing::info!(job = id, scan = %job.scan, attempt = job.attempts, "job begins");
+    let (outcome, timings) = {
+        let progress = Progress::new(&service.hub, &job, flag);
+        // A defect in the processing of one scan must not end the service.
+        let outcome = catch_unwind(AssertUnwindSafe(|| process(service, &job, &progress)))
+            .unwrap_or_else(|panic| JobOutcome::Failed {
+                error: format!("the processing ended unexpectedly: {}", panic_text(&*panic)),
+                hint: Some(
+                    "this is a defect of the program: please report it together with the \
+                     scan's journal"
+                        .into(),
+                ),
+            });
+        (outcome, progress.finish())
+    };
+    if !matches!(outcome, JobOutcome::Published(_)) {
+        service.spool.discard(&job.result);
+    }
+    let _order = service.queue.changing();
+    job.timings = timings;
+    job.ended_at = Some(now());
+    let mut published = None;
+    match outcome {
+        JobOutcome::Published(directory) => {
+            job.state = JobState::Done;
+            job.error = None;
+            job.hint = None;
+            job.directory = Some(directory.display().to_string());
+            tracing::info!(job = id, directory = %directory.display(), "job done");
+            published = Some(published_event(service, &job));
+            if job.result == job.scan {
+                service.forget_grid(&job.scan);
+            }
+        }
+        JobOutcome::Stopped if flag.is_cancelled() => {
+            job.state = JobState::Cancelled;
+            tracing::info!(job = id, "job cancelled");
+        }
+        JobOutcome::Stopped => {
+            job.state = JobState::Queued;
+            job.ended_at = None;
+            job.timings.clear();
+            tracing::info!(job = id, "job put back, since the service stops");
+        }
+        JobOutcome::Failed { error, hint } => {
+            job.state = JobState::Failed;
+            tracing::warn!(job = id, %error, "job failed");
+            job.error = Some(error);
+            job.hint = hint;
+        }
+    }
+    service.keep_job(&job)?;
+    if let Some(event) = published {
+        service.hub.tell(event);
+    }
+    Ok(())
+}
+
+fn published_event(service: &Service, job: &Job) -> Event {
+    let entry = service.spool.entry(&job.result).ok().flatten();
+    Event::Published {
+        job: job.id,
+        scan: job.scan.clone(),
+        result: job.result.clone(),
+        directory: job.directory.clone().unwrap_or_default(),
+        files: entry.map_or_else(Vec::new, |entry| {
+            entry.files.into_iter().map(|file| file.name).collect()
+        }),
+    }
+}
+
+fn panic_text(panic: &(dyn std::any::Any + Send)) -> &str {
+    panic
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("no message")
+}

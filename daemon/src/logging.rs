@@ -1,0 +1,79 @@
+//! Where the log goes: lines for people, the systemd journal, or JSON.
+
+use std::io::IsTerminal;
+
+use tracing_subscriber::filter::EnvFilter;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
+use tracing_subscriber::{Layer, Registry, fmt, reload};
+
+use crate::config::{LogConfig, LogFormat};
+
+/// The log cannot be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    /// There is no systemd journal.
+    #[error("cannot reach the systemd journal: {0}; set log.format = \"text\"")]
+    NoJournal(std::io::Error),
+    /// The filter is not one.
+    #[error("log.level: {0}")]
+    Filter(String),
+    /// Something else in this process logs already.
+    #[error("the log was set up before")]
+    Twice,
+}
+
+/// Changes the level while the service runs.
+#[derive(Debug)]
+pub struct LogHandle {
+    filter: reload::Handle<EnvFilter, Registry>,
+}
+
+impl LogHandle {
+    /// From now on, log this much.
+    ///
+    /// # Errors
+    /// [`LogError::Filter`].
+    pub fn set_level(&self, level: &str) -> Result<(), LogError> {
+        let filter = filter(level)?;
+        self.filter
+            .reload(filter)
+            .map_err(|error| LogError::Filter(error.to_string()))
+    }
+}
+
+/// Sets up the log of this process.
+///
+/// # Errors
+/// Any [`LogError`].
+pub fn init(config: &LogConfig) -> Result<LogHandle, LogError> {
+    let (filter, handle) = reload::Layer::new(filter(&config.level)?);
+    let layer: Box<dyn Layer<_> + Send + Sync> = match resolved(config.format) {
+        LogFormat::Journald => Box::new(tracing_journald::layer().map_err(LogError::NoJournal)?),
+        LogFormat::Json => Box::new(fmt::layer().json().with_writer(std::io::stderr)),
+        LogFormat::Text | LogFormat::Auto => Box::new(
+            fmt::layer()
+                .with_ansi(std::io::stderr().is_terminal())
+                .with_target(false)
+                .with_writer(std::io::stderr),
+        ),
+    };
+    tracing_subscriber::registry()
+        .with(filter)
+        .with(layer)
+        .try_init()
+        .map_err(|_| LogError::Twice)?;
+    Ok(LogHandle { filter: handle })
+}
+
+/// systemd sets JOURNAL_STREAM when standard error goes to its journal.
+fn resolved(format: LogFormat) -> LogFormat {
+    match format {
+        LogFormat::Auto if std::env::var_os("JOURNAL_STREAM").is_some() => LogFormat::Journald,
+        other => other,
+    }
+}
+
+fn filter(level: &str) -> Result<EnvFilter, LogError> {
+    EnvFilter::try_new(level).map_err(|error| LogError::Filter(error.to_string()))
+}

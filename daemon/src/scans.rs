@@ -1,0 +1,278 @@
+//! Scans: starting, ending, and what is kept of them.
+
+use std::sync::Arc;
+use std::thread::JoinHandle;
+
+use relief_api::{Event, Scan, ScanState, ScannerLink, StartScan};
+use scan_record::JournalReader;
+
+use crate::acquisition::{AbortRequest, Ticket, resolve, run};
+use crate::error::ServiceError;
+use crate::ids::{now, shown_name};
+use crate::service::{Service, lock};
+
+/// The place for the one scan that can be under way.
+#[derive(Debug)]
+pub(crate) enum Slot {
+    /// Nothing is under way.
+    Free,
+    /// The scanner is being asked whether it is there.
+    Reserved,
+    /// A scan is under way.
+    Taken {
+        /// As it stands; newer than the kept record.
+        scan: Scan,
+        /// Ends it early.
+        abort: Arc<AbortRequest>,
+        /// Its thread.
+        thread: Option<JoinHandle<()>>,
+    },
+}
+
+/// Frees a reserved slot unless the scan took it.
+struct Reservation<'a> {
+    service: &'a Service,
+    used: bool,
+}
+
+impl Drop for Reservation<'_> {
+    fn drop(&mut self) {
+        if !self.used {
+            *lock(&self.service.slot) = Slot::Free;
+        }
+    }
+}
+
+impl Service {
+    /// Starts a scan. Blocks until the scanner has said who it is, so that a scanner that
+    /// is not there, or a plan that it cannot do, is refused at once.
+    pub(crate) fn start_scan(self: &Arc<Self>, request: &StartScan) -> Result<Scan, ServiceError> {
+        self.check_running()?;
+        let config = self.config();
+        let processing = config.processing().with_overrides(&request.settings)?;
+        let mut reservation = self.reserve()?;
+        let identity = self.scanner.identify().map_err(|error| {
+            self.note_scanner(ScannerLink::Trouble, Some(error.to_string()));
+            ServiceError::Scanner(error)
+        })?;
+        self.note_identity(&identity);
+        let plan = resolve(&request.plan.or(&config.scan), &identity)?;
+        let id = self.ids.next(&request.name, |id| {
+            self.spool.has(id) || self.journal_path(id).exists()
+        });
+        let scan = Scan {
+            id,
+            name: shown_name(&request.name),
+            part: request.part.clone(),
+            operator: request.operator.clone(),
+            note: request.note.clone(),
+            state: ScanState::Starting,
+            reason: None,
+            started_at: now(),
+            ended_at: None,
+            columns_planned: plan.plan.columns,
+            columns: 0,
+            settings: request.settings.clone(),
+            jobs: Vec::new(),
+        };
+        let abort = Arc::new(AbortRequest::default());
+        let ticket = Ticket {
+            scan: scan.clone(),
+            plan,
+            identity,
+            processing,
+            abort: Arc::clone(&abort),
+        };
+        {
+            // Under the lock, so that the thread finds its slot taken, and so that a
+            // service that stops finds either the scan or none to come.
+            let mut slot = lock(&self.slot);
+            self.check_running()?;
+            self.store.put_scan(&scan)?;
+            let service = Arc::clone(self);
+            let thread = std::thread::Builder::new()
+                .name("scan".into())
+                .spawn(move || run(&service, ticket))
+                .map_err(ServiceError::Thread)?;
+            *slot = Slot::Taken {
+                scan: scan.clone(),
+                abort,
+                thread: Some(thread),
+            };
+            reservation.used = true;
+        }
+        self.hub.tell(Event::Scan(scan.clone()));
+        Ok(scan)
+    }
+
+    fn reserve(&self) -> Result<Reservation<'_>, ServiceError> {
+        let mut slot = lock(&self.slot);
+        match &*slot {
+            Slot::Free => {
+                *slot = Slot::Reserved;
+                Ok(Reservation {
+                    service: self,
+                    used: false,
+                })
+            }
+            Slot::Reserved => Err(ServiceError::ScannerBusy { scan: None }),
+            Slot::Taken { scan, .. } => Err(ServiceError::ScannerBusy {
+                scan: Some(scan.id.clone()),
+            }),
+        }
+    }
+
+    /// Ends the scan that is under way, or that of this id. The laser is off when this
+    /// returns, if the scanner can be reached.
+    pub(crate) fn abort_scan(&self, id: Option<&str>, reason: &str) -> Result<Scan, ServiceError> {
+        let (scan, abort) = {
+            let slot = lock(&self.slot);
+            match &*slot {
+                Slot::Taken { scan, abort, .. } if id.is_none_or(|id| id == scan.id) => {
+                    (scan.clone(), Arc::clone(abort))
+                }
+                _ => {
+                    drop(slot);
+                    return Err(match id {
+                        Some(id) => {
+                            let scan = self.scan(id)?;
+                            ServiceError::ScanIsOver {
+                                id: scan.id,
+                                state: scan.state,
+                            }
+                        }
+                        None => ServiceError::NothingToAbort,
+                    });
+                }
+            }
+        };
+        abort.ask(reason);
+        if let Err(error) = self.scanner.abort() {
+            tracing::warn!(%error, "cannot tell the scanner to stop");
+        }
+        Ok(self
+            .active_scan()
+            .filter(|s| s.id == scan.id)
+            .map_or_else(|| self.scan(&scan.id), Ok)?)
+    }
+
+    /// Waits until no scan is under way.
+    pub(crate) fn join_scan(&self) {
+        let thread = match &mut *lock(&self.slot) {
+            Slot::Taken { thread, .. } => thread.take(),
+            _ => None,
+        };
+        if let Some(thread) = thread
+            && thread.join().is_err()
+        {
+            tracing::error!("the scan's thread ended by a panic");
+        }
+    }
+
+    /// True while a scan is under way or about to be.
+    pub(crate) fn is_scanning(&self) -> bool {
+        !matches!(*lock(&self.slot), Slot::Free)
+    }
+
+    /// The scan under way.
+    pub(crate) fn active_scan(&self) -> Option<Scan> {
+        match &*lock(&self.slot) {
+            Slot::Taken { scan, .. } => Some(scan.clone()),
+            _ => None,
+        }
+    }
+
+    /// Changes what is known of the scan under way; gives it as it is then.
+    pub(crate) fn update_active(&self, change: impl FnOnce(&mut Scan)) -> Option<Scan> {
+        match &mut *lock(&self.slot) {
+            Slot::Taken { scan, .. } => {
+                change(scan);
+                Some(scan.clone())
+            }
+            _ => None,
+        }
+    }
+
+    /// Keeps a scan's record and tells of it.
+    pub(crate) fn keep_scan(&self, scan: &Scan) -> Result<(), ServiceError> {
+        self.store.put_scan(scan)?;
+        self.hub.tell(Event::Scan(scan.clone()));
+        Ok(())
+    }
+
+    /// Notes how the scan under way ended, queues its job if it is complete, and makes
+    /// room for the next.
+    pub(crate) fn end_scan(&self, id: &str, state: ScanState, reason: Option<String>) {
+        let scan = self.update_active(|scan| {
+            scan.state = state;
+            scan.reason = reason;
+            scan.ended_at = Some(now());
+        });
+        let Some(mut scan) = scan.filter(|scan| scan.id == id) else {
+            return;
+        };
+        let kept = if state == ScanState::Complete {
+            self.queue_first_job(&mut scan).map(drop)
+        } else {
+            self.store.put_scan(&scan).map_err(ServiceError::from)
+        };
+        if let Err(error) = kept {
+            tracing::error!(scan = id, %error, "cannot keep the record of a scan");
+        }
+        *lock(&self.slot) = Slot::Free;
+        match (state, &scan.reason) {
+            (ScanState::Failed, Some(reason)) => {
+                self.note_scanner(ScannerLink::Trouble, Some(reason.clone()));
+            }
+            _ => self.note_scanner(ScannerLink::Ready, None),
+        }
+        self.hub.tell(Event::Scan(scan));
+    }
+
+    /// One scan, as it stands.
+    pub(crate) fn scan(&self, id: &str) -> Result<Scan, ServiceError> {
+        if let Some(scan) = self.active_scan().filter(|scan| scan.id == id) {
+            return Ok(scan);
+        }
+        self.store
+            .scan(id)?
+            .ok_or_else(|| ServiceError::NoSuchScan { id: id.to_owned() })
+    }
+
+    /// All scans, newest first.
+    pub(crate) fn scans(&self) -> Result<Vec<Scan>, ServiceError> {
+        let active = self.active_scan();
+        let mut scans = self.store.scans()?;
+        scans.reverse();
+        if let Some(active) = active
+            && let Some(kept) = scans.iter_mut().find(|scan| scan.id == active.id)
+        {
+            *kept = active;
+        }
+        Ok(scans)
+    }
+
+    /// After a restart: notes scans that were cut short, and what was kept of them.
+    pub(crate) fn recover_scans(&self) -> Result<(), ServiceError> {
+        for mut scan in self.store.scans()? {
+            if scan.state.is_over() {
+                continue;
+            }
+            let (columns, found) = match JournalReader::open(&self.journal_path(&scan.id)) {
+                Ok(mut reader) => {
+                    while let Ok(Some(_)) = reader.next_column() {}
+                    let ending = reader.ending().map(ToString::to_string);
+                    (reader.columns(), ending.unwrap_or_default())
+                }
+                Err(error) => (0, error.to_string()),
+            };
+            scan.columns = columns;
+            scan.state = ScanState::Interrupted;
+            scan.reason = Some(format!("the service ended during the scan ({found})"));
+            scan.ended_at = Some(now());
+            tracing::warn!(scan = %scan.id, columns, "a scan was cut short when the service last ended");
+            self.store.put_scan(&scan)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,124 @@
+use std::path::Path;
+
+use reliefd::Config;
+
+fn refused(text: &str) -> String {
+    Config::parse(text, Path::new("relief.toml"))
+        .unwrap_err()
+        .to_string()
+}
+
+#[test]
+fn faults_are_told_with_their_line_and_a_way_out() {
+    for (text, message) in [
+        (
+            "[service]\nsocket = \"s\"\n\n[regrid]\n# M\nneigbours = 30\n",
+            "relief.toml, line 6, column 1: in [regrid] unknown key `neigbours`; did you mean \
+             `neighbours`?",
+        ),
+        (
+            "[regird]\npitch_mm = 1\n",
+            "relief.toml, line 1, column 2: unknown key `regird`; did you mean `regrid`?",
+        ),
+        (
+            "[scanner]\nport = \"/dev/ttyS0\"\nbaud = 9\n",
+            "relief.toml, line 3, column 8: 9 is out of range: 1200 to 12000000 bits per second \
+             are possible",
+        ),
+        (
+            "[scanner]\ntransport = \"seriel\"\n",
+            "relief.toml, line 2, column 13: unknown value `seriel`; did you mean `serial`?",
+        ),
+        (
+            "[service]\nlisten = \"0.0.0.0:80\"\n",
+            "relief.toml, line 2, column 10: 0.0.0.0:80 can be reached from other machines, and \
+             the API asks for no password: use a loopback address such as \"127.0.0.1:80\"",
+        ),
+        (
+            "[service]\nlisten = \"localhost\"\n",
+            "relief.toml, line 2, column 10: \"localhost\" is no address with a port, such as \
+             \"127.0.0.1:7437\"",
+        ),
+        (
+            "[regrid]\npitch_mm = 0.0\n",
+            "relief.toml, line 2, column 12: 0 is out of range: a positive number is needed",
+        ),
+        (
+            "[deliverables]\nentities = 144\n",
+            "relief.toml, line 2, column 12: 144 is no surface entity that can be written: use \
+             114 or 128",
+        ),
+        (
+            "[segment]\nclusters = 0\n",
+            "relief.toml, section [segment]: clusters is 0, but must be 1 to 1000",
+        ),
+        (
+            "[log]\nlevel = \"loud=quiet=\"\n",
+            "relief.toml, line 2, column 9: \"loud=quiet=\" is no log level: use error, warn, \
+             info, debug or trace, or a filter such as \"info,reliefd=debug\"",
+        ),
+    ] {
+        assert_eq!(refused(text), message);
+    }
+    let kind = refused("[queue]\nworkers = \"two\"\n");
+    assert!(
+        kind.starts_with("relief.toml, line 2, column 11: invalid type"),
+        "{kind}"
+    );
+    let syntax = refused("[queue]\nworkers = \n");
+    assert!(syntax.starts_with("relief.toml, line 2"), "{syntax}");
+    let missing = Config::load(Path::new("no/such.toml")).unwrap_err();
+    assert_eq!(
+        missing.to_string(),
+        "cannot read the configuration no/such.toml: No such file or directory (os error 2)"
+    );
+}
+
+#[test]
+fn the_examples_are_sound_and_show_the_defaults() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
+    let serial = Config::load(&folder.join("serial.toml")).unwrap();
+    assert_eq!(serial, Config::default());
+    let simulator = Config::load(&folder.join("simulator.toml")).unwrap();
+    assert_eq!(simulator.scanner.port, Path::new("relief-demo/scanner"));
+
+    // With every key that is commented out put in force, nothing is refused.
+    let text = std::fs::read_to_string(folder.join("serial.toml")).unwrap();
+    let all: String = text
+        .lines()
+        .map(|line| match line.strip_prefix("# ") {
+            Some(key) if key.split_once(" = ").is_some_and(|(k, _)| !k.contains(' ')) => key,
+            _ => line,
+        })
+        .flat_map(|line| [line, "\n"])
+        .collect();
+    assert_ne!(all, text);
+    let all = Config::parse(&all, Path::new("serial.toml")).unwrap();
+    assert_eq!(all.regrid.neighbours, Some(32));
+    assert_eq!(all.journal, Config::default().journal);
+    assert_eq!(all.queue, Config::default().queue);
+    assert_eq!(all.log, Config::default().log);
+    let defaults = Config::default().processing().pipeline_settings(0.5, 0.5);
+    let mut shown = all.processing().pipeline_settings(0.5, 0.5);
+    shown.regrid.roi = defaults.regrid.roi;
+    assert_eq!(
+        shown, defaults,
+        "the values shown as defaults are the defaults"
+    );
+}
+
+#[test]
+fn a_reload_says_what_holds_and_what_needs_a_restart() {
+    let parse = |text: &str| Config::parse(text, Path::new("relief.toml")).unwrap();
+    let old = parse("");
+    let new = parse(
+        "[regrid]\nseed = 7\n[log]\nlevel = \"debug\"\n[scanner]\nbaud = 9600\n\
+         [deliverables]\nauthor = \"A\"\n",
+    );
+    let (merged, outcome) = old.reloaded(&new);
+    assert_eq!(outcome.applied, ["regrid", "deliverables", "log"]);
+    assert_eq!(outcome.needs_restart, ["scanner"]);
+    assert_eq!(merged.regrid.seed, Some(7));
+    assert_eq!(merged.scanner, old.scanner);
+    assert_eq!(old.reloaded(&old).1, reliefd::config::Reloaded::default());
+}

@@ -1,0 +1,254 @@
+//! A scanner in memory: a gable roof of two planes, delivered when the test says so.
+
+use std::sync::mpsc::sync_channel;
+use std::sync::{Arc, Condvar, Mutex};
+use std::time::Duration;
+
+use scanner_driver::protocol::{
+    Activity, Calibration, Faults, Head, Identity, Limits, ScanPlan, text,
+};
+use scanner_driver::{
+    DeviceStatus, LineCounts, RawColumn, RawSample, ScanInfo, ScanStream, Scanner, ScannerError,
+    StreamControl, StreamItem,
+};
+
+/// Micrometres per count, of table and profile.
+const COUNT_UM: u32 = 1;
+pub(crate) const COLUMNS: u32 = 60;
+pub(crate) const SAMPLES: u16 = 60;
+const PITCH_UM: i32 = 500;
+
+/// Called with each acknowledged column.
+type OnAcknowledge = Box<dyn Fn(u32) + Send + Sync>;
+
+#[derive(Default)]
+struct State {
+    /// Columns that may still be delivered; `None` for any number.
+    permits: Option<u32>,
+    aborted: bool,
+    homed: bool,
+    /// What every call answers instead.
+    trouble: Option<ScannerError>,
+    /// A fault after this many columns of a scan.
+    fault_after: Option<u32>,
+    laser_on: bool,
+}
+
+/// The scanner, and the test's hand on it.
+#[derive(Default)]
+pub(crate) struct FakeScanner {
+    state: Mutex<State>,
+    changed: Condvar,
+    on_acknowledge: Mutex<Option<OnAcknowledge>>,
+    acknowledged: Mutex<Vec<u32>>,
+    this: std::sync::OnceLock<std::sync::Weak<FakeScanner>>,
+}
+
+impl FakeScanner {
+    pub(crate) fn new() -> Arc<Self> {
+        let scanner = Arc::new(Self::default());
+        scanner.this.get_or_init(|| Arc::downgrade(&scanner));
+        scanner
+    }
+
+    fn change(&self, change: impl FnOnce(&mut State)) {
+        change(&mut self.state.lock().unwrap());
+        self.changed.notify_all();
+    }
+
+    /// From now on only this many columns are delivered.
+    pub(crate) fn allow(&self, columns: u32) {
+        self.change(|state| state.permits = Some(columns));
+    }
+
+    /// From now on columns flow freely.
+    pub(crate) fn allow_all(&self) {
+        self.change(|state| state.permits = None);
+    }
+
+    pub(crate) fn fail_with(&self, trouble: Option<ScannerError>) {
+        self.change(|state| state.trouble = trouble);
+    }
+
+    pub(crate) fn fault_after(&self, columns: u32) {
+        self.change(|state| state.fault_after = Some(columns));
+    }
+
+    pub(crate) fn laser_is_on(&self) -> bool {
+        self.state.lock().unwrap().laser_on
+    }
+
+    pub(crate) fn acknowledged(&self) -> Vec<u32> {
+        self.acknowledged.lock().unwrap().clone()
+    }
+
+    pub(crate) fn on_acknowledge(&self, hook: impl Fn(u32) + Send + Sync + 'static) {
+        *self.on_acknowledge.lock().unwrap() = Some(Box::new(hook));
+    }
+
+    fn check(&self) -> Result<(), ScannerError> {
+        match &self.state.lock().unwrap().trouble {
+            Some(trouble) => Err(trouble.clone()),
+            None => Ok(()),
+        }
+    }
+
+    /// Waits for leave to deliver column `index`.
+    fn wait_for_leave(&self, index: u32) -> Result<(), ScannerError> {
+        let mut state = self.state.lock().unwrap();
+        loop {
+            if state.aborted {
+                return Err(ScannerError::Aborted);
+            }
+            if state.fault_after.is_some_and(|after| index >= after) {
+                return Err(ScannerError::Fault(Faults::TABLE_STALL));
+            }
+            match &mut state.permits {
+                None => return Ok(()),
+                Some(0) => state = self.changed.wait(state).unwrap(),
+                Some(permits) => {
+                    *permits -= 1;
+                    return Ok(());
+                }
+            }
+        }
+    }
+}
+
+struct Control(std::sync::Weak<FakeScanner>);
+
+impl StreamControl for Control {
+    fn acknowledge(&self, column: u32) {
+        if let Some(scanner) = self.0.upgrade() {
+            scanner.acknowledged.lock().unwrap().push(column);
+            if let Some(hook) = &*scanner.on_acknowledge.lock().unwrap() {
+                hook(column);
+            }
+        }
+    }
+
+    fn close(&self) {
+        if let Some(scanner) = self.0.upgrade() {
+            scanner.change(|state| state.aborted = true);
+        }
+    }
+}
+
+impl Scanner for FakeScanner {
+    fn identify(&self) -> Result<Identity, ScannerError> {
+        self.check()?;
+        Ok(Identity {
+            model: text("Fake"),
+            serial: text("F-1"),
+            firmware: text("0.1"),
+            calibration: Calibration {
+                table_count_pm: COUNT_UM * 1_000_000,
+                table_origin_nm: 0,
+                head: Head::Cartesian {
+                    count_pm: COUNT_UM * 1_000_000,
+                },
+            },
+            limits: Limits {
+                table_min_counts: 0,
+                table_max_counts: 100_000,
+                lateral_min_counts: -20_000,
+                lateral_max_counts: 20_000,
+                max_line_rate_millihz: 0,
+                max_columns: 10_000,
+                max_samples: 1_000,
+                max_credits: 64,
+                min_exposure_us: 10,
+                max_exposure_us: 10_000,
+                min_dead_man_ms: 100,
+                max_dead_man_ms: 10_000,
+                proposed: ScanPlan {
+                    first_table_counts: 0,
+                    pitch_counts: PITCH_UM,
+                    columns: COLUMNS,
+                    first_angle_counts: -PITCH_UM * i32::from(SAMPLES) / 2,
+                    angle_step_counts: PITCH_UM,
+                    samples: SAMPLES,
+                    exposure_us: 0,
+                },
+            },
+        })
+    }
+
+    fn home(&self) -> Result<(), ScannerError> {
+        self.check()?;
+        self.change(|state| state.homed = true);
+        Ok(())
+    }
+
+    fn status(&self) -> Result<DeviceStatus, ScannerError> {
+        self.check()?;
+        let state = self.state.lock().unwrap();
+        Ok(DeviceStatus {
+            activity: Activity::Idle,
+            homed: state.homed,
+            laser_on: state.laser_on,
+            faults: Faults::NONE,
+            table_counts: None,
+            temperature_c: None,
+            uptime: Duration::ZERO,
+            line: LineCounts::default(),
+        })
+    }
+
+    fn start_scan(&self, plan: &ScanPlan) -> Result<ScanStream, ScannerError> {
+        self.check()?;
+        self.change(|state| {
+            assert!(state.homed, "the table was not homed");
+            state.aborted = false;
+            state.laser_on = true;
+        });
+        let (sender, receiver) = sync_channel(4);
+        let this = self.this.get().unwrap().clone();
+        let scanner = this.upgrade().unwrap();
+        let plan = *plan;
+        std::thread::spawn(move || {
+            let end = (0..plan.columns).try_for_each(|index| {
+                scanner.wait_for_leave(index)?;
+                sender
+                    .send(StreamItem::Column(column(&plan, index)))
+                    .map_err(|_| ScannerError::Closed)
+            });
+            scanner.change(|state| state.laser_on = false);
+            let _ = sender.send(StreamItem::End(end));
+        });
+        Ok(ScanStream::new(
+            ScanInfo {
+                columns: plan.columns,
+                spacing_um: plan.angle_step_counts.unsigned_abs() * COUNT_UM,
+                uniform: true,
+            },
+            receiver,
+            Arc::new(Control(this)),
+        ))
+    }
+
+    fn abort(&self) -> Result<(), ScannerError> {
+        self.change(|state| state.aborted = true);
+        Ok(())
+    }
+}
+
+/// A gable roof, its ridge along x at y = 0: z = 10 mm - |y| / 2.
+fn column(plan: &ScanPlan, index: u32) -> RawColumn {
+    RawColumn {
+        index,
+        table_counts: plan.first_table_counts + plan.pitch_counts * index as i32,
+        samples: (0..i32::from(plan.samples))
+            .map(|k| {
+                let lateral_counts = plan.first_angle_counts + plan.angle_step_counts * k;
+                RawSample {
+                    lateral_counts,
+                    range_counts: 10_000 - lateral_counts.abs() / 2,
+                    intensity: 200,
+                    saturated: false,
+                }
+            })
+            .collect(),
+        dropouts: 2,
+    }
+}

@@ -1,0 +1,190 @@
+use relief_api::{Event, Job, JobState, Rerun, Scan, ScanState, Status, path};
+use serde_json::json;
+
+use crate::client::Events;
+use crate::rig::{Rig, ended, job_becomes, job_over, json as read_json};
+
+/// Settings with which regridding takes far longer than any test.
+fn endless() -> Rerun {
+    Rerun {
+        settings: [
+            ("regrid.draws".to_owned(), json!(100_000)),
+            ("regrid.neighbours".to_owned(), json!(1_024)),
+            ("regrid.reach_columns".to_owned(), json!(60)),
+        ]
+        .into(),
+        ..Rerun::default()
+    }
+}
+
+/// A rerun that is being regridded.
+async fn running(rig: &Rig, events: &mut Events, scan: &str, rerun: &Rerun) -> Job {
+    let job: Job = rig.client.post(&path::scan_rerun(scan), rerun).await;
+    let regridding = |event: &Event| match event {
+        Event::Progress { job: id, stage, .. } if *id == job.id && stage == "regrid" => Some(()),
+        _ => None,
+    };
+    events.until(regridding).await;
+    job
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_second_scan_is_taken_while_the_first_is_processed() {
+    let rig = Rig::new().await;
+    let (first, _) = rig.scan_to_result("first").await;
+    let mut events = rig.client.events().await;
+    let busy = running(&rig, &mut events, &first.id, &endless()).await;
+
+    let second = rig.start_scan("second").await;
+    let second = ended(&mut events, &second.id).await;
+    assert_eq!(second.state, ScanState::Complete);
+    let status: Status = rig.client.get(path::STATUS).await;
+    assert_eq!((status.jobs_running, status.jobs_queued), (1, 1));
+
+    let _: Job = rig.client.ask(&path::job_cancel(busy.id)).await;
+    let busy = job_over(&mut events, &rig, busy.id).await;
+    assert_eq!(busy.state, JobState::Cancelled);
+    let job = job_over(&mut events, &rig, second.jobs[0]).await;
+    assert_eq!(job.state, JobState::Done, "{:?}", job.error);
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn jobs_are_cancelled_while_they_wait_and_while_they_run() {
+    let rig = Rig::new().await;
+    let (scan, _) = rig.scan_to_result("a").await;
+    let mut events = rig.client.events().await;
+    let busy = running(&rig, &mut events, &scan.id, &endless()).await;
+    let waiting: Job = rig
+        .client
+        .post(&path::scan_rerun(&scan.id), &Rerun::default())
+        .await;
+    let waiting: Job = rig.client.ask(&path::job_cancel(waiting.id)).await;
+    assert_eq!(waiting.state, JobState::Cancelled);
+    let _: Job = rig.client.ask(&path::job_cancel(busy.id)).await;
+    let busy = job_over(&mut events, &rig, busy.id).await;
+    assert_eq!(busy.state, JobState::Cancelled);
+    assert!(!rig.daemon.spool_dir().join(&busy.result).exists());
+
+    let again = rig
+        .client
+        .request("POST", &path::job_cancel(busy.id), None)
+        .await;
+    assert_eq!(
+        (again.status, again.problem().kind.as_str()),
+        (409, "wrong-job-state")
+    );
+    let retried: Job = rig.client.ask(&path::job_retry(waiting.id)).await;
+    assert_eq!(retried.state, JobState::Queued);
+    let done = job_over(&mut events, &rig, waiting.id).await;
+    assert_eq!(done.state, JobState::Done, "{:?}", done.error);
+    // Nothing unfinished is left lying about.
+    let left: Vec<_> = std::fs::read_dir(rig.daemon.spool_dir())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.starts_with('.'))
+        .collect();
+    assert!(left.is_empty(), "{left:?}");
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_rerun_has_other_settings_and_a_folder_of_its_own() {
+    let rig = Rig::new().await;
+    let (scan, first) = rig.scan_to_result("roof").await;
+    let before = std::fs::read(rig.daemon.spool_dir().join(&first.result).join("roof.igs"));
+    let mut events = rig.client.events().await;
+    let rerun = Rerun {
+        name: "roof coarse".into(),
+        settings: [
+            ("regrid.pitch_mm".to_owned(), json!(0.8)),
+            ("deliverables.entities".to_owned(), json!(128)),
+        ]
+        .into(),
+    };
+    let job: Job = rig.client.post(&path::scan_rerun(&scan.id), &rerun).await;
+    assert_ne!(job.result, scan.id);
+    assert_eq!(job.scan, scan.id);
+    let job = job_over(&mut events, &rig, job.id).await;
+    assert_eq!(job.state, JobState::Done, "{:?}", job.error);
+    let folder = rig.daemon.spool_dir().join(&job.result);
+    let report = read_json(&folder.join("report.json"));
+    assert_eq!(report["range_image"]["pitch_mm"], 0.8);
+    assert_eq!(report["settings"]["iges_entities"], 128);
+    assert_eq!(report["scan"]["id"], scan.id.as_str());
+    assert!(folder.join("roof coarse.igs").is_file());
+    let after = std::fs::read(rig.daemon.spool_dir().join(&first.result).join("roof.igs"));
+    assert_eq!(before.unwrap(), after.unwrap());
+    let scan: Scan = rig.client.get(&path::scan(&scan.id)).await;
+    assert_eq!(scan.jobs, [first.id, job.id]);
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_job_cut_short_by_a_stop_is_finished_after_the_restart() {
+    let rig = Rig::new().await;
+    let (scan, _) = rig.scan_to_result("a").await;
+    let mut events = rig.client.events().await;
+    // Long enough to be met half done, short enough to be waited for.
+    let rerun = Rerun {
+        settings: [("regrid.draws".to_owned(), json!(6_000))].into(),
+        ..Rerun::default()
+    };
+    let job = running(&rig, &mut events, &scan.id, &rerun).await;
+    let rig = rig.restart().await;
+    let mut events = rig.client.events().await;
+    let job = job_over(&mut events, &rig, job.id).await;
+    assert_eq!(
+        (job.state, job.attempts),
+        (JobState::Done, 2),
+        "{:?}",
+        job.error
+    );
+    assert!(
+        rig.daemon
+            .spool_dir()
+            .join(&job.result)
+            .join("a.igs")
+            .is_file()
+    );
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_unwritable_spool_fails_the_job_and_a_retry_mends_it() {
+    let rig = Rig::new().await;
+    let spool = rig.daemon.spool_dir().to_owned();
+    // A file in the folder's place refuses even root.
+    std::fs::remove_dir(&spool).unwrap();
+    std::fs::write(&spool, "").unwrap();
+    let mut events = rig.client.events().await;
+    let scan = rig.start_scan("a").await;
+    let scan = ended(&mut events, &scan.id).await;
+    assert_eq!(scan.state, ScanState::Complete);
+    let job = job_over(&mut events, &rig, scan.jobs[0]).await;
+    assert_eq!(job.state, JobState::Failed);
+    let error = job.error.unwrap();
+    assert!(
+        error.starts_with(&format!(
+            "cannot make a folder in the spool {}",
+            spool.display()
+        )) || error.contains("Not a directory"),
+        "{error}"
+    );
+    assert_eq!(
+        job.hint.as_deref(),
+        Some("mend the cause, then retry the job")
+    );
+
+    std::fs::remove_file(&spool).unwrap();
+    std::fs::create_dir(&spool).unwrap();
+    let _: Job = rig.client.ask(&path::job_retry(job.id)).await;
+    let job = job_becomes(&mut events, job.id, JobState::is_over).await;
+    assert_eq!(
+        (job.state, job.attempts),
+        (JobState::Done, 2),
+        "{:?}",
+        job.error
+    );
+    rig.daemon.shutdown().await;
+}

@@ -1,0 +1,113 @@
+//! A service in a folder of its own.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use relief_api::{Event, Job, JobId, JobState, Scan, ScanState, StartScan, path};
+use reliefd::{Config, Daemon};
+use tempfile::TempDir;
+
+use crate::client::{Client, Events};
+use crate::fake::FakeScanner;
+
+pub(crate) struct Rig {
+    pub(crate) daemon: Daemon,
+    pub(crate) client: Client,
+    pub(crate) scanner: Arc<FakeScanner>,
+    pub(crate) folder: TempDir,
+}
+
+pub(crate) fn config(folder: &Path) -> Config {
+    let mut config = Config::default();
+    config.service.socket = folder.join("reliefd.sock");
+    config.service.state_dir = folder.join("state");
+    config.service.spool_dir = folder.join("spool");
+    config.queue.threads = 1;
+    config
+}
+
+impl Rig {
+    pub(crate) async fn new() -> Self {
+        Self::start(tempfile::tempdir().unwrap(), |_| {}).await
+    }
+
+    pub(crate) async fn start(folder: TempDir, change: impl FnOnce(&mut Config)) -> Self {
+        let mut config = config(folder.path());
+        change(&mut config);
+        let scanner = FakeScanner::new();
+        let daemon = Daemon::start_with(config, scanner.clone()).await.unwrap();
+        Self {
+            client: Client::new(daemon.socket()),
+            daemon,
+            scanner,
+            folder,
+        }
+    }
+
+    /// Ends the service and starts another on what it left.
+    pub(crate) async fn restart(self) -> Self {
+        self.daemon.shutdown().await;
+        Self::start(self.folder, |_| {}).await
+    }
+
+    pub(crate) fn journal(&self, scan: &str) -> PathBuf {
+        self.folder
+            .path()
+            .join("state/scans")
+            .join(format!("{scan}.scan"))
+    }
+
+    pub(crate) async fn start_scan(&self, name: &str) -> Scan {
+        let request = StartScan {
+            name: name.into(),
+            ..StartScan::default()
+        };
+        self.client.post(path::SCANS, &request).await
+    }
+
+    /// Takes a scan and waits for its result.
+    pub(crate) async fn scan_to_result(&self, name: &str) -> (Scan, Job) {
+        let mut events = self.client.events().await;
+        let scan = self.start_scan(name).await;
+        let scan = ended(&mut events, &scan.id).await;
+        assert_eq!(scan.state, ScanState::Complete, "{:?}", scan.reason);
+        let job = job_over(&mut events, self, scan.jobs[0]).await;
+        assert_eq!(job.state, JobState::Done, "{:?}", job.error);
+        (scan, job)
+    }
+}
+
+/// Waits for a scan's end.
+pub(crate) async fn ended(events: &mut Events, id: &str) -> Scan {
+    let find = |event: &Event| match event {
+        Event::Scan(scan) if scan.id == id && scan.state.is_over() => Some(scan.clone()),
+        _ => None,
+    };
+    events.until(find).await.1
+}
+
+/// Waits for a job's end, which may be over already.
+pub(crate) async fn job_over(events: &mut Events, rig: &Rig, id: JobId) -> Job {
+    let job: Job = rig.client.get(&path::job(id)).await;
+    if job.state.is_over() {
+        return job;
+    }
+    job_becomes(events, id, JobState::is_over).await
+}
+
+/// Waits for a job to be told in a state.
+pub(crate) async fn job_becomes(
+    events: &mut Events,
+    id: JobId,
+    wanted: impl Fn(JobState) -> bool,
+) -> Job {
+    let find = |event: &Event| match event {
+        Event::Job(job) if job.id == id && wanted(job.state) => Some(job.clone()),
+        _ => None,
+    };
+    events.until(find).await.1
+}
+
+pub(crate) fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}

@@ -1,0 +1,209 @@
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use relief_api::{
+    Event, Job, JobList, JobState, Rerun, Scan, ScanList, ScanState, SpoolEntry, StartScan, path,
+};
+use scan_record::{EndCause, Ending, JournalReader};
+
+use crate::fake::{COLUMNS, SAMPLES};
+use crate::rig::{Rig, ended, job_over, json};
+
+fn read_journal(path: &Path) -> (u32, Ending) {
+    let mut reader = JournalReader::open(path).unwrap();
+    while reader.next_column().unwrap().is_some() {}
+    (reader.columns(), reader.ending().unwrap().clone())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_scan_becomes_a_result_in_the_spool() {
+    let rig = Rig::new().await;
+    let mut events = rig.client.events().await;
+    let request = StartScan {
+        name: "Gable roof".into(),
+        part: "P-17".into(),
+        operator: "M. Mason".into(),
+        note: "first try".into(),
+        ..StartScan::default()
+    };
+    let scan: Scan = rig.client.post(path::SCANS, &request).await;
+    assert!(scan.id.ends_with("-Gable-roof"), "{}", scan.id);
+    let scan = ended(&mut events, &scan.id).await;
+    assert_eq!(
+        (scan.state, scan.columns, scan.columns_planned),
+        (ScanState::Complete, COLUMNS, COLUMNS)
+    );
+    let job = job_over(&mut events, &rig, scan.jobs[0]).await;
+    assert_eq!((job.state, job.attempts), (JobState::Done, 1));
+    assert_eq!(job.result, scan.id);
+
+    let directory = rig.daemon.spool_dir().join(&scan.id);
+    assert_eq!(job.directory.as_deref(), directory.to_str());
+    let entry: SpoolEntry = rig.client.get(&path::spool(&scan.id)).await;
+    let names: Vec<&str> = entry.files.iter().map(|file| file.name.as_str()).collect();
+    assert_eq!(
+        names,
+        [
+            "Gable roof.igs",
+            "manifest.json",
+            "range.png",
+            "regions.png",
+            "report.json"
+        ]
+    );
+    let report = json(&directory.join("report.json"));
+    assert_eq!(report["name"], "Gable roof");
+    assert_eq!(report["scan"]["operator"], "M. Mason");
+    assert_eq!(report["scan"]["part"], "P-17");
+    assert_eq!(report["scan"]["note"], "first try");
+    assert_eq!(report["scan"]["source"], "Fake, serial number F-1");
+    assert_eq!(report["scan"]["columns"], COLUMNS);
+    assert_eq!(report["scan"]["samples"], COLUMNS * u32::from(SAMPLES));
+    assert_eq!(report["scan"]["dropouts"], COLUMNS * 2);
+    assert_eq!(report["regions"]["count"], 2, "a roof has two sides");
+
+    let file = rig
+        .client
+        .request("GET", &path::spool_file(&scan.id, "Gable roof.igs"), None)
+        .await;
+    assert_eq!(file.header("content-type"), Some("model/iges"));
+    assert_eq!(
+        file.body,
+        std::fs::read(directory.join("Gable roof.igs")).unwrap()
+    );
+    let manifest = json(&directory.join("manifest.json"));
+    assert_eq!(manifest["files"][0]["name"], "Gable roof.igs");
+    assert_eq!(manifest["files"][0]["bytes"], file.body.len());
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_column_is_on_disk_before_it_is_acknowledged() {
+    let rig = Rig::new().await;
+    let scans = rig.folder.path().join("state/scans");
+    let checked = Arc::new(AtomicU32::new(0));
+    let count = Arc::clone(&checked);
+    rig.scanner.on_acknowledge(move |index| {
+        let journal = std::fs::read_dir(&scans)
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .find(|path| path.extension().is_some_and(|e| e == "scan"))
+            .unwrap();
+        let (columns, _) = read_journal(&journal);
+        assert!(columns > index, "column {index} of {columns}");
+        count.fetch_add(1, Ordering::Relaxed);
+    });
+    rig.scan_to_result("a").await;
+    assert_eq!(checked.load(Ordering::Relaxed), COLUMNS);
+    assert_eq!(rig.scanner.acknowledged(), (0..COLUMNS).collect::<Vec<_>>());
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_aborted_scan_is_kept_and_can_be_run() {
+    let rig = Rig::new().await;
+    rig.scanner.allow(30);
+    let mut events = rig.client.events().await;
+    let scan = rig.start_scan("half").await;
+    let at_column_30 =
+        |event: &Event| matches!(event, Event::Column { columns: 30, .. }).then_some(());
+    events.until(at_column_30).await;
+    assert!(rig.scanner.laser_is_on());
+    let _: Scan = rig.client.ask(&path::scan_abort(&scan.id)).await;
+    let scan = ended(&mut events, &scan.id).await;
+    assert!(!rig.scanner.laser_is_on());
+    assert_eq!((scan.state, scan.columns), (ScanState::Aborted, 30));
+    assert_eq!(scan.reason.as_deref(), Some("aborted on request"));
+    assert_eq!(
+        read_journal(&rig.journal(&scan.id)),
+        (
+            30,
+            Ending::Closed(EndCause::Aborted("aborted on request".into()))
+        )
+    );
+    let jobs: JobList = rig.client.get(path::JOBS).await;
+    assert_eq!(jobs.jobs, [], "no job by itself");
+
+    let job: Job = rig
+        .client
+        .post(&path::scan_rerun(&scan.id), &Rerun::default())
+        .await;
+    let job = job_over(&mut events, &rig, job.id).await;
+    assert_eq!(job.state, JobState::Done, "{:?}", job.error);
+    let report = json(&rig.daemon.spool_dir().join(&job.result).join("report.json"));
+    assert_eq!(report["scan"]["columns"], 30);
+    assert_eq!(
+        report["warnings"][0],
+        "the scan is aborted: aborted on request"
+    );
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_fault_in_mid_scan_is_named_and_the_columns_are_kept() {
+    let rig = Rig::new().await;
+    rig.scanner.fault_after(12);
+    let mut events = rig.client.events().await;
+    let scan = rig.start_scan("").await;
+    let scan = ended(&mut events, &scan.id).await;
+    assert_eq!((scan.state, scan.columns), (ScanState::Failed, 12));
+    assert_eq!(
+        scan.reason.as_deref(),
+        Some("the scanner reports: table stalled")
+    );
+    let kept = rig
+        .client
+        .request("GET", &path::scan_journal(&scan.id), None)
+        .await;
+    let mut reader = JournalReader::new(kept.body.as_slice()).unwrap();
+    while reader.next_column().unwrap().is_some() {}
+    assert_eq!(reader.columns(), 12);
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn stopping_the_service_ends_its_scan_with_the_laser_off() {
+    let rig = Rig::new().await;
+    rig.scanner.allow(5);
+    let mut events = rig.client.events().await;
+    let scan = rig.start_scan("cut").await;
+    events
+        .until(|event| matches!(event, Event::Column { columns: 5, .. }).then_some(()))
+        .await;
+    let scanner = Arc::clone(&rig.scanner);
+    let rig = rig.restart().await;
+    assert!(!scanner.laser_is_on());
+    while events.next().await.is_some() {}
+    let list: ScanList = rig.client.get(path::SCANS).await;
+    assert_eq!(list.scans.len(), 1);
+    assert_eq!(list.scans[0].id, scan.id);
+    assert_eq!(list.scans[0].state, ScanState::Aborted);
+    assert_eq!(
+        list.scans[0].reason.as_deref(),
+        Some("the service was stopped")
+    );
+    assert_eq!(list.scans[0].columns, 5);
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn streamed_and_regridded_give_the_same_bytes() {
+    let rig = Rig::new().await;
+    let (scan, _) = rig.scan_to_result("same").await;
+    let mut events = rig.client.events().await;
+    // The streamed range image is gone by now, so this regrids from the journal.
+    let job: Job = rig
+        .client
+        .post(&path::scan_rerun(&scan.id), &Rerun::default())
+        .await;
+    let job = job_over(&mut events, &rig, job.id).await;
+    assert!(job.timings.iter().any(|timing| timing.stage == "regrid"));
+    let file = |result: &str, name: &str| {
+        std::fs::read(rig.daemon.spool_dir().join(result).join(name)).unwrap()
+    };
+    for name in ["same.igs", "range.png", "regions.png"] {
+        assert_eq!(file(&scan.id, name), file(&job.result, name), "{name}");
+    }
+    rig.daemon.shutdown().await;
+}
