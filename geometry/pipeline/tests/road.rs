@@ -1,0 +1,138 @@
+//! The whole road on parts whose shape is known in closed form.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use pipeline::{Method, Observer, PipelineError, Settings, Stage, process, process_columns};
+use range_image::{Column, Lattice, Monitor, RangeImage, Sample, Unmonitored};
+
+/// A roof of two planes that meet at x = 0, 24 mm square, columns 0.5 mm apart.
+fn roof() -> Vec<Column> {
+    (-24..=24)
+        .map(|i| {
+            let x_mm = f64::from(i) * 0.5;
+            let samples = (-24..=24).map(|j| Sample {
+                y_mm: f64::from(j) * 0.5,
+                z_mm: 20.0 - 0.6 * x_mm.abs() + 0.1 * f64::from(j) * 0.5,
+                intensity: 255,
+            });
+            Column::new(x_mm, samples.collect())
+        })
+        .collect()
+}
+
+/// Keeps what it is told; cancels at the beginning of a stage, if asked to.
+#[derive(Default)]
+struct Notes {
+    stages: Mutex<Vec<Stage>>,
+    cancel_at: Option<Stage>,
+    cancelled: AtomicBool,
+    steps: AtomicUsize,
+}
+
+impl Monitor for Notes {
+    fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+
+    fn progress(&self, fraction: f64) {
+        assert!((0.0..=1.0).contains(&fraction), "{fraction}");
+        self.steps.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+impl Observer for Notes {
+    fn stage(&self, stage: Stage) {
+        self.stages.lock().unwrap().push(stage);
+        if self.cancel_at == Some(stage) {
+            self.cancelled.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+#[test]
+fn a_roof_becomes_two_faces_that_share_its_ridge() {
+    for method in Method::ALL {
+        let notes = Notes::default();
+        let settings = Settings::new(0.5).with_method(method);
+        assert_eq!(settings.method(), method);
+        let (image, outcome) = process_columns(roof(), &settings, &notes).unwrap();
+        assert_eq!(
+            *notes.stages.lock().unwrap(),
+            [Stage::Regrid, Stage::Segment, Stage::Reconstruct]
+        );
+        assert_eq!(outcome.stages, *notes.stages.lock().unwrap());
+        assert!(notes.steps.load(Ordering::Relaxed) > 0);
+        assert!(image.valid_nodes() >= 49 * 49, "{}", image.valid_nodes());
+        assert_eq!(outcome.regions.regions(), 2, "{method}");
+        let model = &outcome.reconstruction.model;
+        assert_eq!(model.faces.len(), 2, "{method}");
+        for fit in &outcome.reconstruction.regions {
+            assert!(fit.rms_mm < 0.05, "{method}: {fit:?}");
+        }
+    }
+}
+
+#[test]
+fn a_range_image_alone_is_not_regridded() {
+    let (image, with_columns) = process_columns(roof(), &Settings::new(0.5), &Unmonitored).unwrap();
+    let from_image = process(&image, &Settings::new(0.5), &Unmonitored).unwrap();
+    assert_eq!(from_image.stages, [Stage::Segment, Stage::Reconstruct]);
+    assert_eq!(from_image.regions, with_columns.regions);
+    assert_eq!(from_image.reconstruction, with_columns.reconstruction);
+}
+
+#[test]
+fn scans_without_a_part_say_what_to_do() {
+    let settings = Settings::new(0.5);
+    let empty = RangeImage::masked(Lattice { pitch_mm: 0.5 }, 0, 0, 20, 20);
+    let nothing = process(&empty, &settings, &Unmonitored).unwrap_err();
+    assert!(
+        matches!(nothing, PipelineError::NothingMeasured),
+        "{nothing:?}"
+    );
+    assert!(nothing.hint().is_some());
+
+    let none = process_columns(Vec::new(), &settings, &Unmonitored).unwrap_err();
+    assert!(matches!(none, PipelineError::NothingMeasured), "{none:?}");
+
+    let mut speck = empty;
+    speck.set_z_mm(3, 3, Some(1.0));
+    speck.set_z_mm(12, 9, Some(2.0));
+    let too_little = process(&speck, &settings, &Unmonitored).unwrap_err();
+    assert!(
+        matches!(too_little, PipelineError::NoSurface { nodes: 2, .. }),
+        "{too_little:?}"
+    );
+    assert!(too_little.hint().is_some());
+}
+
+#[test]
+fn a_cancelled_run_ends_in_whatever_stage_it_is() {
+    for stage in [Stage::Regrid, Stage::Segment, Stage::Reconstruct] {
+        let notes = Notes {
+            cancel_at: Some(stage),
+            ..Notes::default()
+        };
+        let ended = process_columns(roof(), &Settings::new(0.5), &notes).unwrap_err();
+        assert!(
+            matches!(ended, PipelineError::Cancelled),
+            "{stage}: {ended:?}"
+        );
+        assert_eq!(notes.stages.lock().unwrap().last(), Some(&stage));
+    }
+}
+
+#[test]
+fn settings_are_refused_with_their_stage() {
+    let refused = |change: fn(&mut Settings)| {
+        let mut settings = Settings::new(0.5);
+        change(&mut settings);
+        settings.validate().unwrap_err().to_string()
+    };
+    assert!(refused(|s| s.regrid.pitch_mm = -1.0).starts_with("regrid: pitch_mm"));
+    assert!(refused(|s| s.segment.clusters = 0).starts_with("segment: clusters"));
+    assert!(refused(|s| s.reconstruct.tolerance_mm = f64::NAN).starts_with("reconstruct: "));
+    assert!("relif".parse::<Method>().is_err());
+    assert_eq!("shim-lee".parse::<Method>(), Ok(Method::ShimLee));
+}
