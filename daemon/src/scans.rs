@@ -21,7 +21,7 @@ pub(crate) enum Slot {
     /// A scan is under way.
     Taken {
         /// As it stands; newer than the kept record.
-        scan: Scan,
+        scan: Box<Scan>,
         /// Ends it early.
         abort: Arc<AbortRequest>,
         /// Its thread.
@@ -95,7 +95,7 @@ impl Service {
                 .spawn(move || run(&service, ticket))
                 .map_err(ServiceError::Thread)?;
             *slot = Slot::Taken {
-                scan: scan.clone(),
+                scan: Box::new(scan.clone()),
                 abort,
                 thread: Some(thread),
             };
@@ -150,10 +150,7 @@ impl Service {
         if let Err(error) = self.scanner.abort() {
             tracing::warn!(%error, "cannot tell the scanner to stop");
         }
-        Ok(self
-            .active_scan()
-            .filter(|s| s.id == scan.id)
-            .map_or_else(|| self.scan(&scan.id), Ok)?)
+        self.scan(&scan.id)
     }
 
     /// Waits until no scan is under way.
@@ -177,7 +174,7 @@ impl Service {
     /// The scan under way.
     pub(crate) fn active_scan(&self) -> Option<Scan> {
         match &*lock(&self.slot) {
-            Slot::Taken { scan, .. } => Some(scan.clone()),
+            Slot::Taken { scan, .. } => Some((**scan).clone()),
             _ => None,
         }
     }
@@ -187,7 +184,7 @@ impl Service {
         match &mut *lock(&self.slot) {
             Slot::Taken { scan, .. } => {
                 change(scan);
-                Some(scan.clone())
+                Some((**scan).clone())
             }
             _ => None,
         }

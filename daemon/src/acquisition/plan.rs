@@ -257,3 +257,161 @@ fn lateral_axis(request: &PlanRequest, head: &Head) -> Result<Axis, PlanError> {
         high_counts: 0,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scanner_protocol::{Calibration, Head as WireHead, text};
+
+    /// Table of 10 um counts from -60 to 60 mm; rays in 1 mrad counts, +-100 mrad.
+    fn identity() -> Identity {
+        Identity {
+            model: text("m"),
+            serial: text("s"),
+            firmware: text("f"),
+            calibration: Calibration {
+                table_count_pm: 10_000_000,
+                table_origin_nm: -60_000_000,
+                head: WireHead::Polar {
+                    camera_y_nm: 0,
+                    camera_z_nm: 750_000_000,
+                    angle_count_prad: 1_000_000_000,
+                    range_count_pm: 100_000_000,
+                },
+            },
+            limits: Limits {
+                table_min_counts: 0,
+                table_max_counts: 12_000,
+                lateral_min_counts: -100,
+                lateral_max_counts: 100,
+                max_line_rate_millihz: 0,
+                max_columns: 1_000,
+                max_samples: 256,
+                max_credits: 8,
+                min_exposure_us: 10,
+                max_exposure_us: 1_000,
+                min_dead_man_ms: 100,
+                max_dead_man_ms: 5_000,
+                proposed: ScanPlan {
+                    first_table_counts: 1_000,
+                    pitch_counts: 50,
+                    columns: 200,
+                    first_angle_counts: -80,
+                    angle_step_counts: 2,
+                    samples: 81,
+                    exposure_us: 0,
+                },
+            },
+        }
+    }
+
+    fn planned(change: impl FnOnce(&mut PlanRequest)) -> Result<ScanPlan, String> {
+        let mut request = PlanRequest::default();
+        change(&mut request);
+        resolve(&request, &identity())
+            .map(|resolved| resolved.plan)
+            .map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn without_wishes_the_scanner_decides() {
+        let resolved = resolve(&PlanRequest::default(), &identity()).unwrap();
+        assert_eq!(resolved.plan, identity().limits.proposed);
+        assert!((resolved.column_pitch_mm - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn wishes_are_met_in_counts() {
+        let plan = planned(|r| {
+            (r.x_first_mm, r.x_last_mm, r.pitch_mm) = (Some(-50.0), Some(50.0), Some(0.25));
+        })
+        .unwrap();
+        assert_eq!(
+            (plan.first_table_counts, plan.pitch_counts, plan.columns),
+            (1_000, 25, 401)
+        );
+        let plan = planned(|r| (r.x_first_mm, r.columns) = (Some(0.0), Some(10))).unwrap();
+        // From 6000 to the proposed end at 1000 + 199 * 50.
+        assert_eq!(
+            (plan.first_table_counts, plan.pitch_counts, plan.columns),
+            (6_000, (10_950 - 6_000) / 9, 10)
+        );
+        let back = planned(|r| (r.x_first_mm, r.x_last_mm) = (Some(10.0), Some(-10.0))).unwrap();
+        assert_eq!(
+            (back.first_table_counts, back.pitch_counts, back.columns),
+            (7_000, -50, 41)
+        );
+        let plan = planned(|r| {
+            (r.angle_first_deg, r.angle_last_deg, r.samples) = (
+                Some((-0.05_f64).to_degrees()),
+                Some(0.05_f64.to_degrees()),
+                Some(51),
+            );
+        })
+        .unwrap();
+        assert_eq!(
+            (
+                plan.first_angle_counts,
+                plan.angle_step_counts,
+                plan.samples
+            ),
+            (-50, 2, 51)
+        );
+    }
+
+    #[test]
+    fn what_the_scanner_cannot_do_is_refused_with_its_limits() {
+        for (result, message) in [
+            (
+                planned(|r| r.x_last_mm = Some(61.0)),
+                "61 mm is beyond the scanner's table, which goes from -60.000 to 60.000 mm",
+            ),
+            (
+                planned(|r| (r.pitch_mm, r.columns) = (Some(1.0), Some(500))),
+                "449 mm is beyond the scanner's table",
+            ),
+            (
+                planned(|r| r.pitch_mm = Some(0.001)),
+                "the table's finest step is 0.01 mm",
+            ),
+            (planned(|r| r.pitch_mm = Some(-1.0)), "is not possible"),
+            (
+                planned(|r| r.columns = Some(2_000)),
+                "2000 columns are not possible: this scanner takes 1 to 1000",
+            ),
+            (
+                planned(|r| r.columns = Some(0)),
+                "0 columns are not possible",
+            ),
+            (
+                planned(|r| {
+                    (r.x_first_mm, r.x_last_mm, r.columns) = (Some(1.0), Some(1.0), Some(5))
+                }),
+                "closer than the table's counts",
+            ),
+            (
+                planned(|r| r.samples = Some(1_000)),
+                "1000 samples in a column are not possible: this scanner takes 2 to 256",
+            ),
+            (
+                planned(|r| r.angle_last_deg = Some(10.0)),
+                "10 degrees is beyond the scanner's field of view, which goes from -5.730 to",
+            ),
+            (
+                planned(|r| r.y_first_mm = Some(1.0)),
+                "give angle_first_deg and angle_last_deg",
+            ),
+            (
+                planned(|r| r.exposure_us = Some(5)),
+                "this scanner takes 10 to 1000 us",
+            ),
+            (
+                planned(|r| r.x_first_mm = Some(f64::NAN)),
+                "beyond the scanner's table",
+            ),
+        ] {
+            let error = result.unwrap_err();
+            assert!(error.contains(message), "{error}");
+        }
+    }
+}

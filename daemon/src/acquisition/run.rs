@@ -148,7 +148,7 @@ impl<'a> Keeper<'a> {
             .processing
             .pipeline_settings(header.column_pitch_mm, header.sample_spacing_mm)
             .regrid;
-        let live = Regridder::new(settings.clone())
+        let live = Regridder::new(settings)
             .map_err(|error| error.to_string())
             .and_then(|regridder| {
                 Ok(Live {
