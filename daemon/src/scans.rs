@@ -273,3 +273,99 @@ impl Service {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+    use crate::spool::Spool;
+    use crate::store::Store;
+    use range_image::{Calibration, calibration::Head};
+    use scan_record::{Header, JournalWriter, RawColumn};
+    use scanner_driver::{DeviceStatus, ScanStream, Scanner, ScannerError};
+    use scanner_protocol::{Identity, ScanPlan};
+
+    /// Nothing is attached.
+    struct Absent;
+
+    impl Scanner for Absent {
+        fn identify(&self) -> Result<Identity, ScannerError> {
+            Err(ScannerError::Closed)
+        }
+        fn home(&self) -> Result<(), ScannerError> {
+            Err(ScannerError::Closed)
+        }
+        fn status(&self) -> Result<DeviceStatus, ScannerError> {
+            Err(ScannerError::Closed)
+        }
+        fn start_scan(&self, _plan: &ScanPlan) -> Result<ScanStream, ScannerError> {
+            Err(ScannerError::Closed)
+        }
+        fn abort(&self) -> Result<(), ScannerError> {
+            Err(ScannerError::Closed)
+        }
+    }
+
+    #[test]
+    fn a_scan_cut_short_by_a_crash_is_found_with_its_columns() {
+        let folder = tempfile::tempdir().unwrap();
+        let service = Service::new(
+            Config::default(),
+            Arc::new(Absent),
+            Store::open(&folder.path().join("store")).unwrap(),
+            Spool::open(&folder.path().join("spool")).unwrap(),
+            folder.path().to_owned(),
+        );
+        let scan = Scan {
+            id: "20261121T110830.123Z-a".into(),
+            name: "a".into(),
+            part: String::new(),
+            operator: String::new(),
+            note: String::new(),
+            state: ScanState::Scanning,
+            reason: None,
+            started_at: now(),
+            ended_at: None,
+            columns_planned: 9,
+            columns: 0,
+            settings: relief_api::SettingOverrides::new(),
+            jobs: Vec::new(),
+        };
+        service.store.put_scan(&scan).unwrap();
+        let header = Header {
+            calibration: Calibration {
+                table_origin_mm: 0.0,
+                table_count_mm: 0.01,
+                head: Head::Cartesian { count_mm: 0.01 },
+            },
+            column_pitch_mm: 0.5,
+            sample_spacing_mm: 0.5,
+            identity: Vec::new(),
+            plan: Vec::new(),
+            settings: Vec::new(),
+            metadata: Vec::new(),
+        };
+        let mut journal = JournalWriter::create(&service.journal_path(&scan.id), &header).unwrap();
+        for index in 0..4 {
+            let column = RawColumn {
+                index,
+                ..RawColumn::default()
+            };
+            journal.append(&column).unwrap();
+        }
+        drop(journal);
+
+        service.recover_scans().unwrap();
+        let found = service.scan(&scan.id).unwrap();
+        assert_eq!((found.state, found.columns), (ScanState::Interrupted, 4));
+        let reason = found.reason.unwrap();
+        assert!(
+            reason.starts_with("the service ended during the scan (incomplete: at byte "),
+            "{reason}"
+        );
+        let service = Arc::new(service);
+        let error = service.start_scan(&StartScan::default()).unwrap_err();
+        assert!(matches!(error, ServiceError::Scanner(ScannerError::Closed)));
+        assert!(!service.is_scanning(), "the slot is free again");
+    }
+}
