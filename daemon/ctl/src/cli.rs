@@ -5,7 +5,9 @@ use std::process::ExitCode;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
-use crate::command::{abort, cancel, fetch, jobs, rerun, retry, scan, scans, status, watch};
+use crate::command::{
+    abort, cancel, convert, fetch, jobs, rerun, retry, scan, scans, status, watch,
+};
 
 /// Turns scans of slide-table laser scanners into CAD models.
 ///
@@ -25,6 +27,7 @@ pub(crate) struct Invocation {
 /// The commands, one small file each in `command/`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    Convert(convert::Args),
     Scan(scan::Args),
     Abort(abort::Args),
     Status(status::Args),

@@ -1,6 +1,6 @@
 //! Follows a scan and its job until the deliverables are there, showing how far they are.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use relief_api::{Event, Job, JobId, JobState, Scan, ScanState, path};
 use tokio::time::{MissedTickBehavior, interval};
@@ -18,6 +18,8 @@ pub(crate) struct Followed {
     pub(crate) scan: Scan,
     /// The job whose deliverables are published.
     pub(crate) job: Job,
+    /// From the last column's being on disk to publication, seconds, as seen from here.
+    pub(crate) after_last_column_s: f64,
 }
 
 /// Follows a scan until its job has published.
@@ -31,10 +33,12 @@ pub(crate) async fn scan(
 ) -> Result<Followed, Failure> {
     let mut bar = Progress::counted("scan", 0, "columns");
     let mut asking = asking();
+    let mut last_column = Instant::now();
     let scan = loop {
         let state = tokio::select! {
             event = events.next() => match event? {
                 Some(Event::Column { scan, columns, columns_planned, .. }) if scan == id => {
+                    last_column = Instant::now();
                     bar.count(columns.into(), columns_planned.into(), "");
                     None
                 }
@@ -72,7 +76,11 @@ pub(crate) async fn scan(
     bar.finish(&format!("{} columns on disk", scan.columns));
     let first = scan.jobs.first().copied().unwrap_or_default();
     let job = job(client, events, first).await?;
-    Ok(Followed { scan, job })
+    Ok(Followed {
+        scan,
+        job,
+        after_last_column_s: last_column.elapsed().as_secs_f64(),
+    })
 }
 
 /// Follows a job until it has published.

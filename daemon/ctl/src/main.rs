@@ -4,9 +4,11 @@ mod cli;
 mod command;
 mod failure;
 mod follow;
+mod input;
 mod output;
 mod progress;
 mod service;
+mod summary;
 
 use std::process::ExitCode;
 

@@ -46,7 +46,7 @@ impl Progress {
                 ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(15));
             // A template that does not parse still leaves a usable bar.
             if let Ok(style) = ProgressStyle::with_template(template) {
-                bar.set_style(style.progress_chars("━╸─"));
+                bar.set_style(style.progress_chars("\u{2501}\u{2578}\u{2500}"));
             }
             bar.set_prefix(title.to_owned());
             bar.tick();

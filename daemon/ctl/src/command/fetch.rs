@@ -25,12 +25,15 @@ pub(crate) struct Args {
     endpoint: EndpointArgs,
 }
 
-/// What `--json` prints.
+/// What was fetched; `--json` prints it.
 #[derive(Serialize)]
-struct Fetched {
-    result: String,
-    directory: PathBuf,
-    files: Vec<deliverables::ManifestFile>,
+pub(crate) struct Fetched {
+    /// Name of the folder in the spool.
+    pub(crate) result: String,
+    /// Where the files are now.
+    pub(crate) directory: PathBuf,
+    /// Every file but the manifest.
+    pub(crate) files: Vec<deliverables::ManifestFile>,
 }
 
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
@@ -40,19 +43,8 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
     } else {
         args.scan
     };
-    let entry: SpoolEntry = client.get(&path::spool(&result)).await?;
-    let directory = args.output.unwrap_or_else(|| PathBuf::from(&entry.result));
-    fs::create_dir_all(&directory)
-        .map_err(|error| Failure::at(format!("cannot make {}", directory.display()), &error))?;
-    for file in &entry.files {
-        download(&client, &entry.result, &file.name, &directory).await?;
-    }
-    let files = checked(&directory)?;
-    let fetched = Fetched {
-        result: entry.result,
-        directory,
-        files,
-    };
+    let directory = args.output.unwrap_or_else(|| PathBuf::from(&result));
+    let fetched = into_directory(&client, &result, directory).await?;
     output::either(json, &fetched, |fetched| {
         let mut lines: Vec<String> = fetched
             .files
@@ -61,6 +53,26 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
             .collect();
         lines.push(fetched.directory.join(MANIFEST_NAME).display().to_string());
         lines.join("\n")
+    })
+}
+
+/// Copies a result's files into a directory, which is made if need be, and checks them.
+pub(crate) async fn into_directory(
+    client: &Client,
+    result: &str,
+    directory: PathBuf,
+) -> Result<Fetched, Failure> {
+    let entry: SpoolEntry = client.get(&path::spool(result)).await?;
+    fs::create_dir_all(&directory)
+        .map_err(|error| Failure::at(format!("cannot make {}", directory.display()), &error))?;
+    for file in &entry.files {
+        download(client, &entry.result, &file.name, &directory).await?;
+    }
+    let files = checked(&directory)?;
+    Ok(Fetched {
+        result: entry.result,
+        directory,
+        files,
     })
 }
 
@@ -79,7 +91,7 @@ async fn download(
     name: &str,
     directory: &Path,
 ) -> Result<(), Failure> {
-    if name.is_empty() || name.starts_with('.') || name.contains(['/', '\\', '\0']) {
+    if !is_plain(name) {
         return Err(Failure::Failed(format!(
             "the service names a file {name:?}, which is not safe"
         )));
@@ -106,6 +118,11 @@ async fn download(
     done
 }
 
+/// Whether a name is that of a file in the directory itself, and not hidden.
+fn is_plain(name: &str) -> bool {
+    !(name.is_empty() || name.starts_with('.') || name.contains(['/', '\\', '\0']))
+}
+
 /// Checks every file against the manifest that came with it.
 fn checked(directory: &Path) -> Result<Vec<deliverables::ManifestFile>, Failure> {
     let path = directory.join(MANIFEST_NAME);
@@ -114,6 +131,12 @@ fn checked(directory: &Path) -> Result<Vec<deliverables::ManifestFile>, Failure>
     let manifest: Manifest = serde_json::from_slice(&text)
         .map_err(|error| Failure::at(format!("{} is not a manifest", path.display()), &error))?;
     for listed in &manifest.files {
+        if !is_plain(&listed.name) {
+            return Err(Failure::Failed(format!(
+                "the manifest names a file {:?}, which is not safe",
+                listed.name
+            )));
+        }
         let path = directory.join(&listed.name);
         let found = File::open(&path)
             .and_then(deliverables::sha256_of)
@@ -127,4 +150,45 @@ fn checked(directory: &Path) -> Result<Vec<deliverables::ManifestFile>, Failure>
         }
     }
     Ok(manifest.files)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn directory_with(content: &[u8], sha256: &str) -> tempfile::TempDir {
+        let directory = tempfile::tempdir().unwrap();
+        fs::write(directory.path().join("house.igs"), content).unwrap();
+        let manifest = serde_json::json!({
+            "name": "house", "timestamp": "2026-11-21T09:30:00Z", "versions": {}, "seed": 1,
+            "files": [{"name": "house.igs", "bytes": content.len(), "sha256": sha256}],
+            "settings": {
+                "method": "relief", "seed": 1, "pitch_mm": 0.4, "neighbours": 32, "draws": 32,
+                "reach_columns": 8, "estimator": "least-median", "clusters": 20,
+                "crease_angle_rad": 0.2, "step_factor": 1.0, "minimum_nodes": 50,
+                "tolerance_mm": 0.01, "iges_entities": 114,
+            },
+        });
+        fs::write(directory.path().join(MANIFEST_NAME), manifest.to_string()).unwrap();
+        directory
+    }
+
+    #[test]
+    fn files_are_held_against_their_manifest() {
+        // SHA-256 of "abc": FIPS 180-2, appendix B.1.
+        let sha256 = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        let good = directory_with(b"abc", sha256);
+        assert_eq!(checked(good.path()).unwrap().len(), 1);
+        let bad = directory_with(b"abd", sha256);
+        let error = checked(bad.path()).unwrap_err().to_string();
+        assert!(error.contains("is not what the manifest says"), "{error}");
+    }
+
+    #[test]
+    fn names_that_lead_elsewhere_are_not_plain() {
+        assert!(is_plain("house.igs") && is_plain("front cover 7.igs"));
+        for name in ["", "..", "../x", "/etc/passwd", "a/b", ".hidden", "a\\b"] {
+            assert!(!is_plain(name), "{name:?}");
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 pub(crate) mod abort;
 pub(crate) mod cancel;
+pub(crate) mod convert;
 pub(crate) mod fetch;
 pub(crate) mod jobs;
 pub(crate) mod rerun;
@@ -21,6 +22,7 @@ use crate::failure::Failure;
 pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
     let json = invocation.json;
     match invocation.command {
+        Command::Convert(args) => block_on(convert::run(args, json)),
         Command::Scan(args) => block_on(scan::run(args, json)),
         Command::Abort(args) => block_on(abort::run(args, json)),
         Command::Status(args) => block_on(status::run(args, json)),

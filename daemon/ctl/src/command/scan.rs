@@ -79,6 +79,12 @@ struct PlanArgs {
     /// Angle of the highest ray, degrees
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     angle_last_deg: Option<f64>,
+    /// Least y that matters, millimetres, instead of an angle
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    y_first_mm: Option<f64>,
+    /// Greatest y that matters, millimetres, instead of an angle
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    y_last_mm: Option<f64>,
     /// Rays in a column
     #[arg(long, value_name = "N")]
     samples: Option<u16>,
@@ -116,6 +122,8 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
             columns: plan.columns,
             angle_first_deg: plan.angle_first_deg,
             angle_last_deg: plan.angle_last_deg,
+            y_first_mm: plan.y_first_mm,
+            y_last_mm: plan.y_last_mm,
             samples: plan.samples,
             exposure_us: plan.exposure_us,
             ..PlanRequest::default()

@@ -1,0 +1,266 @@
+//! What the user may say, and what follows from it.
+
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use deliverables::{CadOptions, Entities, file_stem};
+use jiff::Timestamp;
+use pipeline::{Method, Settings};
+use scan_files::Units;
+
+use crate::failure::Failure;
+
+/// Turn a scan file into a CAD file, without a service
+///
+/// Reads text (.xyz .asc .csv .txt: x y z in mm, a point each line), PLY, IGES points
+/// (entities 106 and 116) and the service's own .scan files, each plain or
+/// gzip-compressed. The same samples and settings give the same CAD file as the service.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// The scan file
+    #[arg(value_name = "INPUT")]
+    pub(super) input: PathBuf,
+    /// The CAD file; its ending picks the format (.igs or .iges). Default: the input's
+    /// name with .igs, in the current directory
+    #[arg(short, long, value_name = "OUT.igs")]
+    output: Option<PathBuf>,
+    /// Distance of the grid's nodes, millimetres; default: after the scan's density
+    #[arg(long, value_name = "MM")]
+    pitch_mm: Option<f64>,
+    /// The road from samples to surfaces: ours, or Shim & Lee 1995 as printed
+    #[arg(long, value_name = "METHOD", value_enum, default_value_t = MethodName::Relief)]
+    method: MethodName,
+    /// How far a surface may lie from the range image, millimetres
+    #[arg(long, value_name = "MM")]
+    tolerance_mm: Option<f64>,
+    /// IGES entities of the surfaces: 114 (parametric splines) or 128 (rational B-splines)
+    #[arg(long, value_name = "TYPE", value_enum, default_value_t = EntityType::Parametric)]
+    entities: EntityType,
+    /// Write a report as JSON, too
+    #[arg(long, value_name = "FILE.json")]
+    pub(super) report: Option<PathBuf>,
+    /// Draw range.png and regions.png into this directory, too
+    #[arg(long, value_name = "DIR")]
+    pub(super) pictures: Option<PathBuf>,
+    /// Seed of every random draw
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Samples looked at for a grid node
+    #[arg(long, value_name = "M")]
+    neighbours: Option<usize>,
+    /// Planes tried for a grid node
+    #[arg(long, value_name = "N")]
+    draws: Option<usize>,
+    /// Threads to use; 0 for all processors. The result does not depend on it
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) threads: usize,
+    /// Unit of the coordinates in the file; default: millimetres, or what the file says
+    #[arg(long, value_name = "UNIT", value_enum)]
+    units: Option<UnitName>,
+    /// Name of the part in the CAD file; default: that kept with the scan, or the
+    /// output's name
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
+    /// Time in the CAD file and the report, such as 2026-11-21T09:30:00Z. Default:
+    /// SOURCE_DATE_EPOCH (seconds since 1970), else when the scan was taken, else when the
+    /// scan file was last changed
+    #[arg(long, value_name = "TIME")]
+    timestamp: Option<Timestamp>,
+    /// Author in the CAD file
+    #[arg(long, value_name = "NAME")]
+    pub(super) author: Option<String>,
+    /// Organisation in the CAD file
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "",
+        hide_default_value = true
+    )]
+    organisation: String,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum MethodName {
+    Relief,
+    ShimLee,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum EntityType {
+    #[value(name = "114")]
+    Parametric,
+    #[value(name = "128")]
+    Rational,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum UnitName {
+    Mm,
+    M,
+    Inch,
+}
+
+/// Endings that mean IGES.
+const IGES_ENDINGS: [&str; 2] = ["igs", "iges"];
+/// Endings of scan files that are left off a default name.
+const SCAN_ENDINGS: [&str; 8] = ["xyz", "asc", "csv", "txt", "ply", "igs", "iges", "scan"];
+
+impl Args {
+    /// Where the CAD file goes.
+    pub(super) fn output(&self) -> Result<PathBuf, Failure> {
+        let Some(path) = &self.output else {
+            let path = PathBuf::from(format!("{}.igs", input_stem(&self.input)));
+            if same_file(&path, &self.input) {
+                return Err(Failure::Usage(format!(
+                    "{} would be overwritten by its own conversion; name the output with -o",
+                    self.input.display()
+                )));
+            }
+            return Ok(path);
+        };
+        let ending = path
+            .extension()
+            .map(|e| e.to_string_lossy().to_ascii_lowercase());
+        if !ending
+            .as_deref()
+            .is_some_and(|ending| IGES_ENDINGS.contains(&ending))
+        {
+            return Err(Failure::Usage(format!(
+                "the ending of {} names no format that can be written; known: .igs, .iges",
+                path.display()
+            )));
+        }
+        if same_file(path, &self.input) {
+            return Err(Failure::Usage(format!(
+                "{} is the scan file itself; name another output",
+                path.display()
+            )));
+        }
+        Ok(path.clone())
+    }
+
+    /// Name of the part.
+    pub(super) fn name(&self, kept: Option<&str>) -> String {
+        let given = self
+            .name
+            .as_deref()
+            .or(kept)
+            .filter(|name| !name.trim().is_empty());
+        given.map_or_else(|| input_stem(&self.input), str::to_owned)
+    }
+
+    pub(super) fn units(&self) -> Option<Units> {
+        self.units.map(|units| match units {
+            UnitName::Mm => Units::Millimetre,
+            UnitName::M => Units::Metre,
+            UnitName::Inch => Units::Inch,
+        })
+    }
+
+    /// The pipeline's settings for a scan for which this pitch is recommended.
+    pub(super) fn settings(&self, recommended_pitch_mm: f64) -> Result<Settings, Failure> {
+        let pitch_mm = self.pitch_mm.unwrap_or(recommended_pitch_mm);
+        let method = match self.method {
+            MethodName::Relief => Method::Relief,
+            MethodName::ShimLee => Method::ShimLee,
+        };
+        let mut settings = Settings::new(pitch_mm).with_method(method);
+        if let Some(seed) = self.seed {
+            settings = settings.with_seed(seed);
+        }
+        if let Some(tolerance_mm) = self.tolerance_mm {
+            settings.reconstruct.tolerance_mm = tolerance_mm;
+        }
+        if let Some(neighbours) = self.neighbours {
+            settings.regrid.neighbours = neighbours;
+        }
+        if let Some(draws) = self.draws {
+            settings.regrid.draws = draws;
+        }
+        settings.regrid.threads = self.threads;
+        settings
+            .validate()
+            .map_err(|error| Failure::Usage(error.to_string()))?;
+        Ok(settings)
+    }
+
+    pub(super) fn cad(&self, operator: Option<&str>) -> CadOptions {
+        CadOptions {
+            entities: match self.entities {
+                EntityType::Parametric => Entities::Parametric114,
+                EntityType::Rational => Entities::Rational128,
+            },
+            author: self
+                .author
+                .as_deref()
+                .or(operator)
+                .unwrap_or_default()
+                .to_owned(),
+            organisation: self.organisation.clone(),
+        }
+    }
+
+    /// The time that stands in the files.
+    pub(super) fn timestamp(&self, kept: Option<Timestamp>) -> Result<Timestamp, Failure> {
+        if let Some(given) = self.timestamp {
+            return Ok(given);
+        }
+        if let Some(epoch) = std::env::var_os("SOURCE_DATE_EPOCH") {
+            let seconds = epoch.to_str().and_then(|text| text.parse().ok());
+            let time = seconds.and_then(|seconds| Timestamp::from_second(seconds).ok());
+            return time.ok_or_else(|| {
+                Failure::Usage(format!(
+                    "SOURCE_DATE_EPOCH is {epoch:?}, which is not a number of seconds since 1970"
+                ))
+            });
+        }
+        if let Some(kept) = kept {
+            return Ok(kept);
+        }
+        let changed = std::fs::metadata(&self.input)
+            .and_then(|file| file.modified())
+            .ok();
+        let changed = changed.and_then(|time| Timestamp::try_from(time).ok());
+        Ok(changed.unwrap_or(Timestamp::UNIX_EPOCH))
+    }
+}
+
+/// The input's name without `.gz` and the ending of its format, fit for a file.
+fn input_stem(input: &Path) -> String {
+    let name = input
+        .file_name()
+        .map(|name| name.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    let stem = match name.rsplit_once('.') {
+        Some((stem, ending)) if SCAN_ENDINGS.contains(&ending.to_ascii_lowercase().as_str()) => {
+            stem
+        }
+        _ => name,
+    };
+    file_stem(stem)
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_name_is_that_of_the_input() {
+        for (input, stem) in [
+            ("/data/bun000.ply.gz", "bun000"),
+            ("part.v2.xyz", "part.v2"),
+            ("part.v2", "part.v2"),
+            ("20261121T110830Z-house.scan", "20261121T110830Z-house"),
+        ] {
+            assert_eq!(input_stem(Path::new(input)), stem);
+        }
+    }
+}

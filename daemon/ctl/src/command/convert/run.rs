@@ -1,0 +1,164 @@
+//! The conversion itself.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use deliverables::{Inputs, ManifestFile, Report, Stopwatch, write_atomically};
+use pipeline::{Observer, PipelineError, Stage};
+use range_image::Monitor;
+use serde::Serialize;
+
+use super::Args;
+use crate::failure::Failure;
+use crate::input;
+use crate::output;
+use crate::progress::Progress;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Converted {
+    output: PathBuf,
+    file: ManifestFile,
+    report: Report,
+}
+
+/// Shows the stages on standard error; ends them on Ctrl-C.
+struct Shown {
+    stop: AtomicBool,
+    shown: Mutex<Option<(Stage, Progress)>>,
+}
+
+impl Monitor for Shown {
+    fn is_cancelled(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    fn progress(&self, fraction: f64) {
+        if let Ok(mut shown) = self.shown.lock()
+            && let Some((_, bar)) = shown.as_mut()
+        {
+            bar.at(fraction, "");
+        }
+    }
+}
+
+impl Observer for Shown {
+    fn stage(&self, stage: Stage) {
+        if let Ok(mut shown) = self.shown.lock() {
+            if let Some((_, bar)) = shown.take() {
+                bar.finish("done");
+            }
+            *shown = Some((stage, Progress::share(stage.as_str())));
+        }
+    }
+}
+
+impl Shown {
+    fn end(&self, message: &str) {
+        if let Ok(mut shown) = self.shown.lock()
+            && let Some((_, bar)) = shown.take()
+        {
+            bar.finish(message);
+        }
+    }
+}
+
+/// Converts; Ctrl-C ends it without leaving half a file.
+pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
+    let shown = std::sync::Arc::new(Shown {
+        stop: AtomicBool::new(false),
+        shown: Mutex::new(None),
+    });
+    let worker = std::sync::Arc::clone(&shown);
+    let mut work = tokio::task::spawn_blocking(move || convert(&args, &worker));
+    let joined = tokio::select! {
+        joined = &mut work => joined,
+        _ = tokio::signal::ctrl_c() => {
+            shown.stop.store(true, Ordering::Relaxed);
+            work.await
+        }
+    };
+    let converted = joined.map_err(|error| Failure::at("the conversion broke off", &error))??;
+    output::either(json, &converted, told)
+}
+
+fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
+    let output = args.output()?;
+    let input = input::read(&args.input, args.units())?;
+    let settings = args.settings(input.recommended_pitch_mm())?;
+    let cad = args.cad(input.scan.operator.as_deref());
+    let timestamp = args.timestamp(input.timestamp)?;
+    let name = args.name(input.name.as_deref());
+
+    let watch = Stopwatch::new(shown);
+    let processed = pipeline::process_columns(input.columns, &settings, &watch);
+    let (image, outcome) = processed.map_err(|error| {
+        shown.end("failed");
+        refused(&args.input, &error)
+    })?;
+    let inputs = Inputs {
+        name: &name,
+        timestamp,
+        image: &image,
+        outcome: &outcome,
+        settings: &settings,
+        cad: &cad,
+        scan: input.scan,
+        warnings: input.notes,
+        versions: std::collections::BTreeMap::default(),
+    };
+    watch.stage(Stage::Export);
+    let model = &outcome.reconstruction.model;
+    let file = write_atomically::<deliverables::DeliverError>(&output, |sink| {
+        Ok(deliverables::write_iges(
+            model, &name, timestamp, &cad, sink,
+        )?)
+    })
+    .map_err(|error| Failure::at(format!("cannot write {}", output.display()), &error))?;
+    watch.progress(1.0);
+    if let Some(directory) = &args.pictures {
+        watch.stage(Stage::Pictures);
+        fs::create_dir_all(directory)
+            .and_then(|()| deliverables::write_pictures(directory, &inputs))
+            .map_err(|error| {
+                Failure::at(format!("cannot draw into {}", directory.display()), &error)
+            })?;
+        watch.progress(1.0);
+    }
+    let report = Report::new(&inputs, watch.read());
+    shown.end("done");
+    if let Some(path) = &args.report {
+        write_report(path, &report)?;
+    }
+    Ok(Converted {
+        output,
+        file,
+        report,
+    })
+}
+
+fn write_report(path: &Path, report: &Report) -> Result<(), Failure> {
+    write_atomically::<deliverables::DeliverError>(path, |sink| {
+        serde_json::to_writer_pretty(&mut *sink, report)?;
+        Ok(sink.write_all(b"\n")?)
+    })
+    .map(|_| ())
+    .map_err(|error| Failure::at(format!("cannot write {}", path.display()), &error))
+}
+
+fn refused(input: &Path, error: &PipelineError) -> Failure {
+    match (error, error.hint()) {
+        (PipelineError::Cancelled, _) => Failure::Interrupted,
+        (_, Some(hint)) => Failure::Failed(format!("{}: {error}; {hint}", input.display())),
+        (_, None) => Failure::Failed(format!("{}: {error}", input.display())),
+    }
+}
+
+fn told(converted: &Converted) -> String {
+    let report = &converted.report;
+    let mut lines = vec![converted.output.display().to_string()];
+    lines.extend(crate::summary::lines(report));
+    lines.join("\n")
+}

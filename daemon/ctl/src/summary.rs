@@ -1,0 +1,93 @@
+//! A report told to people.
+
+use deliverables::Report;
+use deliverables::report::RegionReport;
+
+use crate::output;
+
+/// Regions listed one by one; a part with more is summed up.
+const MOST_REGIONS: usize = 24;
+
+/// The report in lines: a table of regions, the whole, the stages, what to know.
+pub(crate) fn lines(report: &Report) -> Vec<String> {
+    let mut lines = vec![String::new(), regions(report)];
+    let hidden = report.regions.list.len().saturating_sub(MOST_REGIONS);
+    if hidden > 0 {
+        lines.push(format!("... and {hidden} smaller ones"));
+    }
+    let image = &report.range_image;
+    let model = &report.model;
+    lines.push(String::new());
+    lines.push(format!(
+        "range image  {} x {} nodes at {} mm, {} with a value, from {} samples in {} columns",
+        image.columns,
+        image.rows,
+        image.pitch_mm,
+        image.nodes,
+        report.scan.samples,
+        report.scan.columns
+    ));
+    lines.push(format!(
+        "model        {} faces, {} edges shared, {} free",
+        model.faces, model.edges_shared, model.free_edges
+    ));
+    lines.push(format!(
+        "agreement    SNR {} dB, {} nodes lost, {} invented",
+        decibels(report.snr_db),
+        report.lost_nodes,
+        report.invented_nodes
+    ));
+    let mut stages: Vec<(&String, &f64)> = report.timings_s.iter().collect();
+    stages.sort_by_key(|(name, _)| order(name));
+    let stages: Vec<String> = stages
+        .iter()
+        .map(|(name, seconds)| format!("{name} {seconds:.2} s"))
+        .collect();
+    lines.push(format!("time         {}", stages.join(", ")));
+    lines.extend(
+        report
+            .warnings
+            .iter()
+            .map(|warning| format!("note         {warning}")),
+    );
+    lines
+}
+
+/// Stages in the order in which they run; others after them.
+fn order(name: &str) -> usize {
+    let stages = pipeline::Stage::ALL;
+    stages
+        .iter()
+        .position(|stage| stage.as_str() == name)
+        .unwrap_or(stages.len())
+}
+
+fn regions(report: &Report) -> String {
+    let mut largest: Vec<&RegionReport> = report.regions.list.iter().collect();
+    if largest.len() > MOST_REGIONS {
+        largest.sort_by_key(|region| std::cmp::Reverse(region.nodes));
+        largest.truncate(MOST_REGIONS);
+    }
+    output::table(
+        &["REGION", "SURFACE", "NODES", "RMS MM", "MAX MM", "PSNR DB"],
+        &[0, 2, 3, 4, 5],
+        largest.into_iter().map(|region| {
+            vec![
+                region.label.to_string(),
+                region.kind.clone(),
+                region.nodes.to_string(),
+                millimetres(region.rms_mm),
+                millimetres(region.max_mm),
+                decibels(region.psnr_db),
+            ]
+        }),
+    )
+}
+
+fn millimetres(length_mm: Option<f64>) -> String {
+    length_mm.map_or_else(|| "-".into(), |length| format!("{length:.4}"))
+}
+
+fn decibels(ratio_db: Option<f64>) -> String {
+    ratio_db.map_or_else(|| "-".into(), |ratio| format!("{ratio:.1}"))
+}
