@@ -1,1 +1,10 @@
-//! End-to-end tests: the daemon driven through its API against the simulated scanner.
+//! The whole house under one roof: a simulated scanner on a real pseudo-terminal, a private
+//! service in this process, and a client that speaks to it as any other program would.
+//!
+//! [`rig`] starts them and waits on events, never for a while. [`direct`] takes the other
+//! road from a scan to a CAD file, without a service, for comparison. The tests proper lie
+//! in `tests/`; the program `scan-scene` scans a scene for judges outside.
+
+pub mod direct;
+pub mod iges;
+pub mod rig;
