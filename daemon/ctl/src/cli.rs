@@ -6,7 +6,7 @@ use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    abort, cancel, convert, fetch, jobs, rerun, retry, scan, scans, status, watch,
+    abort, cancel, convert, demo, doctor, fetch, jobs, rerun, retry, scan, scans, status, watch,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
@@ -27,6 +27,7 @@ pub(crate) struct Invocation {
 /// The commands, one small file each in `command/`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    Demo(demo::Args),
     Convert(convert::Args),
     Scan(scan::Args),
     Abort(abort::Args),
@@ -38,6 +39,7 @@ pub(crate) enum Command {
     Rerun(rerun::Args),
     Watch(watch::Args),
     Fetch(fetch::Args),
+    Doctor(doctor::Args),
 }
 
 /// Reads the command line; on wrong usage says so in one line and gives exit code 2.

@@ -7,7 +7,9 @@ use std::path::Path;
 use deliverables::ScanReport;
 use flate2::bufread::MultiGzDecoder;
 use jiff::Timestamp;
+use pipeline::Settings;
 use range_image::{Column, Sample};
+use reliefd::config::Processing;
 use scan_files::{PointScan, ReadOptions, Units, recommended_pitch_mm};
 use scan_record::{Ending, JournalReader};
 
@@ -31,6 +33,8 @@ pub(crate) struct Input {
     pub(crate) sample_spacing_mm: f64,
     /// What the report says about the scan.
     pub(crate) scan: ScanReport,
+    /// Processing settings kept with the scan, where there are some.
+    pub(crate) processing: Option<Processing>,
     /// Name kept with the scan, where there is one.
     pub(crate) name: Option<String>,
     /// When it was taken, where the file says so.
@@ -40,9 +44,16 @@ pub(crate) struct Input {
 }
 
 impl Input {
-    /// The grid pitch that suits this scan's density, millimetres.
-    pub(crate) fn recommended_pitch_mm(&self) -> f64 {
-        recommended_pitch_mm(self.column_pitch_mm, self.sample_spacing_mm)
+    /// The settings with which the service would process this scan: those kept with it,
+    /// else the defaults for its density.
+    pub(crate) fn settings(&self) -> Settings {
+        match &self.processing {
+            Some(kept) => kept.pipeline_settings(self.column_pitch_mm, self.sample_spacing_mm),
+            None => {
+                let pitch = recommended_pitch_mm(self.column_pitch_mm, self.sample_spacing_mm);
+                Settings::new(pitch)
+            }
+        }
     }
 }
 
@@ -121,6 +132,7 @@ fn from_points(scan: PointScan, name: &str) -> Input {
             ..ScanReport::default()
         },
         columns,
+        processing: None,
         name: None,
         timestamp: None,
         notes: scan.notes,
@@ -169,6 +181,7 @@ fn journal(reader: impl BufRead, name: &str) -> Result<Input, Failure> {
             dropouts: Some(dropouts),
         },
         columns,
+        processing: serde_json::from_slice(&header.settings).ok(),
         timestamp: kept.as_ref().and_then(|scan| scan.started_at.parse().ok()),
         name: kept.map(|scan| scan.name),
         notes,

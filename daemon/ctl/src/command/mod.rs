@@ -3,6 +3,8 @@
 pub(crate) mod abort;
 pub(crate) mod cancel;
 pub(crate) mod convert;
+pub(crate) mod demo;
+pub(crate) mod doctor;
 pub(crate) mod fetch;
 pub(crate) mod jobs;
 pub(crate) mod rerun;
@@ -22,6 +24,7 @@ use crate::failure::Failure;
 pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
     let json = invocation.json;
     match invocation.command {
+        Command::Demo(args) => block_on(demo::run(args, json)),
         Command::Convert(args) => block_on(convert::run(args, json)),
         Command::Scan(args) => block_on(scan::run(args, json)),
         Command::Abort(args) => block_on(abort::run(args, json)),
@@ -32,6 +35,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Cancel(args) => block_on(cancel::run(args, json)),
         Command::Rerun(args) => block_on(rerun::run(args, json)),
         Command::Watch(args) => block_on(watch::run(args, json)),
+        Command::Doctor(args) => block_on(doctor::run(args, json)),
         Command::Fetch(args) => block_on(fetch::run(args, json)),
     }
 }

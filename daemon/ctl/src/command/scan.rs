@@ -126,7 +126,6 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
             y_last_mm: plan.y_last_mm,
             samples: plan.samples,
             exposure_us: plan.exposure_us,
-            ..PlanRequest::default()
         },
         settings: setting::overrides(args.settings),
     };

@@ -27,9 +27,10 @@ pub(crate) struct Args {
     /// Distance of the grid's nodes, millimetres; default: after the scan's density
     #[arg(long, value_name = "MM")]
     pitch_mm: Option<f64>,
-    /// The road from samples to surfaces: ours, or Shim & Lee 1995 as printed
-    #[arg(long, value_name = "METHOD", value_enum, default_value_t = MethodName::Relief)]
-    method: MethodName,
+    /// The road from samples to surfaces: ours, or Shim & Lee 1995 as printed; default:
+    /// what a .scan file was set to, else ours
+    #[arg(long, value_name = "METHOD", value_enum)]
+    method: Option<MethodName>,
     /// How far a surface may lie from the range image, millimetres
     #[arg(long, value_name = "MM")]
     tolerance_mm: Option<f64>,
@@ -157,14 +158,17 @@ impl Args {
         })
     }
 
-    /// The pipeline's settings for a scan for which this pitch is recommended.
-    pub(super) fn settings(&self, recommended_pitch_mm: f64) -> Result<Settings, Failure> {
-        let pitch_mm = self.pitch_mm.unwrap_or(recommended_pitch_mm);
-        let method = match self.method {
-            MethodName::Relief => Method::Relief,
-            MethodName::ShimLee => Method::ShimLee,
-        };
-        let mut settings = Settings::new(pitch_mm).with_method(method);
+    /// The settings of a scan with what the user says differently.
+    pub(super) fn settings(&self, mut settings: Settings) -> Result<Settings, Failure> {
+        if let Some(pitch_mm) = self.pitch_mm {
+            settings.regrid.pitch_mm = pitch_mm;
+        }
+        if let Some(method) = self.method {
+            settings = settings.with_method(match method {
+                MethodName::Relief => Method::Relief,
+                MethodName::ShimLee => Method::ShimLee,
+            });
+        }
         if let Some(seed) = self.seed {
             settings = settings.with_seed(seed);
         }

@@ -87,7 +87,7 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
 fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
     let output = args.output()?;
     let input = input::read(&args.input, args.units())?;
-    let settings = args.settings(input.recommended_pitch_mm())?;
+    let settings = args.settings(input.settings())?;
     let cad = args.cad(input.scan.operator.as_deref());
     let timestamp = args.timestamp(input.timestamp)?;
     let name = args.name(input.name.as_deref());

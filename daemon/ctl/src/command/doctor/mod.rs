@@ -1,0 +1,96 @@
+//! `relief doctor`: looks for the usual troubles and says how to mend each.
+
+mod disk;
+mod finding;
+mod machine;
+mod port;
+mod reach;
+
+use std::path::PathBuf;
+
+use reliefd::Config;
+use serde::Serialize;
+
+use crate::failure::Failure;
+use crate::output::{self, counted};
+use crate::service::EndpointArgs;
+use finding::{Finding, Grade};
+
+/// Look for the usual troubles and say how to mend each
+///
+/// Checks the configuration, the scanner's port (there, permitted, not held by somebody
+/// else), programs that disturb serial ports, the folders and their disk, the clock, and
+/// whether the service answers. Changes nothing.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// The service's configuration
+    #[arg(long, value_name = "FILE", default_value = "/etc/relief/reliefd.toml")]
+    config: PathBuf,
+    #[command(flatten)]
+    endpoint: EndpointArgs,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Told {
+    healthy: bool,
+    findings: Vec<Finding>,
+}
+
+pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
+    let mut findings = Vec::new();
+    let config = match Config::load(&args.config) {
+        Ok(config) => {
+            let said = format!("{} is sound", args.config.display());
+            findings.push(Finding::good("configuration", said));
+            config
+        }
+        Err(error) => {
+            findings.push(Finding::bad(
+                "configuration",
+                format!("{error}; the checks below take the defaults"),
+                "mend the file at the place named (reliefd --check-config looks at it again), or \
+                 name another with --config",
+            ));
+            Config::default()
+        }
+    };
+    findings.extend(port::check(&config.scanner.port));
+    findings.extend(machine::disturbers());
+    findings.push(disk::check(
+        "kept scans",
+        "service.state_dir",
+        &config.service.state_dir,
+    ));
+    findings.push(disk::check(
+        "spool",
+        "service.spool_dir",
+        &config.service.spool_dir,
+    ));
+    findings.push(machine::clock());
+    findings.push(reach::check(args.endpoint.endpoint()).await);
+
+    let bad = findings
+        .iter()
+        .filter(|finding| finding.grade == Grade::Bad)
+        .count();
+    let told = Told {
+        healthy: bad == 0,
+        findings,
+    };
+    output::either(json, &told, |told| {
+        told.findings
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join("\n")
+    })?;
+    if bad == 0 {
+        Ok(())
+    } else {
+        Err(Failure::Failed(format!(
+            "{} found; each says how to mend it",
+            counted(bad, "trouble")
+        )))
+    }
+}

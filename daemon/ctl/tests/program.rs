@@ -1,0 +1,322 @@
+//! The program as its users meet it: arguments in, files, text and exit code out.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn relief(directory: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_relief"))
+        .current_dir(directory)
+        .env_remove("SOURCE_DATE_EPOCH")
+        .env_remove("RELIEF_SOCKET")
+        .args(arguments)
+        .output()
+        .expect("the program starts")
+}
+
+/// A roof of two planes, 24 mm square, as lines of x y z; a blank line is no harm.
+fn roof() -> String {
+    let mut text = String::from("# x y z\n\n");
+    for i in -24..=24 {
+        for j in -24..=24 {
+            let (x, y) = (f64::from(i) * 0.5, f64::from(j) * 0.5);
+            writeln!(text, "{x} {y} {}", 20.0 - 0.6 * x.abs() + 0.1 * y).expect("text takes it");
+        }
+    }
+    text
+}
+
+/// Fails with this code and tells why in one line on standard error, nothing elsewhere.
+fn refused(output: &Output, code: i32, because: &str) {
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{told}");
+    assert_eq!(told.lines().count(), 1, "{told}");
+    assert!(
+        told.starts_with("relief: ") && told.contains(because),
+        "{told}"
+    );
+    assert!(output.stdout.is_empty());
+}
+
+#[test]
+fn a_scan_file_becomes_a_cad_file_a_report_and_pictures() {
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("roof.xyz"), roof()).unwrap();
+    let output = relief(
+        directory.path(),
+        &[
+            "convert",
+            "roof.xyz",
+            "--json",
+            "--report",
+            "r.json",
+            "--pictures",
+            "pics",
+            "--timestamp",
+            "2026-11-21T09:30:00Z",
+        ],
+    );
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let iges = fs::read(directory.path().join("roof.igs")).unwrap();
+    assert_eq!(told["output"], "roof.igs");
+    assert_eq!(told["file"]["bytes"], iges.len());
+    assert!(
+        iges.chunks(81)
+            .all(|line| line.len() == 81 && line[80] == b'\n')
+    );
+    assert!(iges.windows(15).any(|w| w == b"20261121.093000"));
+
+    let report: Value =
+        serde_json::from_slice(&fs::read(directory.path().join("r.json")).unwrap()).unwrap();
+    assert_eq!(report, told["report"]);
+    assert_eq!(report["regions"]["count"], 2);
+    assert_eq!(report["regions"]["list"].as_array().map(Vec::len), Some(2));
+    assert_eq!(report["model"]["faces"], 2);
+    assert_eq!(report["model"]["edges_shared"], 1);
+    assert_eq!(report["scan"]["samples"], 49 * 49);
+    assert_eq!(report["settings"]["method"], "relief");
+    for key in [
+        "snr_db",
+        "lost_nodes",
+        "invented_nodes",
+        "warnings",
+        "versions",
+    ] {
+        assert!(!report[key].is_null(), "{key}");
+    }
+    for stage in ["regrid", "segment", "reconstruct", "export", "pictures"] {
+        assert!(report["timings_s"][stage].is_f64(), "{stage}");
+    }
+    for picture in ["range.png", "regions.png"] {
+        let bytes = fs::read(directory.path().join("pics").join(picture)).unwrap();
+        assert!(bytes.starts_with(b"\x89PNG\r\n\x1a\n"), "{picture}");
+    }
+}
+
+#[test]
+fn the_same_samples_give_the_same_bytes_whatever_the_threads() {
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("roof.xyz"), roof()).unwrap();
+    let converted = |out: &str, threads: &str| {
+        let output = relief(
+            directory.path(),
+            &[
+                "convert",
+                "roof.xyz",
+                "-o",
+                out,
+                "--threads",
+                threads,
+                "--entities",
+                "128",
+            ],
+        );
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        fs::read(directory.path().join(out)).unwrap()
+    };
+    let one = converted("one.igs", "1");
+    assert_eq!(one, converted("two.iges", "2"));
+    // Only the two formats of before stand there, no temporary file.
+    assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 3);
+}
+
+#[test]
+fn wrong_usage_is_told_in_one_line_with_exit_code_2() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    fs::write(at.join("roof.xyz"), roof()).unwrap();
+    refused(&relief(at, &["convert", "roof.xyz", "--jsn"]), 2, "'--jsn'");
+    refused(&relief(at, &["convert"]), 2, "INPUT");
+    refused(&relief(at, &["retry", "seven"]), 2, "seven");
+    refused(
+        &relief(at, &["convert", "roof.xyz", "-o", "roof.stp"]),
+        2,
+        ".igs, .iges",
+    );
+    refused(
+        &relief(at, &["convert", "roof.xyz", "--pitch-mm", "0"]),
+        2,
+        "pitch_mm",
+    );
+    refused(
+        &relief(at, &["rerun", "x", "--set", "neighbours"]),
+        2,
+        "KEY=VALUE",
+    );
+    refused(
+        &relief(at, &["status", "--url", "https://x:1"]),
+        2,
+        "http://127.0.0.1",
+    );
+    refused(
+        &relief(at, &["demo", "--object", "castle"]),
+        2,
+        "house, cylinder",
+    );
+    refused(&relief(at, &["demo", "--noise-mm=-1"]), 2, "noise");
+}
+
+#[test]
+fn failures_are_told_in_one_line_with_exit_code_1() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    fs::write(at.join("bad.xyz"), "0 0 0\n1 2\n").unwrap();
+    fs::write(at.join("empty.xyz"), "# nothing\n").unwrap();
+    refused(&relief(at, &["convert", "none.xyz"]), 1, "none.xyz");
+    refused(&relief(at, &["convert", "bad.xyz"]), 1, "line 2");
+    refused(&relief(at, &["convert", "empty.xyz"]), 1, "no points");
+    let socket = at.join("none.sock");
+    let socket = socket.to_str().unwrap();
+    for command in [
+        &["status"][..],
+        &["abort"],
+        &["scans"],
+        &["fetch", "x"],
+        &["scan", "--wait"],
+    ] {
+        let arguments: Vec<&str> = command
+            .iter()
+            .copied()
+            .chain(["--socket", socket])
+            .collect();
+        refused(&relief(at, &arguments), 1, "relief doctor");
+    }
+    assert!(!at.join("none.igs").exists() && !at.join("bad.igs").exists());
+}
+
+#[test]
+fn four_dots_are_no_part_and_the_user_learns_why() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    fs::write(at.join("dots.xyz"), "0 0 0\n0 1 0\n1 0 0\n1 1 0\n").unwrap();
+    let output = relief(at, &["convert", "dots.xyz"]);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    let last = told.lines().last().unwrap();
+    assert!(
+        last.starts_with("relief: dots.xyz: ") && last.contains("larger pitch"),
+        "{told}"
+    );
+    assert!(!at.join("dots.igs").exists());
+}
+
+#[test]
+fn the_doctor_names_every_trouble_and_its_remedy() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let config = format!(
+        "[service]\nstate_dir = {:?}\nspool_dir = {:?}\n[scanner]\nport = {:?}\n",
+        at,
+        at.join("no-spool"),
+        at.join("no-port")
+    );
+    fs::write(at.join("reliefd.toml"), config).unwrap();
+    let socket = at.join("none.sock");
+    let output = relief(
+        at,
+        &[
+            "doctor",
+            "--json",
+            "--config",
+            "reliefd.toml",
+            "--socket",
+            socket.to_str().unwrap(),
+        ],
+    );
+    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(String::from_utf8_lossy(&output.stderr).lines().count(), 1);
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(told["healthy"], false);
+    let graded = |check: &str| {
+        let findings = told["findings"].as_array().unwrap();
+        let found = findings
+            .iter()
+            .find(|finding| finding["check"] == check)
+            .unwrap();
+        assert_eq!(
+            found["remedy"].is_null(),
+            found["grade"] == "good",
+            "{found}"
+        );
+        found["grade"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(graded("configuration"), "good");
+    assert_ne!(graded("kept scans"), "bad");
+    for check in ["scanner port", "spool", "service"] {
+        assert_eq!(graded(check), "bad", "{check}");
+    }
+}
+
+#[test]
+fn help_is_there_for_every_command() {
+    let directory = tempfile::tempdir().unwrap();
+    let help = relief(directory.path(), &["--help"]);
+    assert!(help.status.success());
+    let text = String::from_utf8_lossy(&help.stdout).into_owned();
+    for command in [
+        "demo", "convert", "scan", "abort", "status", "scans", "jobs", "retry", "cancel", "rerun",
+        "watch", "fetch", "doctor",
+    ] {
+        assert!(
+            text.contains(&format!("\n  {command} ")),
+            "{command} is not listed:\n{text}"
+        );
+        let own = relief(directory.path(), &[command, "--help"]);
+        assert!(own.status.success());
+        assert!(
+            String::from_utf8_lossy(&own.stdout).contains("--json"),
+            "{command}"
+        );
+    }
+}
+
+#[test]
+fn the_demo_leaves_the_deliverables_and_nothing_else() {
+    let directory = tempfile::tempdir().unwrap();
+    let temporary = directory.path().join("tmp");
+    fs::create_dir(&temporary).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_relief"))
+        .current_dir(directory.path())
+        .env("TMPDIR", &temporary)
+        .args(["demo", "--json", "--object", "cylinder", "--out", "there"])
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(told["iges"], "there/cylinder.igs");
+    assert_eq!(told["scan"]["state"], "complete");
+    assert_eq!(told["job"]["state"], "done");
+    assert_eq!(told["report"]["model"]["faces"], 2);
+    let mut names: Vec<String> = fs::read_dir(directory.path().join("there"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    assert_eq!(
+        names,
+        [
+            "cylinder.igs",
+            "manifest.json",
+            "range.png",
+            "regions.png",
+            "report.json"
+        ]
+    );
+    assert_eq!(fs::read_dir(&temporary).unwrap().count(), 0);
+}
