@@ -1,16 +1,10 @@
 //! A scan of a real object by a real scanner, sent over the wire again.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use relief_tests::direct::{self, Label};
 use relief_tests::rig::{Rig, recording};
-
-/// Set to take the whole view and not a crop of it: minutes without optimisation.
-const FULL_VARIABLE: &str = "RELIEF_FULL";
-/// Columns in the middle of the view that the crop keeps.
-const CROP_COLUMNS: usize = 60;
 
 /// The view, if it is there: it is not part of the source.
 fn view() -> Option<PathBuf> {
@@ -23,38 +17,11 @@ fn view() -> Option<PathBuf> {
     None
 }
 
-/// Writes the columns in the middle of a scan as text.
-fn crop(path: &Path, folder: &Path) -> Result<PathBuf> {
-    let scan = scan_files::read(path, &scan_files::ReadOptions::default())?;
-    let first = scan.columns.len().saturating_sub(CROP_COLUMNS) / 2;
-    let mut text = String::from("# x y z in mm\n");
-    for column in scan.columns.iter().skip(first).take(CROP_COLUMNS) {
-        for sample in &column.samples {
-            writeln!(
-                text,
-                "{:.5} {:.5} {:.5}",
-                column.x_mm, sample.y_mm, sample.z_mm
-            )?;
-        }
-    }
-    let path = folder.join("crop.xyz");
-    std::fs::write(&path, text)?;
-    Ok(path)
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn a_real_scan_gives_the_same_file_by_wire_and_directly() -> Result<()> {
-    let Some(view) = view() else {
+    let Some(input) = view() else {
         return Ok(());
     };
-    let folder = tempfile::tempdir()?;
-    let whole = std::env::var_os(FULL_VARIABLE).is_some();
-    let input = if whole {
-        view
-    } else {
-        crop(&view, folder.path())?
-    };
-
     let rig = Rig::start(&recording(input.clone())).await?;
     let mut request = super::named("bunny");
     request.operator = "A. Measurer".into();
@@ -82,7 +49,7 @@ async fn a_real_scan_gives_the_same_file_by_wire_and_directly() -> Result<()> {
         result.iges()? == &from_journal,
         "the journal gives other bytes"
     );
-    let converted = folder.path().join("converted.igs");
+    let converted = rig.folder().join("converted.igs");
     if let Some(converted) = direct::program(&input, &label, &converted)? {
         assert!(
             result.iges()? == &converted,

@@ -2,23 +2,20 @@
 //!
 //! The service of this process takes scans of one and the same surface that are 1, 10 and
 //! 40 times as long, over a pseudo-terminal. The simulated scanner, which holds the whole
-//! surface, is a second process: this program started once more. It stops before its last
-//! column, and the scan is then aborted, so that everything of an acquisition happens and
-//! nothing of a job.
+//! surface, is a second process. It stops before its last column, and the scan is then
+//! aborted, so that everything of an acquisition happens and nothing of a job.
 
 use std::fmt::Write as _;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{Read, Write};
 use std::path::Path;
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-use anyhow::{Context, Result, ensure};
-use peak_alloc::PeakAlloc;
+use anyhow::{Result, ensure};
 use relief_api::{Scan, ScanState, StartScan, path};
 use relief_tests::rig::{GUARD, Rig, journal_columns, recording};
 use sim_scanner::device::Event;
 
-#[global_allocator]
-static ALLOCATOR: PeakAlloc = PeakAlloc;
+use crate::role::{Role, SCANNER};
+use crate::{ALLOCATOR, runtime};
 
 /// Columns of the shortest scan: more than the regridder's window and what may be in flight
 /// between the driver and the disk.
@@ -32,27 +29,8 @@ const PITCH_MM: f64 = 0.5;
 /// much: kept in memory, its samples alone would be 9 MB, and its range image 6 MB.
 const GROWTH_BYTES: usize = 512 * 1024;
 
-const SCANNER_ROLE: &str = "--as-scanner";
-
-fn main() -> Result<()> {
-    let mut arguments = std::env::args().skip(1);
-    match arguments.next().as_deref() {
-        Some(SCANNER_ROLE) => {
-            let file = arguments.next().context("no recording")?;
-            let columns = arguments.next().context("no number of columns")?;
-            be_the_scanner(Path::new(&file), columns.parse()?)
-        }
-        // The harness is asked for its tests by some runners.
-        Some("--list") => {
-            println!("memory_of_acquisition_is_constant: test");
-            Ok(())
-        }
-        _ => measure(),
-    }
-}
-
 /// Serves a recording, stops short of its last column, says so, and ends with its input.
-fn be_the_scanner(file: &Path, columns: u32) -> Result<()> {
+pub(crate) fn be_the_scanner(file: &Path, columns: u32) -> Result<()> {
     let server = recording(file.to_owned()).serve_pty(None)?;
     let mut control = server.control();
     control.step_columns(Some(columns));
@@ -61,46 +39,6 @@ fn be_the_scanner(file: &Path, columns: u32) -> Result<()> {
     println!("done");
     std::io::stdin().read_to_end(&mut Vec::new())?;
     Ok(())
-}
-
-/// The simulated scanner in its own process.
-struct Scanner {
-    child: Child,
-    input: Option<ChildStdin>,
-    output: BufReader<ChildStdout>,
-}
-
-impl Scanner {
-    fn start(file: &Path, columns: u32) -> Result<Self> {
-        let mut child = Command::new(std::env::current_exe()?)
-            .arg(SCANNER_ROLE)
-            .arg(file)
-            .arg(columns.to_string())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()?;
-        let output = child.stdout.take().context("no output")?;
-        Ok(Self {
-            input: child.stdin.take(),
-            output: BufReader::new(output),
-            child,
-        })
-    }
-
-    fn line(&mut self) -> Result<String> {
-        let mut line = String::new();
-        ensure!(
-            self.output.read_line(&mut line)? > 0,
-            "the scanner has ended"
-        );
-        Ok(line.trim_end().to_owned())
-    }
-
-    fn end(mut self) -> Result<()> {
-        drop(self.input.take());
-        ensure!(self.child.wait()?.success(), "the scanner failed");
-        Ok(())
-    }
 }
 
 /// A wavy strip, `columns` long, as text.
@@ -125,7 +63,7 @@ fn write_strip(path: &Path, columns: u32) -> Result<()> {
 fn acquire(runtime: &tokio::runtime::Runtime, folder: &Path, columns: u32) -> Result<usize> {
     let strip = folder.join(format!("{columns}.xyz"));
     write_strip(&strip, columns + 1)?;
-    let mut scanner = Scanner::start(&strip, columns)?;
+    let mut scanner = Role::start(SCANNER, &[&strip.to_string_lossy(), &columns.to_string()])?;
     let port = scanner.line()?;
     let peak = runtime.block_on(async {
         let rig = Rig::at_port(Path::new(&port)).await?;
@@ -159,12 +97,9 @@ fn acquire(runtime: &tokio::runtime::Runtime, folder: &Path, columns: u32) -> Re
     Ok(peak)
 }
 
-fn measure() -> Result<()> {
+pub(crate) fn acquisition_needs_the_same_however_long_the_scan() -> Result<()> {
     let folder = tempfile::tempdir()?;
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build()?;
+    let runtime = runtime()?;
     // Once for what is made at the first use of anything.
     acquire(&runtime, folder.path(), COLUMNS)?;
     let mut peaks = Vec::new();
@@ -184,6 +119,5 @@ fn measure() -> Result<()> {
             "acquisition needs {peak} bytes instead of {shortest} for a longer scan"
         );
     }
-    println!("memory_of_acquisition_is_constant: ok");
     Ok(())
 }
