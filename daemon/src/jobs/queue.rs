@@ -97,9 +97,16 @@ impl Queue {
         }
     }
 
-    /// A job runs no more.
-    pub(crate) fn end(&self, id: JobId) {
-        lock(&self.state).running.remove(&id);
+    /// The attempt with this flag runs no more; another one at the same job goes on.
+    pub(crate) fn end(&self, id: JobId, flag: &Arc<StopFlag>) {
+        let mut state = lock(&self.state);
+        if state
+            .running
+            .get(&id)
+            .is_some_and(|running| Arc::ptr_eq(running, flag))
+        {
+            state.running.remove(&id);
+        }
     }
 
     /// No job is begun any more, and those that run are asked to stop.

@@ -36,14 +36,14 @@ pub(crate) fn work(service: &Arc<Service>) {
             // service takes it up again.
             tracing::error!(job = id, %error, "cannot keep the record of a job");
         }
-        service.queue.end(id);
+        service.queue.end(id, &flag);
     }
 }
 
 fn attempt(
     service: &Service,
     id: relief_api::JobId,
-    flag: &StopFlag,
+    flag: &Arc<StopFlag>,
 ) -> Result<(), crate::error::ServiceError> {
     let mut job = {
         let _order = service.queue.changing();
@@ -74,6 +74,9 @@ fn attempt(
         service.spool.discard(&job.result);
     }
     let _order = service.queue.changing();
+    // Before anybody is told: who hears of the end may cancel or retry at once, and must
+    // not meet this attempt.
+    service.queue.end(id, flag);
     job.timings = timings;
     job.ended_at = Some(now());
     let mut published = None;
