@@ -31,6 +31,11 @@ impl SpoolError {
                  service.spool_dir to another folder",
                 self.path.display()
             ),
+            io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory => format!(
+                "{} is no folder: move away what is there, or set service.spool_dir to \
+                 another folder",
+                self.path.display()
+            ),
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
                 "make room on the disk, then retry the job".to_owned()
             }

@@ -166,10 +166,11 @@ async fn an_unwritable_spool_fails_the_job_and_a_retry_mends_it() {
         )) || error.contains("Not a directory"),
         "{error}"
     );
-    assert_eq!(
-        job.hint.as_deref(),
-        Some("mend the cause, then retry the job")
+    let hint = format!(
+        "{} is no folder: move away what is there, or set service.spool_dir to another folder",
+        spool.display()
     );
+    assert_eq!(job.hint, Some(hint));
 
     std::fs::remove_file(&spool).unwrap();
     std::fs::create_dir(&spool).unwrap();
