@@ -40,7 +40,7 @@ impl Placement {
         }
     }
 
-    fn to_mm(self, p: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn to_mm(self, p: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|d| self.origin_mm[d] + self.pitch_mm * p[d])
     }
 

@@ -53,6 +53,15 @@ pub struct Domain {
     pub y_mm: (f64, f64),
 }
 
+impl Domain {
+    /// Whether the surface covers the rectangle.
+    #[must_use]
+    pub fn is_within(&self, surface: &PatchSurface) -> bool {
+        let covers = |(low, high): (f64, f64), (from, to): (f64, f64)| from <= low && high <= to;
+        covers(self.x_mm, surface.u_domain()) && covers(self.y_mm, surface.v_domain())
+    }
+}
+
 /// Least-squares spline over a full rectangle of nodes with `knots_per_side` distinct
 /// uniform knots along each side, the ends included. A side with too few nodes for that
 /// gets as many knots as its nodes determine.

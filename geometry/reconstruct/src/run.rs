@@ -5,6 +5,7 @@ use range_image::{Monitor, RangeImage, RegionMap};
 
 use crate::assemble::{Carrier, Placement, domains, model};
 use crate::border::cracks::trace;
+use crate::border::intersection::intersections;
 use crate::border::map::{BorderSettings, PlanarMap, build};
 use crate::fit::{Domain, FitError, patches_from_spline, patches_through_nodes};
 use crate::metrics::{Metrics, compare, psnr_db};
@@ -52,6 +53,10 @@ pub struct RegionFit {
 }
 
 /// A node with its place and height in millimetres.
+/// Margin of a surface around the nodes of its region, pitches: half of one to the
+/// border, and what smoothing may do.
+const SURFACE_MARGIN: f64 = 3.0;
+
 #[derive(Debug, Clone, Copy)]
 struct Node {
     column: usize,
@@ -90,23 +95,40 @@ pub fn reconstruct(
         piece_price: settings.piece_price_pitch2,
         bound: settings.border_bound_pitches,
     };
-    let planar = build(&trace(&pieces), &borders, monitor)?;
-    monitor.progress(0.4);
-
     let nodes = nodes_of(image, map, &pieces);
     let placement = Placement::of(image);
+    let cracks = trace(&pieces);
+    let failed = |region: u16| {
+        move |e: FitError| ReconstructError::Fit {
+            label: region,
+            reason: e.to_string(),
+        }
+    };
+    // By the letter of the paper the border comes first, and the surface covers it.
+    let mut early = Vec::new();
+    if settings.method == Method::Relief {
+        for (k, nodes) in nodes.iter().enumerate() {
+            monitor.check()?;
+            let domain = around(image, nodes).ok_or(FitError::Empty);
+            let surface = domain.and_then(|domain| surface(image, nodes, &domain, settings));
+            early.push(surface.map_err(failed(pieces.regions[k]))?);
+        }
+    }
+    let placed = intersections(&cracks, &early, placement);
+    monitor.progress(0.4);
+    let planar = build(&cracks, &placed, &borders, monitor)?;
+
     let names = names(&pieces.regions);
     let mut carriers = Vec::with_capacity(nodes.len());
     let mut fits: Vec<RegionFit> = Vec::new();
     for (k, domain) in domains(&planar, placement).into_iter().enumerate() {
         monitor.check()?;
         let region = pieces.regions[k];
-        let failed = |e: FitError| ReconstructError::Fit {
-            label: region,
-            reason: e.to_string(),
+        let domain = domain.ok_or(FitError::Empty).map_err(failed(region))?;
+        let surface = match early.get(k) {
+            Some(surface) if domain.is_within(surface) => surface.clone(),
+            _ => surface(image, &nodes[k], &domain, settings).map_err(failed(region))?,
         };
-        let domain = domain.ok_or(FitError::Empty).map_err(failed)?;
-        let surface = surface(image, &nodes[k], &domain, settings).map_err(failed)?;
         let rms_mm = tally(&mut fits, region, image, &nodes[k], &surface);
         carriers.push(Carrier {
             region,
@@ -174,6 +196,23 @@ fn nodes_of(image: &RangeImage, map: &RegionMap, pieces: &PieceMap) -> Vec<Vec<N
         }
     }
     nodes
+}
+
+/// A rectangle that holds the nodes and as good as any border that may be drawn around
+/// them. `None` without nodes.
+fn around(image: &RangeImage, nodes: &[Node]) -> Option<Domain> {
+    let margin_mm = SURFACE_MARGIN * image.pitch_mm();
+    let extent = |places: &mut dyn Iterator<Item = f64>| {
+        places.fold(None, |extent: Option<(f64, f64)>, p| {
+            let (low, high) = extent.unwrap_or((p, p));
+            Some((low.min(p), high.max(p)))
+        })
+    };
+    let widened = |(low, high): (f64, f64)| (low - margin_mm, high + margin_mm);
+    Some(Domain {
+        x_mm: widened(extent(&mut nodes.iter().map(|n| image.x_mm(n.column)))?),
+        y_mm: widened(extent(&mut nodes.iter().map(|n| image.y_mm(n.row)))?),
+    })
 }
 
 fn surface(

@@ -60,11 +60,30 @@ const CUBIC_PRICE: f64 = 16.0 / 7.0;
 /// Weight of an outline against a border between faces where they meet.
 const OUTLINE_WEIGHT: f64 = 8.0;
 
+/// The same of a crease that the surfaces on its sides have placed.
+const PLACED_WEIGHT: f64 = 100.0;
+
 /// Samples of a traced border nearer to its vertices than this do not count, pitches.
 const VERTEX_CLEARANCE: f64 = 1.0;
 
 /// Farthest a junction moves from its corner of the lattice, pitches.
 const JUNCTION_REACH: f64 = 1.0;
+
+/// The same where the curves that meet there cross at an angle that tells the place: the
+/// tip of a sharp corner is missed by the samples, and so by the lattice.
+const TIP_REACH: f64 = 5.0;
+
+/// Least ratio of the eigenvalues of the normal equations for that.
+const WELL_CROSSED: f64 = 0.02;
+
+/// A piece at the end of a border of at most this many steps, next to one at least
+/// [`BEVEL_RATIO`] times as long, cuts off the tip that the samples have missed.
+const BEVEL_STEPS: usize = 5;
+const BEVEL_RATIO: usize = 3;
+
+/// Factor of the price of pieces for borders whose samples lie on them: there is no
+/// staircase to see past.
+const PLACED_PRICE: f64 = 0.05;
 
 /// Farthest the filtered border may lie from the drawn one, pitches. Filtering cuts a
 /// right angle by less; single nodes that stick out do not count.
@@ -78,16 +97,21 @@ struct Border<'a> {
     level: usize,
 }
 
+/// Builds the map. `placed[k]`, where given, are better samples of chain `k` than the
+/// middles of its cracks.
 pub(crate) fn build(
     cracks: &CrackMap,
+    placed: &[Option<Vec<[f64; 2]>>],
     settings: &BorderSettings,
     monitor: &dyn Monitor,
 ) -> Result<PlanarMap, Cancelled> {
     let mut borders: Vec<Border<'_>> = cracks
         .chains
         .iter()
-        .map(|chain| {
-            let mut points = chain.middles.clone();
+        .enumerate()
+        .map(|(k, chain)| {
+            let placed = placed.get(k).and_then(Option::as_ref);
+            let mut points = placed.unwrap_or(&chain.middles).clone();
             if chain.ends.is_none() {
                 let start = sharpest(&points);
                 points.rotate_left(start);
@@ -95,7 +119,10 @@ pub(crate) fn build(
             }
             let mut border = Border {
                 chain,
-                samples: Samples::new(points),
+                samples: match placed {
+                    Some(_) => Samples::placed(points),
+                    None => Samples::new(points),
+                },
                 segments: Vec::new(),
                 level: SMOOTH,
             };
@@ -134,12 +161,21 @@ impl Border<'_> {
         let Some(share) = PRICES.get(self.level) else {
             return;
         };
-        let factor = settings.piece_price * share;
+        let factor = settings.piece_price
+            * share
+            * if self.samples.placed {
+                PLACED_PRICE
+            } else {
+                1.0
+            };
         let price = Price {
             line: factor,
             cubic: factor * CUBIC_PRICE,
         };
         self.segments = self.samples.divide(price);
+        if self.chain.ends.is_some() && !settings.literal {
+            drop_bevels(&mut self.segments);
+        }
     }
 
     /// Paths between vertices; `None` when one has no length.
@@ -151,10 +187,15 @@ impl Border<'_> {
         let ends = self.chain.ends.map(|(a, b)| (junctions[a], junctions[b]));
         let points = &self.samples.points;
         if self.level == TRACED || points.len() < 2 {
-            let (start, end) = ends.map_or((None, None), |(a, b)| (Some(a), Some(b)));
+            // Nothing but the middles of the cracks is sure to cross no other border.
+            let middles = &self.chain.middles;
+            let (start, end) = match ends {
+                Some((start, end)) => (Some(start), Some(end)),
+                None => (None, middles.first().copied()),
+            };
             let whole: Vec<_> = start
                 .into_iter()
-                .chain(points.iter().copied())
+                .chain(middles.iter().copied())
                 .chain(end)
                 .collect();
             return Some(vec![path::polyline(&whole)?]);
@@ -190,6 +231,28 @@ impl Border<'_> {
     }
 }
 
+/// Lets the long pieces at a border's ends run on to its junctions.
+fn drop_bevels(segments: &mut Vec<Segment>) {
+    let steps = |s: &Segment| s.last - s.first;
+    let is_bevel = |end: &Segment, next: &Segment| {
+        steps(end) <= BEVEL_STEPS && steps(next) >= BEVEL_RATIO * steps(end)
+    };
+    if let [end, next, ..] = segments[..]
+        && is_bevel(&end, &next)
+    {
+        segments[1].first = end.first;
+        segments.remove(0);
+    }
+    if let [.., next, end] = segments[..]
+        && is_bevel(&end, &next)
+    {
+        segments.pop();
+        if let Some(last) = segments.last_mut() {
+            last.last = end.last;
+        }
+    }
+}
+
 /// Junctions at the point nearest to the curves that meet there, or on their corner of
 /// the lattice where a traced border ends.
 fn place_junctions(cracks: &CrackMap, borders: &[Border<'_>]) -> Vec<[f64; 2]> {
@@ -222,11 +285,14 @@ fn place_junctions(cracks: &CrackMap, borders: &[Border<'_>]) -> Vec<[f64; 2]> {
         for (junction, segment, sample) in [(start, first, first.first), (end, last, last.last)] {
             let length = (segment.last - segment.first) as f64;
             let outline = border.chain.left == 0 || border.chain.right == 0;
-            let weight = if outline {
-                OUTLINE_WEIGHT * length
-            } else {
-                length
-            };
+            let weight = length
+                * if border.samples.placed {
+                    PLACED_WEIGHT
+                } else if outline {
+                    OUTLINE_WEIGHT
+                } else {
+                    1.0
+                };
             let (point, along) = border.samples.at(segment, sample);
             let normal = [-along[1], along[0]];
             let offset = normal[0] * point[0] + normal[1] * point[1];
@@ -251,11 +317,14 @@ fn place_junctions(cracks: &CrackMap, borders: &[Border<'_>]) -> Vec<[f64; 2]> {
                 (m[0][0] * rhs[1] - m[1][0] * rhs[0]) / det,
             ];
             let (by, far) = (minus(place, corner), norm(minus(place, corner)));
-            let share = if far > JUNCTION_REACH {
-                JUNCTION_REACH / far
+            let trace = m[0][0] + m[1][1];
+            // For a ratio far below 1 this is the ratio of the eigenvalues.
+            let reach = if det > WELL_CROSSED * trace * trace {
+                TIP_REACH
             } else {
-                1.0
+                JUNCTION_REACH
             };
+            let share = if far > reach { reach / far } else { 1.0 };
             [corner[0] + share * by[0], corner[1] + share * by[1]]
         })
         .collect()
@@ -301,7 +370,17 @@ fn faults(
             outline.extend_from_slice(&strand.points);
             strands.push(strand);
         }
-        if border.level < TRACED && strays(&border.samples, &outline) {
+        let tips: Vec<Tip> = border
+            .chain
+            .ends
+            .iter()
+            .flat_map(|&(a, b)| [a, b])
+            .map(|j| Tip {
+                place: junctions[j],
+                moved: norm(minus(junctions[j], cracks.junctions[j])),
+            })
+            .collect();
+        if border.level < TRACED && strays(&border.samples, &outline, &tips) {
             bad.insert(k);
         }
         outlines.push(outline);
@@ -328,8 +407,15 @@ fn faults(
     bad
 }
 
-/// True when a drawn border leaves the traced one.
-fn strays(samples: &Samples, outline: &[[f64; 2]]) -> bool {
+/// Where a border ends, and how far that is from where its samples end.
+struct Tip {
+    place: [f64; 2],
+    moved: f64,
+}
+
+/// True when a drawn border leaves its samples, those aside that end short of a tip or
+/// run past it.
+fn strays(samples: &Samples, outline: &[[f64; 2]], tips: &[Tip]) -> bool {
     let mut length = vec![0.0];
     for pair in outline.windows(2) {
         length.push(length[length.len() - 1] + norm(minus(pair[1], pair[0])));
@@ -356,7 +442,8 @@ fn strays(samples: &Samples, outline: &[[f64; 2]]) -> bool {
             let close = outline[from..(to + 1).min(outline.len())]
                 .windows(2)
                 .any(|s| distance_to_segment(*point, s[0], s[1]) <= FARTHEST);
-            !close
+            let at_tip = |t: &Tip| norm(minus(*point, t.place)) <= t.moved + FARTHEST;
+            !close && !tips.iter().any(at_tip)
         })
 }
 

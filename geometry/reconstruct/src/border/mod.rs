@@ -2,6 +2,7 @@
 
 pub(crate) mod cracks;
 pub(crate) mod crossing;
+pub(crate) mod intersection;
 pub(crate) mod map;
 pub(crate) mod path;
 pub(crate) mod segments;

@@ -17,6 +17,9 @@ const ROUNDED_SHARE: f64 = 0.3;
 /// Shorter pieces are dropped, pitches.
 const NEGLIGIBLE: f64 = 1e-6;
 
+/// Newton steps to the point of a curve nearest to a vertex.
+const NEAREST_STEPS: usize = 3;
+
 /// A place where two pieces meet, or a border ends.
 #[derive(Debug, Clone, Copy)]
 struct Joint {
@@ -114,6 +117,15 @@ fn meeting(p: [f64; 2], u: [f64; 2], q: [f64; 2], v: [f64; 2]) -> Option<[f64; 2
     Some([p[0] + t * u[0], p[1] + t * u[1]])
 }
 
+/// An end of a segment as it is drawn.
+struct End {
+    place: [f64; 2],
+    /// Derivative of the segment's form there.
+    slope: [f64; 2],
+    /// Arc length from the form's origin.
+    at: f64,
+}
+
 /// Draws the segments `first..last` as one path.
 struct Pen<'a> {
     samples: &'a Samples,
@@ -148,20 +160,38 @@ impl Pen<'_> {
         }
     }
 
-    /// Place and derivative on segment `k`, `by` after its start or before its end.
-    fn end_of(&self, k: usize, at_end: bool, by: f64) -> Option<([f64; 2], [f64; 2])> {
+    /// Where segment `k` is drawn from or to: `by` after its start or before its end.
+    fn end_of(&self, k: usize, at_end: bool, by: f64) -> Option<End> {
         let segment = &self.segments[k];
         let joint = &self.joints[if at_end { k + 1 } else { k }];
         let inward = if at_end { -by } else { by };
         if let Form::Line { .. } = segment.form {
             let along = self.chord(k)?;
-            let place = [0, 1].map(|d| joint.place[d] + inward * along[d]);
-            return Some((place, along));
+            return Some(End {
+                place: [0, 1].map(|d| joint.place[d] + inward * along[d]),
+                slope: along,
+                at: 0.0,
+            });
         }
         let lengths = &self.samples.length;
         let sample = if at_end { segment.last } else { segment.first };
-        let (place, slope) = segment.on_form(lengths[sample] - lengths[segment.origin] + inward);
-        Some((if by > 0.0 { place } else { joint.place }, slope))
+        let mut at = lengths[sample] - lengths[segment.origin] + inward;
+        if by > 0.0 {
+            let (place, slope) = segment.on_form(at);
+            return Some(End { place, slope, at });
+        }
+        // A vertex may lie beyond the last sample or before it: the curve goes on to the
+        // place nearest to it.
+        for _ in 0..NEAREST_STEPS {
+            let (place, slope) = segment.on_form(at);
+            let speed2 = dot(slope, slope).max(NEGLIGIBLE);
+            at += dot(minus(joint.place, place), slope) / speed2;
+        }
+        Some(End {
+            place: joint.place,
+            slope: segment.on_form(at).1,
+            at,
+        })
     }
 
     /// How far pieces of different form stop short of joint `k`, where the path goes on,
@@ -183,20 +213,20 @@ impl Pen<'_> {
         let mut path = Builder::default();
         for k in self.first..self.last {
             let (head, tail) = (self.room(k), self.room(k + 1));
-            let (from, out) = self.end_of(k, false, head)?;
-            let (to, into) = self.end_of(k, true, tail)?;
+            let (from, to) = (self.end_of(k, false, head)?, self.end_of(k, true, tail)?);
             if self.is_line(k) {
-                path.line(from, to);
+                path.line(from.place, to.place);
+            } else if to.at - from.at > NEGLIGIBLE {
+                path.hermite(from.place, from.slope, to.place, to.slope, to.at - from.at);
             } else {
-                let lengths = &self.samples.length;
-                let (a, b) = (self.segments[k].first, self.segments[k].last);
-                path.hermite(from, out, to, into, lengths[b] - lengths[a] - head - tail);
+                // A vertex lies beyond the far end of the segment next to it.
+                return None;
             }
             if tail > 0.0
                 && let Some((_, after)) = self.through(k + 1)
             {
-                let (next, onward) = self.end_of(after, false, tail)?;
-                path.arc(to, into, next, onward);
+                let next = self.end_of(after, false, tail)?;
+                path.arc(to.place, to.slope, next.place, next.slope);
             }
         }
         path.finish()
@@ -253,9 +283,7 @@ impl Builder {
         into: [f64; 2],
         length: f64,
     ) {
-        if length > NEGLIGIBLE {
-            self.push(length, hermite(from, out, to, into, length));
-        }
+        self.push(length, hermite(from, out, to, into, length));
     }
 
     fn finish(self) -> Option<PiecewiseCubic<2>> {

@@ -64,9 +64,20 @@ pub(crate) struct Samples {
     pub(crate) smooth: Vec<[f64; 2]>,
     /// Length of the smoothed border up to each sample: the staircase itself is longer.
     pub(crate) length: Vec<f64>,
+    /// The samples lie on the border itself, and are no middles of cracks.
+    pub(crate) placed: bool,
 }
 
 impl Samples {
+    /// Samples on the border itself.
+    pub(crate) fn placed(points: Vec<[f64; 2]>) -> Self {
+        Self {
+            placed: true,
+            ..Self::new(points)
+        }
+    }
+
+    /// Samples that are the middles of cracks.
     pub(crate) fn new(points: Vec<[f64; 2]>) -> Self {
         let smooth = smoothed(&points, 4);
         let mut length = Vec::with_capacity(points.len());
@@ -81,6 +92,7 @@ impl Samples {
             points,
             smooth,
             length,
+            placed: false,
         }
     }
 
@@ -138,7 +150,7 @@ impl Samples {
             form,
         };
         let steps = last - first;
-        if matches!(form, Form::Cubic { .. }) && steps >= 2 * MIN_HALF_STEPS {
+        if !self.placed && matches!(form, Form::Cubic { .. }) && steps >= 2 * MIN_HALF_STEPS {
             let wrong = (first + 1..last)
                 .filter(|&k| {
                     let (point, along) = self.at(&whole, k);
@@ -217,6 +229,12 @@ impl Samples {
                 c[0] += by;
                 c
             };
+            if self.placed {
+                return Form::Cubic {
+                    x: shift(x, origin[0]),
+                    y: shift(y, origin[1]),
+                };
+            }
             let reach = self.length[last] - self.length[first];
             let scaled = |c: [f64; 4]| {
                 [
@@ -248,6 +266,9 @@ impl Samples {
             along = [-along[0], -along[1]];
         }
         let point = [mean[0] + origin[0], mean[1] + origin[1]];
+        if self.placed {
+            return Form::Line { point, along };
+        }
         // The samples next to a corner cut it off and say nothing about the line.
         let inner = if last - first >= 6 {
             first + 1..last

@@ -1,0 +1,142 @@
+//! Creases placed where the surfaces on their two sides intersect.
+//!
+//! The nodes tell on which side of a crease they lie to half a pitch at best; the
+//! surfaces fitted to all nodes of either side tell where they meet far better.
+
+use nurbs::PatchSurface;
+
+use super::cracks::{Chain, CrackMap};
+use crate::assemble::Placement;
+use crate::polygon::norm;
+
+/// Farthest a sample moves, pitches. Where surfaces meet farther away, or not at all,
+/// the border is a step.
+const REACH: f64 = 1.5;
+
+/// Least difference of the slopes of two surfaces that place their intersection.
+const LEAST_BEND: f64 = 0.15;
+
+/// Share of a border's samples that must find the intersection.
+const LEAST_SHARE: f64 = 0.8;
+
+/// Newton steps; surfaces are nearly plane over a pitch.
+const STEPS: usize = 4;
+
+/// Off the intersection by less than this, pitches, a sample counts as on it.
+const CLOSE: f64 = 1e-3;
+
+/// Samples on the intersections, in pitches, for the chains that are creases between two
+/// of the surfaces; `surfaces[k]` belongs to piece `k + 1`.
+pub(crate) fn intersections(
+    cracks: &CrackMap,
+    surfaces: &[PatchSurface],
+    placement: Placement,
+) -> Vec<Option<Vec<[f64; 2]>>> {
+    let surface = |piece: u32| surfaces.get((piece as usize).checked_sub(1)?);
+    cracks
+        .chains
+        .iter()
+        .map(|chain| {
+            let sides = [surface(chain.left)?, surface(chain.right)?];
+            placed(chain, sides, placement)
+        })
+        .collect()
+}
+
+fn placed(chain: &Chain, sides: [&PatchSurface; 2], placement: Placement) -> Option<Vec<[f64; 2]>> {
+    let found: Vec<[f64; 2]> = chain
+        .middles
+        .iter()
+        .filter_map(|&middle| nearest(middle, sides, placement))
+        .collect();
+    let enough = found.len() as f64 >= LEAST_SHARE * chain.middles.len() as f64;
+    (enough && found.len() >= 2).then_some(found)
+}
+
+/// The point of the intersection nearest to a place, along the slope of the difference.
+fn nearest(
+    start: [f64; 2],
+    [left, right]: [&PatchSurface; 2],
+    placement: Placement,
+) -> Option<[f64; 2]> {
+    let mut place = start;
+    for _ in 0..STEPS {
+        let [x, y] = placement.to_mm(place);
+        let difference = |u, v| left.z_partial(x, y, u, v) - right.z_partial(x, y, u, v);
+        let (gap_mm, slope) = (difference(0, 0), [difference(1, 0), difference(0, 1)]);
+        let bend = norm(slope);
+        if bend < LEAST_BEND {
+            return None;
+        }
+        let step = gap_mm / (bend * placement.pitch_mm);
+        for d in 0..2 {
+            place[d] -= step * slope[d] / bend;
+        }
+        let moved = norm([place[0] - start[0], place[1] - start[1]]);
+        if moved.is_nan() || moved > REACH {
+            return None;
+        }
+        if step.abs() < CLOSE {
+            return Some(place);
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plane(a: f64, b: f64, c: f64) -> PatchSurface {
+        let at = |i: usize| -30.0 + 20.0 * i as f64;
+        PatchSurface::through_thirds(vec![-30.0, 30.0], vec![-30.0, 30.0], |i, j| {
+            a + b * at(i) + c * at(j)
+        })
+        .unwrap()
+    }
+
+    fn chain(middles: Vec<[f64; 2]>) -> CrackMap {
+        CrackMap {
+            chains: vec![Chain {
+                left: 1,
+                right: 2,
+                middles,
+                ends: None,
+            }],
+            ..CrackMap::default()
+        }
+    }
+
+    const PLACEMENT: Placement = Placement {
+        origin_mm: [-10.0, -10.0],
+        pitch_mm: 0.5,
+    };
+
+    #[test]
+    fn a_staircase_goes_to_the_line_where_planes_meet() {
+        // They meet on y = x / 4 + 1, that is row = column / 4 + 17.
+        let surfaces = [plane(1.0, 0.25, 0.0), plane(0.0, 0.0, 1.0)];
+        let row = |column: f64| column / 4.0 + 17.0;
+        let middles: Vec<_> = (0..40)
+            .map(|k| [f64::from(k), row(f64::from(k)).floor() + 0.5])
+            .collect();
+        let found = intersections(&chain(middles), &surfaces, PLACEMENT);
+        let found = found[0].as_ref().unwrap();
+        assert_eq!(found.len(), 40);
+        for p in found {
+            assert!((p[1] - row(p[0])).abs() < 1e-9, "{p:?}");
+        }
+    }
+
+    #[test]
+    fn steps_and_smooth_joins_stay_where_the_nodes_put_them() {
+        let middles: Vec<_> = (0..40).map(|k| [f64::from(k), 20.5]).collect();
+        let step = [plane(5.0, 0.0, 0.3), plane(0.0, 0.0, 0.0)];
+        assert_eq!(
+            intersections(&chain(middles.clone()), &step, PLACEMENT),
+            [None]
+        );
+        let smooth = [plane(0.0, 0.0, 0.1), plane(0.0, 0.0, 0.0)];
+        assert_eq!(intersections(&chain(middles), &smooth, PLACEMENT), [None]);
+    }
+}
