@@ -47,12 +47,9 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// Tells inliers, which may always lie `floor` from the plane, square to it: on a steep
-    /// surface that bends away, z strays far from the plane within a spacing.
+    /// Tells inliers, which may always lie `floor` from the plane.
     pub(crate) fn agrees(&self, floor: f64) -> impl Fn(&Neighbour) -> bool + use<> {
-        let plane = self.plane;
-        let floor_z = floor * (1.0 + plane.a * plane.a + plane.b * plane.b).sqrt();
-        let tolerance = self.tolerance.max(floor_z);
+        let (plane, tolerance) = (self.plane, self.tolerance.max(floor));
         move |n| plane.residual(n).abs() <= tolerance
     }
 }

@@ -65,8 +65,8 @@ pub struct SupportSettings {
     /// Least number of inliers within the radius. Default 3.
     pub least_samples: usize,
     /// Samples are inliers within 2.5 robust standard deviations of the plane, and always
-    /// within this many spacings of it, square to it (so that coarsely quantised depths
-    /// stay inliers). Default 0.5.
+    /// within this many spacings of it (so that coarsely quantised depths stay inliers).
+    /// Default 0.5.
     pub inlier_floor: f64,
     /// A plane whose 2.5 robust standard deviations exceed this many spacings describes no
     /// surface, only stray samples. Default 6.
