@@ -1,1 +1,166 @@
 //! Lets independent programs judge the CAD files of simulated scans.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+
+use crate::shell;
+
+/// The judge's packages, pinned: another OpenCASCADE may judge otherwise.
+const PACKAGES: [&str; 2] = ["cadquery-ocp==8.0.1.1.0", "numpy"];
+
+/// The simulated objects, and what is asked of their scans.
+const OBJECTS: [&str; 2] = ["house", "cylinder"];
+
+/// Seeds begin here. Lower ones were looked at while the stages were tuned.
+const FIRST_SEED: u32 = 101;
+
+#[derive(Debug, Args)]
+pub(crate) struct Options {
+    /// Scans of each object.
+    #[arg(long, default_value_t = 2)]
+    pub(crate) seeds: u32,
+    /// Also let FreeCAD load the files (needs `freecadcmd`).
+    #[arg(long)]
+    pub(crate) freecad: bool,
+    /// Where the scans go; `target/judges/scenes` if not given.
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// One judged scan.
+struct Case {
+    name: String,
+    arguments: Vec<String>,
+    faces: Option<u32>,
+}
+
+/// Scans every object through the pseudo-terminal and the service, and has each IGES file
+/// judged. All are judged before the first failure is reported.
+pub(crate) fn run(options: &Options) -> Result<()> {
+    let place = shell::root().join("target/judges");
+    let python = python(&place)?;
+    let scenes = options.out.clone().unwrap_or_else(|| place.join("scenes"));
+    shell::run(
+        "cargo",
+        &["build", "--release", "--package", "relief-tests", "--bins"],
+    )?;
+    let mut failed = Vec::new();
+    for case in cases(options.seeds) {
+        let folder = scenes.join(&case.name);
+        if folder.exists() {
+            std::fs::remove_dir_all(&folder)
+                .with_context(|| format!("cannot empty {}", folder.display()))?;
+        }
+        println!("\n{}", case.name);
+        if let Err(error) = judge(&case, &folder, &python, options.freecad) {
+            failed.push(format!("{}: {error}", case.name));
+        }
+    }
+    if failed.is_empty() {
+        println!("\njudges: every file holds");
+        return Ok(());
+    }
+    bail!(
+        "{} files do not hold:\n  {}",
+        failed.len(),
+        failed.join("\n  ")
+    );
+}
+
+fn cases(seeds: u32) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for object in OBJECTS {
+        for seed in FIRST_SEED..FIRST_SEED + seeds {
+            for entities in ["114", "128"] {
+                let words = ["--object", object, "--entities", entities, "--seed"];
+                cases.push(Case {
+                    name: format!("{object}-{entities}-{seed}"),
+                    arguments: words
+                        .map(String::from)
+                        .into_iter()
+                        .chain([seed.to_string()])
+                        .collect(),
+                    faces: Some(if object == "house" { 4 } else { 2 }),
+                });
+            }
+        }
+    }
+    let bunny = shell::root().join("../shared/data/stanford_bunny/bun000.ply.gz");
+    if bunny.exists() {
+        cases.push(Case {
+            name: "bun000".into(),
+            arguments: vec!["--replay".into(), bunny.display().to_string()],
+            faces: None,
+        });
+    } else {
+        println!("skipped: no recorded scans beside the repository");
+    }
+    cases
+}
+
+fn judge(case: &Case, folder: &Path, python: &str, freecad: bool) -> Result<()> {
+    let out = folder.display().to_string();
+    let target = std::env::var_os("CARGO_TARGET_DIR")
+        .map_or_else(|| shell::root().join("target"), PathBuf::from);
+    let scan_scene = target.join("release/scan-scene").display().to_string();
+    let mut words: Vec<&str> = case.arguments.iter().map(String::as_str).collect();
+    words.extend(["--out", &out]);
+    shell::run(&scan_scene, &words)?;
+    let file = iges_in(folder)?;
+    match case.faces {
+        Some(_) => {
+            let truth = folder.join("truth.json").display().to_string();
+            shell::run(python, &["tests/judges/scene_check.py", &file, &truth])?;
+        }
+        None => shell::quiet(python, &["tests/judges/occ_check.py", "--no-points", &file])?,
+    }
+    if freecad {
+        let faces = case.faces.map(|n| ("EXPECT_FACES", n.to_string()));
+        let mut with = vec![("IGES_FILE", file)];
+        with.extend(faces);
+        shell::run_with("freecadcmd", &["tests/judges/freecad_check.py"], &with)?;
+    }
+    Ok(())
+}
+
+fn iges_in(folder: &Path) -> Result<String> {
+    let entries = std::fs::read_dir(folder).with_context(|| format!("no {}", folder.display()))?;
+    let files: Vec<PathBuf> = entries
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|e| e == "igs"))
+        .collect();
+    match &files[..] {
+        [file] => Ok(file.display().to_string()),
+        _ => bail!(
+            "{} IGES files in {} instead of one",
+            files.len(),
+            folder.display()
+        ),
+    }
+}
+
+/// A Python with the judge's packages, made once.
+fn python(place: &Path) -> Result<String> {
+    let home = place.join("python");
+    let python = home.join("bin/python").display().to_string();
+    let ready = home.join("ready");
+    let wanted = PACKAGES.join("\n");
+    if std::fs::read_to_string(&ready).is_ok_and(|had| had == wanted) {
+        return Ok(python);
+    }
+    shell::run("python3", &["-m", "venv", &home.display().to_string()])?;
+    let mut install = vec![
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--disable-pip-version-check",
+    ];
+    install.extend(PACKAGES);
+    shell::run(&python, &install)?;
+    std::fs::write(&ready, wanted).with_context(|| format!("cannot write {}", ready.display()))?;
+    Ok(python)
+}

@@ -38,9 +38,20 @@ fn full() -> anyhow::Result<()> {
     shell::run("cargo", &["fmt", "--all", "--check"])?;
     shell::run(
         "cargo",
-        &["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"],
+        &[
+            "clippy",
+            "--workspace",
+            "--all-targets",
+            "--",
+            "--deny",
+            "warnings",
+        ],
     )?;
     rules::check()?;
     shell::run("cargo", &["test", "--workspace"])?;
-    judge::run(&judge::Options { seeds: 10, freecad: true, out: None })
+    judge::run(&judge::Options {
+        seeds: 10,
+        freecad: true,
+        out: None,
+    })
 }

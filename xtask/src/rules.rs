@@ -26,7 +26,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("segment", &["range-image"]),
     ("reconstruct", &["nurbs", "range-image"]),
     ("cad-exchange", &["nurbs", "reconstruct"]),
-    ("pipeline", &["range-image", "reconstruct", "regrid", "segment"]),
+    (
+        "pipeline",
+        &["range-image", "reconstruct", "regrid", "segment"],
+    ),
     ("scan-record", &["range-image", "scanner-protocol"]),
     ("deliverables", &GEOMETRY),
     ("relief-api", &[]),
@@ -36,10 +39,17 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-const GEOMETRY: [&str; 7] =
-    ["cad-exchange", "nurbs", "pipeline", "range-image", "reconstruct", "regrid", "segment"];
+const GEOMETRY: [&str; 7] = [
+    "cad-exchange",
+    "nurbs",
+    "pipeline",
+    "range-image",
+    "reconstruct",
+    "regrid",
+    "segment",
+];
 
-const DAEMON: [&str; 12] = [
+const DAEMON: [&str; 13] = [
     "cad-exchange",
     "deliverables",
     "nurbs",
@@ -48,6 +58,7 @@ const DAEMON: [&str; 12] = [
     "reconstruct",
     "regrid",
     "relief-api",
+    "scan-files",
     "scan-record",
     "scanner-driver",
     "scanner-protocol",
@@ -91,8 +102,14 @@ const EVERYTHING: [&str; 16] = [
 ];
 
 /// Libraries that computation must not link: clocks, files and runtimes come with them.
-const KEPT_FROM_GEOMETRY: [&str; 6] =
-    ["tokio", "tracing", "serde_json", "jiff", "rustix", "tempfile"];
+const KEPT_FROM_GEOMETRY: [&str; 6] = [
+    "tokio",
+    "tracing",
+    "serde_json",
+    "jiff",
+    "rustix",
+    "tempfile",
+];
 
 /// Checks every rule and reports all that are broken.
 pub(crate) fn check() -> Result<()> {
@@ -103,7 +120,11 @@ pub(crate) fn check() -> Result<()> {
         println!("rules: all hold");
         return Ok(());
     }
-    bail!("{} rules are broken:\n  {}", broken.len(), broken.join("\n  "));
+    bail!(
+        "{} rules are broken:\n  {}",
+        broken.len(),
+        broken.join("\n  ")
+    );
 }
 
 fn dependencies(broken: &mut Vec<String>) -> Result<()> {
@@ -112,14 +133,22 @@ fn dependencies(broken: &mut Vec<String>) -> Result<()> {
         &["metadata", "--no-deps", "--format-version", "1"],
     )?)?;
     let allowed: BTreeMap<_, _> = ALLOWED.iter().copied().collect();
-    for package in metadata["packages"].as_array().context("cargo metadata lists no packages")? {
-        let name = package["name"].as_str().context("a package without a name")?;
+    for package in metadata["packages"]
+        .as_array()
+        .context("cargo metadata lists no packages")?
+    {
+        let name = package["name"]
+            .as_str()
+            .context("a package without a name")?;
         let Some(may_use) = allowed.get(name) else {
-            broken.push(format!("{name}: has no place in xtask's table of dependencies"));
+            broken.push(format!(
+                "{name}: has no place in xtask's table of dependencies"
+            ));
             continue;
         };
-        let in_geometry =
-            package["manifest_path"].as_str().is_some_and(|path| path.contains("/geometry/"));
+        let in_geometry = package["manifest_path"]
+            .as_str()
+            .is_some_and(|path| path.contains("/geometry/"));
         for dependency in package["dependencies"].as_array().into_iter().flatten() {
             let used = dependency["name"].as_str().unwrap_or_default();
             // Tests may compare with anything; only what is linked matters.
@@ -143,7 +172,9 @@ fn sources(broken: &mut Vec<String>) -> Result<()> {
             .with_context(|| format!("cannot read {path}"))?;
         let lines = text.lines().count();
         if lines > LONGEST_FILE_LINES {
-            broken.push(format!("{path}: {lines} lines, more than {LONGEST_FILE_LINES}"));
+            broken.push(format!(
+                "{path}: {lines} lines, more than {LONGEST_FILE_LINES}"
+            ));
         }
         if let Some(line) = text.lines().position(|line| !line.is_ascii()) {
             broken.push(format!("{path}:{}: a character outside ASCII", line + 1));

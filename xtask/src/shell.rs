@@ -13,14 +13,42 @@ pub(crate) fn root() -> PathBuf {
 
 /// Runs a program in the workspace's root; its output goes where ours does.
 pub(crate) fn run(program: &str, arguments: &[&str]) -> Result<()> {
+    run_with(program, arguments, &[])
+}
+
+/// The same with variables added to the environment.
+pub(crate) fn run_with(
+    program: &str,
+    arguments: &[&str],
+    environment: &[(&str, String)],
+) -> Result<()> {
     eprintln!("$ {program} {}", arguments.join(" "));
     let status = Command::new(program)
         .args(arguments)
+        .envs(environment.iter().map(|(name, value)| (name, value)))
         .current_dir(root())
         .status()
         .with_context(|| format!("cannot start {program}"))?;
     if !status.success() {
         bail!("{program} {} ended with {status}", arguments.join(" "));
+    }
+    Ok(())
+}
+
+/// The same for a program whose output is of interest only when it fails.
+pub(crate) fn quiet(program: &str, arguments: &[&str]) -> Result<()> {
+    let output = Command::new(program)
+        .args(arguments)
+        .current_dir(root())
+        .output()
+        .with_context(|| format!("cannot start {program}"))?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stdout);
+        bail!(
+            "{program} {} ended with {}: {said}",
+            arguments.join(" "),
+            output.status
+        );
     }
     Ok(())
 }
@@ -34,7 +62,11 @@ pub(crate) fn output(program: &str, arguments: &[&str]) -> Result<String> {
         .with_context(|| format!("cannot start {program}"))?;
     if !output.status.success() {
         let cause = String::from_utf8_lossy(&output.stderr);
-        bail!("{program} {} ended with {}: {cause}", arguments.join(" "), output.status);
+        bail!(
+            "{program} {} ended with {}: {cause}",
+            arguments.join(" "),
+            output.status
+        );
     }
     Ok(String::from_utf8(output.stdout)?)
 }

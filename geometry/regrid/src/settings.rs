@@ -53,7 +53,7 @@ impl Default for Roi {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SupportSettings {
     /// Radius in which inliers count. Larger closes larger gaps, and fills concave corners
-    /// of the outline by about `radius² / 2R` spacings at a radius of curvature of R
+    /// of the outline by about `radius^2 / 2R` spacings at a radius of curvature of R
     /// spacings. Default 2.
     pub radius: f64,
     /// How far outside the hull of its inliers a node may lie. Default 0.4.

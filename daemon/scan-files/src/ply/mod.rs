@@ -192,6 +192,6 @@ fn one_line(error: &ParseError) -> String {
     if text.chars().count() <= LENGTH {
         text
     } else {
-        text.chars().take(LENGTH).chain(['…']).collect()
+        text.chars().take(LENGTH).chain("...".chars()).collect()
     }
 }

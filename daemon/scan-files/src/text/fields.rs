@@ -142,7 +142,7 @@ fn excerpt(text: &str) -> String {
     if text.chars().count() <= LENGTH {
         text.to_owned()
     } else {
-        text.chars().take(LENGTH).chain(['…']).collect()
+        text.chars().take(LENGTH).chain("...".chars()).collect()
     }
 }
 

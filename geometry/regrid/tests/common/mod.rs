@@ -45,7 +45,7 @@ pub(crate) fn columns(
         .collect()
 }
 
-/// `start, start + step, …`, `number` of them.
+/// `start, start + step, ...`, `number` of them.
 pub(crate) fn steps(start: f64, step: f64, number: i32) -> impl Iterator<Item = f64> + Clone {
     (0..number).map(move |k| start + step * f64::from(k))
 }
