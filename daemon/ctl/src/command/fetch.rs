@@ -5,9 +5,10 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use deliverables::{MANIFEST_NAME, Manifest};
-use relief_api::{ScanList, SpoolEntry, path};
+use relief_api::{SpoolEntry, path};
 use serde::Serialize;
 
+use super::named;
 use crate::failure::Failure;
 use crate::output;
 use crate::service::{Client, EndpointArgs};
@@ -15,7 +16,7 @@ use crate::service::{Client, EndpointArgs};
 /// Copy the deliverables of a scan here and check them against their manifest
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The scan (or the result of a rerun), or `latest`
+    /// The scan or its name (of several the newest), the result of a rerun, or `latest`
     #[arg(value_name = "SCAN")]
     scan: String,
     /// Directory for the files, instead of one named after the scan
@@ -38,11 +39,7 @@ pub(crate) struct Fetched {
 
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
     let client = Client::new(args.endpoint.endpoint());
-    let result = if args.scan == "latest" {
-        latest(&client).await?
-    } else {
-        args.scan
-    };
+    let result = named::scan_id(&client, args.scan).await?;
     let directory = args.output.unwrap_or_else(|| PathBuf::from(&result));
     let fetched = into_directory(&client, &result, directory).await?;
     output::either(json, &fetched, |fetched| {
@@ -74,14 +71,6 @@ pub(crate) async fn into_directory(
         directory,
         files,
     })
-}
-
-async fn latest(client: &Client) -> Result<String, Failure> {
-    let list: ScanList = client.get(path::SCANS).await?;
-    let newest = list.scans.into_iter().next();
-    newest
-        .map(|scan| scan.id)
-        .ok_or_else(|| Failure::Failed("there is no scan yet".into()))
 }
 
 /// Into a temporary name first, so that no file is ever half there.

@@ -7,6 +7,7 @@ pub(crate) mod demo;
 pub(crate) mod doctor;
 pub(crate) mod fetch;
 pub(crate) mod jobs;
+mod named;
 pub(crate) mod rerun;
 pub(crate) mod retry;
 pub(crate) mod scan;

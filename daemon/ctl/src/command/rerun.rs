@@ -2,6 +2,7 @@
 
 use relief_api::{Job, Rerun, path};
 
+use super::named;
 use super::setting::{self, Setting};
 use crate::failure::Failure;
 use crate::follow;
@@ -11,7 +12,7 @@ use crate::service::{Client, EndpointArgs};
 /// Process a kept scan again, with other settings if wanted
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The scan, as `relief scans` lists it
+    /// The scan, as `relief scans` lists it, or its name (of several the newest), or `latest`
     #[arg(value_name = "SCAN")]
     scan: String,
     /// A setting that differs, keyed as in the configuration, such as regrid.neighbours=25;
@@ -44,7 +45,8 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
         name: args.name,
         settings: setting::overrides(args.settings),
     };
-    let mut job: Job = client.post(&path::scan_rerun(&args.scan), &request).await?;
+    let scan = named::scan_id(&client, args.scan).await?;
+    let mut job: Job = client.post(&path::scan_rerun(&scan), &request).await?;
     if let Some(events) = events {
         job = follow::job(&client, events, job.id).await?;
     }
