@@ -44,15 +44,17 @@ pub(crate) struct Input {
 }
 
 impl Input {
+    /// The distance of the grid's nodes that fits the density of the samples.
+    pub(crate) fn pitch_mm(&self) -> f64 {
+        recommended_pitch_mm(self.column_pitch_mm, self.sample_spacing_mm)
+    }
+
     /// The settings with which the service would process this scan: those kept with it,
     /// else the defaults for its density.
     pub(crate) fn settings(&self) -> Settings {
         match &self.processing {
             Some(kept) => kept.pipeline_settings(self.column_pitch_mm, self.sample_spacing_mm),
-            None => {
-                let pitch = recommended_pitch_mm(self.column_pitch_mm, self.sample_spacing_mm);
-                Settings::new(pitch)
-            }
+            None => Settings::new(self.pitch_mm()),
         }
     }
 }

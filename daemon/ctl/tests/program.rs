@@ -320,3 +320,52 @@ fn the_demo_leaves_the_deliverables_and_nothing_else() {
     );
     assert_eq!(fs::read_dir(&temporary).unwrap().count(), 0);
 }
+
+#[test]
+fn coordinates_in_metres_are_suspected_where_the_grid_would_be_too_fine() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let mut text = String::new();
+    for i in 0..50 {
+        for j in 0..50 {
+            writeln!(
+                text,
+                "{:.5} {:.5} 0.01",
+                f64::from(i) * 2e-4,
+                f64::from(j) * 2e-4
+            )
+            .expect("text takes it");
+        }
+    }
+    fs::write(at.join("metres.xyz"), text).unwrap();
+    refused(&relief(at, &["convert", "metres.xyz"]), 1, "--units");
+    // Who asks for it on the command line is told that this is no pitch.
+    let asked = ["convert", "metres.xyz", "--pitch-mm", "0.0002"];
+    refused(&relief(at, &asked), 2, "pitch_mm = 0.0002");
+    assert!(!at.join("metres.igs").exists());
+    let output = relief(at, &["convert", "metres.xyz", "--units", "m"]);
+    assert!(output.status.success() && at.join("metres.igs").exists());
+}
+
+#[test]
+fn the_demo_tells_at_once_what_it_cannot_do() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    fs::write(at.join("taken"), "mine").unwrap();
+    refused(
+        &relief(at, &["demo", "--out", "taken"]),
+        2,
+        "not a directory",
+    );
+    assert_eq!(fs::read_to_string(at.join("taken")).unwrap(), "mine");
+    refused(
+        &relief(at, &["demo", "--noise-mm", "-1"]),
+        2,
+        "between 0 and 100",
+    );
+    refused(
+        &relief(at, &["demo", "--outliers", "-0.1"]),
+        2,
+        "between 0 and 1",
+    );
+}

@@ -26,12 +26,13 @@ pub(crate) struct Args {
     output: Option<PathBuf>,
     /// Distance of the grid's nodes, millimetres; default: after the scan's density
     #[arg(long, value_name = "MM")]
-    pitch_mm: Option<f64>,
+    pub(super) pitch_mm: Option<f64>,
     /// The road from samples to surfaces: ours, or Shim & Lee 1995 as printed; default:
     /// what a .scan file was set to, else ours
     #[arg(long, value_name = "METHOD", value_enum)]
     method: Option<MethodName>,
-    /// How far a surface may lie from the range image, millimetres
+    /// Root mean square distance from the range image at which a surface is near enough,
+    /// millimetres
     #[arg(long, value_name = "MM")]
     tolerance_mm: Option<f64>,
     /// IGES entities of the surfaces: 114 (parametric splines) or 128 (rational B-splines)
@@ -59,7 +60,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "UNIT", value_enum)]
     units: Option<UnitName>,
     /// Name of the part in the CAD file; default: that kept with the scan, or the
-    /// output's name
+    /// input's name
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
     /// Time in the CAD file and the report, such as 2026-11-21T09:30:00Z. Default:

@@ -16,6 +16,9 @@ use crate::input;
 use crate::output;
 use crate::progress::Progress;
 
+/// Samples closer than this are rather in another unit.
+const FINEST_PITCH_MM: f64 = 0.001;
+
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Converted {
@@ -87,7 +90,14 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
 fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
     let output = args.output()?;
     let input = input::read(&args.input, args.units())?;
-    let settings = args.settings(input.settings())?;
+    let settings = args
+        .settings(input.settings())
+        .map_err(|failure| match failure {
+            Failure::Usage(_) if args.pitch_mm.is_none() && input.pitch_mm() < FINEST_PITCH_MM => {
+                too_dense(&args.input, input.pitch_mm())
+            }
+            other => other,
+        })?;
     let cad = args.cad(input.scan.operator.as_deref());
     let timestamp = args.timestamp(input.timestamp)?;
     let name = args.name(input.name.as_deref());
@@ -137,6 +147,14 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
         file,
         report,
     })
+}
+
+fn too_dense(input: &Path, pitch_mm: f64) -> Failure {
+    Failure::Failed(format!(
+        "{}: its samples ask for a grid of {pitch_mm} mm, finer than any that is offered; if its \
+         coordinates are not in millimetres, say so with --units, else choose --pitch-mm",
+        input.display()
+    ))
 }
 
 fn write_report(path: &Path, report: &Report) -> Result<(), Failure> {

@@ -26,15 +26,15 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Standard deviation of the range noise, millimetres [default: 0.05]
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     noise_mm: Option<f64>,
     /// Share of samples that lie anywhere in range [default: 0]
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     outliers: Option<f64>,
     /// Share of samples at steps that lie between both sides [default: 0.1]
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     mixed: Option<f64>,
     /// Share of rays that bring no sample [default: 0.001]
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     dropouts: Option<f64>,
 }

@@ -32,6 +32,13 @@ struct Told {
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
     // From here on an interrupt is ours to handle, whatever we are at.
     let interrupt = interrupted()?;
+    if args.out.exists() && !args.out.is_dir() {
+        // Better told now than after the scan.
+        return Err(Failure::Usage(format!(
+            "{} is not a directory; choose another with --out",
+            args.out.display()
+        )));
+    }
     let bench = Bench::set_up(&args).await?;
     eprintln!(
         "A simulated scanner at {} scans the {}; a private service processes it.",
