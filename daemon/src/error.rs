@@ -105,3 +105,12 @@ pub enum ServiceError {
     #[error("cannot start a thread: {0}")]
     Thread(io::Error),
 }
+
+/// What a panic said.
+pub(crate) fn panic_text(panic: &(dyn std::any::Any + Send)) -> &str {
+    panic
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("no message")
+}

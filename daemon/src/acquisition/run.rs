@@ -8,6 +8,7 @@
 //! Everything behind the channel may block for a moment without the scanner noticing;
 //! when it blocks for longer, the scanner's credit runs out and the table waits.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Instant;
@@ -23,6 +24,7 @@ use super::grid_file::GridFile;
 use super::plan::ResolvedPlan;
 use super::{AbortRequest, calibration};
 use crate::config::{JournalConfig, Processing};
+use crate::error::panic_text;
 use crate::service::{KeptGrid, Service};
 
 /// Columns between the driver and the journal.
@@ -41,7 +43,16 @@ pub(crate) struct Ticket {
 /// scan's state.
 pub(crate) fn run(service: &Arc<Service>, ticket: Ticket) {
     let id = ticket.scan.id.clone();
-    let outcome = take(service, &ticket);
+    // A defect in the taking of one scan must not keep the scanner busy for ever. What the
+    // panic passes on its way drops the stream, which turns the laser off.
+    let outcome =
+        catch_unwind(AssertUnwindSafe(|| take(service, &ticket))).unwrap_or_else(|panic| {
+            Err(format!(
+                "the scan ended unexpectedly: {}; this is a defect of the program, please \
+                 report it",
+                panic_text(&*panic)
+            ))
+        });
     let (state, reason) = match (outcome, ticket.abort.reason()) {
         (Ok(()), _) => (ScanState::Complete, None),
         (Err(_), Some(reason)) => (ScanState::Aborted, Some(reason)),
@@ -70,6 +81,9 @@ fn take(service: &Arc<Service>, ticket: &Ticket) -> Result<(), String> {
     }
     check_abort()?;
     let stream = scanner.start_scan(&ticket.plan.plan).map_err(text)?;
+    // Once more: an abort that came just before the start found nothing to stop. Dropping
+    // the stream turns the laser off.
+    check_abort()?;
     let info = stream.info();
     tracing::info!(scan = %ticket.scan.id, columns = info.columns, "scan begins");
     service.note_scanner(ScannerLink::Scanning, None);

@@ -9,6 +9,7 @@ use relief_api::{Event, Job, JobState};
 use super::process::process;
 use super::progress::Progress;
 use super::queue::StopFlag;
+use crate::error::panic_text;
 use crate::ids::now;
 use crate::service::Service;
 
@@ -127,12 +128,4 @@ fn published_event(service: &Service, job: &Job) -> Event {
             entry.files.into_iter().map(|file| file.name).collect()
         }),
     }
-}
-
-fn panic_text(panic: &(dyn std::any::Any + Send)) -> &str {
-    panic
-        .downcast_ref::<&str>()
-        .copied()
-        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
-        .unwrap_or("no message")
 }

@@ -21,6 +21,9 @@ const PITCH_UM: i32 = 500;
 /// Called with each acknowledged column.
 type OnAcknowledge = Box<dyn Fn(u32) + Send + Sync>;
 
+/// Called when a scan is about to start.
+type OnStart = Box<dyn Fn() + Send>;
+
 #[derive(Default)]
 struct State {
     /// Columns that may still be delivered; `None` for any number.
@@ -40,6 +43,7 @@ pub(crate) struct FakeScanner {
     state: Mutex<State>,
     changed: Condvar,
     on_acknowledge: Mutex<Option<OnAcknowledge>>,
+    on_start: Mutex<Option<OnStart>>,
     acknowledged: Mutex<Vec<u32>>,
     this: std::sync::OnceLock<std::sync::Weak<FakeScanner>>,
 }
@@ -84,6 +88,11 @@ impl FakeScanner {
 
     pub(crate) fn on_acknowledge(&self, hook: impl Fn(u32) + Send + Sync + 'static) {
         *self.on_acknowledge.lock().unwrap() = Some(Box::new(hook));
+    }
+
+    /// Called once, when the next scan is about to start.
+    pub(crate) fn on_start(&self, hook: impl Fn() + Send + 'static) {
+        *self.on_start.lock().unwrap() = Some(Box::new(hook));
     }
 
     fn check(&self) -> Result<(), ScannerError> {
@@ -197,6 +206,10 @@ impl Scanner for FakeScanner {
 
     fn start_scan(&self, plan: &ScanPlan) -> Result<ScanStream, ScannerError> {
         self.check()?;
+        let hook = self.on_start.lock().unwrap().take();
+        if let Some(hook) = hook {
+            hook();
+        }
         self.change(|state| {
             assert!(state.homed, "the table was not homed");
             state.aborted = false;

@@ -1,6 +1,7 @@
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::channel;
 
 use relief_api::{
     Event, Job, JobList, JobState, Rerun, Scan, ScanList, ScanState, SpoolEntry, StartScan, path,
@@ -97,6 +98,41 @@ async fn a_column_is_on_disk_before_it_is_acknowledged() {
     rig.scan_to_result("a").await;
     assert_eq!(checked.load(Ordering::Relaxed), COLUMNS);
     assert_eq!(rig.scanner.acknowledged(), (0..COLUMNS).collect::<Vec<_>>());
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_abort_just_before_the_start_still_holds() {
+    let rig = Rig::new().await;
+    let mut events = rig.client.events().await;
+    let ((reached, at_start), (go, leave)) = (channel(), channel());
+    rig.scanner.on_start(move || {
+        reached.send(()).unwrap();
+        leave.recv().unwrap();
+    });
+    let scan = rig.start_scan("early").await;
+    at_start.recv().unwrap();
+    let _: Scan = rig.client.ask(&path::scan_abort(&scan.id)).await;
+    go.send(()).unwrap();
+    let scan = ended(&mut events, &scan.id).await;
+    assert_eq!((scan.state, scan.columns), (ScanState::Aborted, 0));
+    assert_eq!(scan.reason.as_deref(), Some("aborted on request"));
+    assert!(rig.scanner.acknowledged().is_empty());
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_defect_in_one_scan_leaves_room_for_the_next() {
+    let rig = Rig::new().await;
+    let mut events = rig.client.events().await;
+    rig.scanner
+        .on_start(|| panic!("a defect made for this test"));
+    let scan = rig.start_scan("broken").await;
+    let scan = ended(&mut events, &scan.id).await;
+    assert_eq!(scan.state, ScanState::Failed);
+    let reason = scan.reason.unwrap();
+    assert!(reason.contains("a defect made for this test"), "{reason}");
+    rig.scan_to_result("next").await;
     rig.daemon.shutdown().await;
 }
 
