@@ -59,6 +59,17 @@ pub enum ScanFileError {
         /// The byte.
         value: u8,
     },
+    /// A known format that holds no points, or none that are read.
+    #[error(
+        "{file}: is {format}, which is not read; expected PLY or lines of `x y z`, plain or \
+         gzip-compressed"
+    )]
+    OtherFormat {
+        /// The file.
+        file: String,
+        /// The format, with its article.
+        format: &'static str,
+    },
     /// A line longer than any line of numbers.
     #[error("{file}, line {line}: longer than {limit} bytes; a line holds one point")]
     LongLine {

@@ -11,6 +11,22 @@ use crate::{ply, text};
 const BUFFER_BYTES: usize = 256 * 1024;
 const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 const PLY_MAGIC: [u8; 3] = *b"ply";
+/// Enough to tell the formats apart.
+const HEAD_BYTES: u64 = 16;
+/// How files begin that users may take for scan files.
+const OTHERS: [(&[u8], &str); 11] = [
+    (b"P2\n", "a PGM picture"),
+    (b"P5\n", "a PGM picture"),
+    (b"\x89PNG", "a PNG picture"),
+    (b"{", "a JSON file"),
+    (b"solid ", "an STL mesh"),
+    (b"ISO-10303-21", "a STEP file"),
+    (b"%PDF", "a PDF document"),
+    (b"PK\x03\x04", "a ZIP archive"),
+    (b"ASTM-E57", "an E57 point cloud"),
+    (b"LASF", "a LAS point cloud"),
+    (b"# .PCD", "a PCD point cloud"),
+];
 
 /// Parses a whole file into `gather`.
 pub(crate) fn parse(source: impl Read, gather: &mut Gather<'_>) -> Result<(), ScanFileError> {
@@ -31,6 +47,11 @@ fn by_format(
 ) -> Result<(), ScanFileError> {
     if head.starts_with(&PLY_MAGIC) {
         ply::parse(reader, gather)
+    } else if let Some((_, format)) = OTHERS.iter().find(|(magic, _)| head.starts_with(magic)) {
+        Err(ScanFileError::OtherFormat {
+            file: gather.file.to_owned(),
+            format,
+        })
     } else {
         text::parse(reader, gather)
     }
@@ -44,7 +65,7 @@ fn peek<R: BufRead>(
     let mut head = Vec::new();
     reader
         .by_ref()
-        .take(PLY_MAGIC.len() as u64)
+        .take(HEAD_BYTES)
         .read_to_end(&mut head)
         .map_err(|source| ScanFileError::Read {
             file: gather.file.to_owned(),

@@ -217,3 +217,15 @@ fn no_cut_of_a_file_panics() {
         }
     }
 }
+
+#[test]
+fn header_errors_quote_the_line_and_spare_the_grammar() {
+    let told = read(header("ascii", "-4", "float").as_bytes())
+        .unwrap_err()
+        .to_string();
+    assert!(told.contains("element vertex -4"), "{told}");
+    assert!(
+        !told.contains("ExpectedSet") && !told.contains('{'),
+        "{told}"
+    );
+}

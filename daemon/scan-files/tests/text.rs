@@ -204,3 +204,21 @@ fn no_damage_to_a_file_panics() {
         }
     }
 }
+
+#[test]
+fn files_of_other_formats_are_called_by_their_name() {
+    let read = |bytes: &[u8]| read_from(bytes, "scan", &ReadOptions::default());
+    for (head, format) in [
+        (&b"P5\n2560 2500\n65535\n\0\0"[..], "a PGM picture"),
+        (b"{\"width\": 2560}", "a JSON file"),
+        (b"solid part\nfacet normal 0 0 1\n", "an STL mesh"),
+        (b"PK\x03\x04\x14\0", "a ZIP archive"),
+    ] {
+        for bytes in [head.to_vec(), gzip(head)] {
+            let told = read(&bytes).unwrap_err().to_string();
+            assert!(told.starts_with(&format!("scan: is {format},")), "{told}");
+        }
+    }
+    // A header line may begin with anything else.
+    assert!(read(b"P5 y z\n0 0 1\n0 1 1\n1 0 1\n1 1 1\n").is_ok());
+}

@@ -187,7 +187,12 @@ fn one_line(error: &ParseError) -> String {
     let joined = error.to_string();
     let place = error.line().map(|line| format!("Line {line}: "));
     let bare = place.and_then(|place| joined.strip_prefix(&place));
-    let words: Vec<&str> = bare.unwrap_or(&joined).split_whitespace().collect();
+    let bare = bare.unwrap_or(&joined);
+    // What the parser's grammar would have taken is of no use to users.
+    let bare = bare
+        .split_once("Error: ParseError")
+        .map_or(bare, |(told, _)| told);
+    let words: Vec<&str> = bare.split_whitespace().collect();
     let text = words.join(" ");
     if text.chars().count() <= LENGTH {
         text
