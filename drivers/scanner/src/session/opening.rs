@@ -5,7 +5,7 @@ use std::time::Duration;
 use scanner_protocol::commands::{
     GetCalibration, GetLimits, Hello, HelloReply, Identify, Nameplate,
 };
-use scanner_protocol::{Calibration, Identity, Limits, MAX_VERSION, MIN_VERSION};
+use scanner_protocol::{Calibration, Head, Identity, Limits, MAX_VERSION, MIN_VERSION};
 
 use super::request::Purpose;
 use super::{Event, Phase, Session};
@@ -51,6 +51,12 @@ impl Session {
     }
 
     pub(super) fn on_calibration(&mut self, calibration: Calibration) {
+        // Columns in such counts would all lie in one place, and nobody could undo it later.
+        if has_zero_count(&calibration) {
+            return self.lose(ScannerError::Protocol(
+                "its calibration gives a count the size of zero".to_owned(),
+            ));
+        }
         self.calibration = Some(calibration);
         self.requests.push(&GetLimits {}, Purpose::Limits);
     }
@@ -124,5 +130,46 @@ impl Session {
             port: self.port.clone(),
             heard,
         }
+    }
+}
+
+/// Whether some count stands for no distance or no angle.
+fn has_zero_count(calibration: &Calibration) -> bool {
+    calibration.table_count_pm == 0
+        || match calibration.head {
+            Head::Polar {
+                angle_count_prad,
+                range_count_pm,
+                ..
+            } => angle_count_prad == 0 || range_count_pm == 0,
+            Head::Cartesian { count_pm } => count_pm == 0,
+        }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_count_of_zero_is_noticed() {
+        let polar = |angle_count_prad, range_count_pm| Head::Polar {
+            camera_y_nm: 0,
+            camera_z_nm: 0,
+            angle_count_prad,
+            range_count_pm,
+        };
+        let zero = |table_count_pm, head| {
+            has_zero_count(&Calibration {
+                table_count_pm,
+                table_origin_nm: 0,
+                head,
+            })
+        };
+        assert!(!zero(1, polar(1, 1)));
+        assert!(!zero(1, Head::Cartesian { count_pm: 1 }));
+        assert!(zero(0, polar(1, 1)));
+        assert!(zero(1, polar(0, 1)));
+        assert!(zero(1, polar(1, 0)));
+        assert!(zero(1, Head::Cartesian { count_pm: 0 }));
     }
 }
