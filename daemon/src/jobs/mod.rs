@@ -29,6 +29,9 @@ impl Service {
     /// Queues a kept scan to be processed again.
     pub(crate) fn rerun(&self, id: &str, request: &Rerun) -> Result<Job, ServiceError> {
         self.check_running()?;
+        // The job is noted on the scan as it is read here: two requests at once would lose
+        // one of the notes.
+        let _order = self.queue.changing();
         let mut scan = self.scan(id)?;
         if !scan.state.is_over() {
             return Err(ServiceError::ScanNotOver { id: id.to_owned() });
