@@ -312,6 +312,7 @@ impl<'a> Keeper<'a> {
                 // The job regrids from the journal and reports what is wrong.
                 tracing::warn!(scan = self.id, %problem, "the live range image ends here");
                 self.live = None;
+                self.service.forget_grid(self.id);
                 Vec::new()
             }
         }
