@@ -107,6 +107,7 @@ impl GridWorker {
             return None;
         }
         let spacing = local_spacing(window, nearest, &mut self.lengths);
+        let dense = nearest.len() == settings.neighbours;
         let support = &settings.support;
         // Inliers are some of the samples: where those do not suffice, inliers will not.
         if !self
@@ -117,7 +118,7 @@ impl GridWorker {
         }
         if settings.estimator == Estimator::LeastSquares {
             let fit = self.finder.least_squares(nearest)?;
-            let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm);
+            let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm, dense);
             let supported = self
                 .surroundings
                 .supported(nearest, spacing, support, agrees);
@@ -136,7 +137,7 @@ impl GridWorker {
                 self.samples.truncate(half);
                 continue;
             }
-            let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm);
+            let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm, dense);
             if self
                 .surroundings
                 .supported(nearest, spacing, support, &agrees)

@@ -47,9 +47,17 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// Tells inliers, which may always lie `floor` from the plane.
-    pub(crate) fn agrees(&self, floor: f64) -> impl Fn(&Neighbour) -> bool + use<> {
-        let (plane, tolerance) = (self.plane, self.tolerance.max(floor));
+    /// Tells inliers, which may always lie `floor` from the plane: in z, or square to it
+    /// where samples are `dense`. On a steep surface that bends away z strays far within a
+    /// spacing, but among lone outliers a steep plane joins anything.
+    pub(crate) fn agrees(&self, floor: f64, dense: bool) -> impl Fn(&Neighbour) -> bool + use<> {
+        let plane = self.plane;
+        let slope2 = if dense {
+            plane.a * plane.a + plane.b * plane.b
+        } else {
+            0.0
+        };
+        let tolerance = self.tolerance.max(floor * (1.0 + slope2).sqrt());
         move |n| plane.residual(n).abs() <= tolerance
     }
 }

@@ -83,7 +83,7 @@ const BEVEL_RATIO: usize = 3;
 
 /// Factor of the price of pieces for borders whose samples lie on them: there is no
 /// staircase to see past.
-const PLACED_PRICE: f64 = 0.05;
+const PLACED_PRICE: f64 = 0.01;
 
 /// Farthest the filtered border may lie from the drawn one, pitches. Filtering cuts a
 /// right angle by less; single nodes that stick out do not count.
