@@ -16,6 +16,9 @@ const OBJECTS: [&str; 2] = ["house", "cylinder"];
 /// Seeds begin here. Lower ones were looked at while the stages were tuned.
 const FIRST_SEED: u32 = 101;
 
+/// Most seconds from a scan's last column to its result in the spool.
+const SLOWEST_S: &str = "2";
+
 #[derive(Debug, Args)]
 pub(crate) struct Options {
     /// Scans of each object.
@@ -46,6 +49,11 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         "cargo",
         &["build", "--release", "--package", "relief-tests", "--bins"],
     )?;
+    let judges = Judges {
+        python,
+        cadmpeg: cadmpeg(&place)?,
+        freecad: options.freecad,
+    };
     let mut failed = Vec::new();
     for case in cases(options.seeds) {
         let folder = scenes.join(&case.name);
@@ -54,7 +62,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
                 .with_context(|| format!("cannot empty {}", folder.display()))?;
         }
         println!("\n{}", case.name);
-        if let Err(error) = judge(&case, &folder, &python, options.freecad) {
+        if let Err(error) = judges.judge(&case, &folder) {
             failed.push(format!("{}: {error}", case.name));
         }
     }
@@ -100,29 +108,42 @@ fn cases(seeds: u32) -> Vec<Case> {
     cases
 }
 
-fn judge(case: &Case, folder: &Path, python: &str, freecad: bool) -> Result<()> {
-    let out = folder.display().to_string();
-    let target = std::env::var_os("CARGO_TARGET_DIR")
-        .map_or_else(|| shell::root().join("target"), PathBuf::from);
-    let scan_scene = target.join("release/scan-scene").display().to_string();
-    let mut words: Vec<&str> = case.arguments.iter().map(String::as_str).collect();
-    words.extend(["--out", &out]);
-    shell::run(&scan_scene, &words)?;
-    let file = iges_in(folder)?;
-    match case.faces {
-        Some(_) => {
+/// The programs that judge.
+struct Judges {
+    python: String,
+    cadmpeg: String,
+    freecad: bool,
+}
+
+impl Judges {
+    fn judge(&self, case: &Case, folder: &Path) -> Result<()> {
+        let out = folder.display().to_string();
+        let target = std::env::var_os("CARGO_TARGET_DIR")
+            .map_or_else(|| shell::root().join("target"), PathBuf::from);
+        let scan_scene = target.join("release/scan-scene").display().to_string();
+        let mut words: Vec<&str> = case.arguments.iter().map(String::as_str).collect();
+        words.extend(["--within-s", SLOWEST_S, "--out", &out]);
+        shell::run(&scan_scene, &words)?;
+        let file = iges_in(folder)?;
+        if case.faces.is_some() {
             let truth = folder.join("truth.json").display().to_string();
-            shell::run(python, &["tests/judges/scene_check.py", &file, &truth])?;
+            let check = "tests/judges/scene_check.py";
+            shell::run(&self.python, &[check, &file, &truth])?;
+        } else {
+            let check = "tests/judges/occ_check.py";
+            shell::quiet(&self.python, &[check, "--no-points", &file])?;
         }
-        None => shell::quiet(python, &["tests/judges/occ_check.py", "--no-points", &file])?,
+        let faces = case.faces.map(|n| n.to_string());
+        let mut words = vec![file.as_str()];
+        words.extend(faces.as_deref());
+        shell::quiet(&self.cadmpeg, &words)?;
+        if self.freecad {
+            let mut with = vec![("IGES_FILE", file.clone())];
+            with.extend(faces.map(|n| ("EXPECT_FACES", n)));
+            shell::run_with("freecadcmd", &["tests/judges/freecad_check.py"], &with)?;
+        }
+        Ok(())
     }
-    if freecad {
-        let faces = case.faces.map(|n| ("EXPECT_FACES", n.to_string()));
-        let mut with = vec![("IGES_FILE", file)];
-        with.extend(faces);
-        shell::run_with("freecadcmd", &["tests/judges/freecad_check.py"], &with)?;
-    }
-    Ok(())
 }
 
 fn iges_in(folder: &Path) -> Result<String> {
@@ -140,6 +161,23 @@ fn iges_in(folder: &Path) -> Result<String> {
             folder.display()
         ),
     }
+}
+
+/// An independent reader in Rust, in a workspace of its own.
+fn cadmpeg(place: &Path) -> Result<String> {
+    let home = place.join("cadmpeg");
+    let manifest = "tests/judges/cadmpeg/Cargo.toml";
+    let target = home.display().to_string();
+    let mut words = vec![
+        "build",
+        "--release",
+        "--locked",
+        "--manifest-path",
+        manifest,
+    ];
+    words.extend(["--target-dir", &target]);
+    shell::run("cargo", &words)?;
+    Ok(home.join("release/judge-cadmpeg").display().to_string())
 }
 
 /// A Python with the judge's packages, made once.

@@ -190,10 +190,18 @@ impl<S: Send + Sync, T: DeserializeOwned + Default> FromRequest<S> for Body<T> {
         if bare {
             return Ok(Self(T::default()));
         }
-        match Json::<T>::from_request(request, state).await {
-            Ok(Json(body)) => Ok(Self(body)),
-            Err(rejection) => Err(wrong_body(&rejection)),
-        }
+        // An object only: as a bare list of values, `[]` would stand for every default, and
+        // so start a scan.
+        type Object = serde_json::Map<String, serde_json::Value>;
+        let Json(object) = Json::<Object>::from_request(request, state)
+            .await
+            .map_err(|rejection| wrong_body(&rejection))?;
+        serde_json::from_value(object.into())
+            .map(Self)
+            .map_err(|error| {
+                let text = format!("the body is not as it must be: {error}");
+                Refusal::new(StatusCode::BAD_REQUEST, "wrong-body", text, None)
+            })
     }
 }
 

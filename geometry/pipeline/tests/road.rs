@@ -43,7 +43,10 @@ impl Monitor for Notes {
 
 impl Observer for Notes {
     fn stage(&self, stage: Stage) {
-        self.stages.lock().unwrap().push(stage);
+        self.stages
+            .lock()
+            .expect("nobody panics with the lock")
+            .push(stage);
         if self.cancel_at == Some(stage) {
             self.cancelled.store(true, Ordering::Relaxed);
         }

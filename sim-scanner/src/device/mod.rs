@@ -41,6 +41,9 @@ pub struct Poll {
     pub wake: Option<Duration>,
 }
 
+/// Kinds of messages from here on are the device's own.
+const DEVICE_KINDS: u8 = 0x80;
+
 /// Bytes after which a poll stops measuring: enough to keep a line busy, few enough that an
 /// abort is heard soon.
 const POLL_BYTES: usize = 4096;
@@ -139,7 +142,10 @@ impl Device {
     pub fn receive(&mut self, mut bytes: &[u8], now: Duration) {
         self.advance(now);
         while let Some(packet) = self.decoder.next(&mut bytes) {
-            self.heard = now;
+            // Its own words, sent back by a line with an echo, are no sign of a host.
+            if packet.kind < DEVICE_KINDS {
+                self.heard = now;
+            }
             self.handle(packet, now);
         }
     }
@@ -338,8 +344,7 @@ impl Device {
     fn handle(&mut self, packet: Packet, now: Duration) {
         match HostMessage::decode(&packet) {
             Ok(message) => self.carry_out(packet, message, now),
-            // The device's own kinds come back on a line with an echo.
-            Err(MessageError::UnknownKind(kind)) if kind >= 0x80 => {}
+            Err(MessageError::UnknownKind(kind)) if kind >= DEVICE_KINDS => {}
             Err(MessageError::UnknownKind(_)) => {
                 self.reject(&packet, RejectReason::UnknownCommand, 0);
             }

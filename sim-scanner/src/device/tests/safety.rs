@@ -29,6 +29,19 @@ fn a_silent_host_finds_laser_and_table_stopped() {
 }
 
 #[test]
+fn an_echo_of_the_device_is_no_sign_of_a_host() {
+    let mut host = Host::ready();
+    host.link.device().step_columns(Some(2));
+    host.scan(64);
+    let status = DeviceMessage::Status(host.status());
+    for _ in 0..4 {
+        host.link.pass(SECOND / 2);
+        host.link.send(status.frame(1).as_bytes());
+    }
+    assert!(host.link.device().events().contains(&Event::DeadMan));
+}
+
+#[test]
 fn a_moving_table_stops_when_the_host_falls_silent() {
     let mut host = Host::ready();
     host.greet(500);

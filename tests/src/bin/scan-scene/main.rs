@@ -73,6 +73,9 @@ struct Options {
     /// IGES entities of the surfaces: 114 or 128
     #[arg(long, value_name = "TYPE")]
     entities: Option<u16>,
+    /// Fail if the result takes longer than this after the last column, seconds
+    #[arg(long, value_name = "S")]
+    within_s: Option<f64>,
     /// Where the files go; made if it is not there
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -192,6 +195,13 @@ fn run(options: &Options) -> Result<()> {
     );
     println!("total    {:.3} s", figures.total_s);
     println!("files    {}", options.out.display());
+    if let Some(limit_s) = options.within_s {
+        anyhow::ensure!(
+            figures.after_last_column_s <= limit_s,
+            "the result took {:.3} s after the last column, more than {limit_s} s",
+            figures.after_last_column_s
+        );
+    }
     Ok(())
 }
 
