@@ -32,6 +32,7 @@ use relief_api::{Event, StartScan};
 use relief_tests::rig::{Published, Rig};
 use sim_scanner::config::{Object, SimConfig};
 use sim_scanner::preset::{Overrides, Preset};
+use sim_scanner::source::Source;
 
 /// Scan a scene with the simulated scanner and a private service, for judging what comes out
 #[derive(Debug, Parser)]
@@ -189,6 +190,13 @@ fn run(options: &Options) -> Result<()> {
     println!("columns  {}", figures.columns);
     println!("samples  {}", figures.samples);
     println!("pitch    {pitch_mm} mm");
+    if let Source::Simulated { scanner, .. } = scanner.source()? {
+        let noise = &scanner.noise;
+        println!(
+            "noise    {} mm, outliers {}, mixed {}, dropouts {}; seed {}",
+            noise.noise_mm, noise.outliers, noise.mixed, noise.dropouts, scanner.seed
+        );
+    }
     println!(
         "result   {:.3} s after the last column was on disk",
         figures.after_last_column_s
