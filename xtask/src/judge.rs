@@ -38,7 +38,7 @@ struct Case {
     arguments: Vec<String>,
     faces: Option<u32>,
     /// Greatest error of outlines. The target is 1 pitch; where silhouette and disc of the
-    /// cylinder cross at 29 degrees, half a pitch of either comes out doubled.
+    /// cylinder cross at a sharp angle, an error of either comes out larger.
     outline_pitches: &'static str,
 }
 
