@@ -9,7 +9,7 @@ use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::Path;
 
-use range_image::{GridColumn, Lattice, RangeImage, RangeImageBuilder};
+use range_image::{GridColumn, Lattice, NodeQuality, RangeImage, RangeImageBuilder};
 
 /// Writes the columns as they are finished.
 #[derive(Debug)]
@@ -31,6 +31,14 @@ impl GridFile {
             .write_all(&(column.z_mm.len() as u64).to_le_bytes())?;
         for z in &column.z_mm {
             self.out.write_all(&z.to_le_bytes())?;
+        }
+        let qualities = column.quality.len() as u64;
+        self.out.write_all(&qualities.to_le_bytes())?;
+        for quality in &column.quality {
+            self.out.write_all(&quality.inliers.to_le_bytes())?;
+            self.out.write_all(&quality.samples.to_le_bytes())?;
+            self.out.write_all(&quality.scale_mm.to_le_bytes())?;
+            self.out.write_all(&quality.nearest_mm.to_le_bytes())?;
         }
         Ok(())
     }
@@ -60,8 +68,35 @@ pub(crate) fn read(path: &Path, lattice: Lattice) -> io::Result<RangeImage> {
             source.read_exact(&mut word)?;
             z_mm.push(f64::from_le_bytes(word));
         }
-        builder.push(GridColumn { i, j_first, z_mm });
+        source.read_exact(&mut word)?;
+        let mut quality = Vec::new();
+        for _ in 0..u64::from_le_bytes(word) {
+            quality.push(read_quality(&mut source)?);
+        }
+        builder.push(GridColumn {
+            i,
+            j_first,
+            z_mm,
+            quality,
+        });
     }
+}
+
+fn read_quality(source: &mut impl Read) -> io::Result<NodeQuality> {
+    let (mut count, mut length) = ([0; 2], [0; 4]);
+    source.read_exact(&mut count)?;
+    let inliers = u16::from_le_bytes(count);
+    source.read_exact(&mut count)?;
+    let samples = u16::from_le_bytes(count);
+    source.read_exact(&mut length)?;
+    let scale_mm = f32::from_le_bytes(length);
+    source.read_exact(&mut length)?;
+    Ok(NodeQuality {
+        inliers,
+        samples,
+        scale_mm,
+        nearest_mm: f32::from_le_bytes(length),
+    })
 }
 
 #[cfg(test)]
@@ -72,16 +107,24 @@ mod tests {
     fn columns_come_back_bit_for_bit() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.grid");
+        let of = |inliers| NodeQuality {
+            inliers,
+            samples: 9,
+            scale_mm: 0.1,
+            nearest_mm: 1.0 / 3.0,
+        };
         let columns = [
             GridColumn {
                 i: -2,
                 j_first: 5,
                 z_mm: vec![0.1, f64::NAN, -3.5],
+                quality: [1, 0, 7].map(of).to_vec(),
             },
             GridColumn {
                 i: 1,
                 j_first: 4,
                 z_mm: vec![1.0 / 3.0],
+                quality: Vec::new(),
             },
         ];
         let mut file = GridFile::create(&path).unwrap();
@@ -98,5 +141,7 @@ mod tests {
             image.raw_z_mm().iter().map(|z| z.to_bits()).collect()
         };
         assert_eq!(bits(&read), bits(&built));
+        assert_eq!(read.quality(0, 3), built.quality(0, 3));
+        assert!(read.qualities().eq([1, 7].map(of)));
     }
 }

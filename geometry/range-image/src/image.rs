@@ -1,5 +1,7 @@
 //! The uniform range image and the lattice it lives on.
 
+use crate::quality::NodeQuality;
+
 /// The lattice of grid nodes: node `(i, j)` lies at `(i * pitch, j * pitch)`.
 ///
 /// It is anchored at the part frame's origin, not at the first sample, so that neither
@@ -39,6 +41,9 @@ pub struct GridColumn {
     pub j_first: i64,
     /// z at successive nodes upwards, millimetres; NaN where the node is masked.
     pub z_mm: Vec<f64>,
+    /// Quality of the same nodes; empty where it is not known. What it says of masked nodes
+    /// has no meaning.
+    pub quality: Vec<NodeQuality>,
 }
 
 /// z at the nodes of a uniform grid, with a mask: a node has a value or none.
@@ -53,6 +58,8 @@ pub struct RangeImage {
     columns: usize,
     rows: usize,
     z_mm: Vec<f64>,
+    /// Empty, or as long as `z_mm`.
+    quality: Vec<NodeQuality>,
 }
 
 impl RangeImage {
@@ -72,6 +79,7 @@ impl RangeImage {
             columns,
             rows,
             z_mm: vec![f64::NAN; columns * rows],
+            quality: Vec::new(),
         }
     }
 
@@ -139,7 +147,30 @@ impl RangeImage {
         (!z.is_nan()).then_some(z)
     }
 
-    /// Sets or masks (`None`) a node.
+    /// Quality of a node; `None` where it is masked or outside the image, or where nothing
+    /// is known of it, as in images that no regridder made.
+    #[must_use]
+    pub fn quality(&self, column: usize, row: usize) -> Option<NodeQuality> {
+        self.z_mm(column, row)?;
+        let quality = self.quality.get(column * self.rows + row)?;
+        (quality.samples > 0).then_some(*quality)
+    }
+
+    /// Notes the quality of a node, which may be masked.
+    ///
+    /// # Panics
+    /// When the node lies outside the image.
+    pub fn set_quality(&mut self, column: usize, row: usize, quality: NodeQuality) {
+        assert!(
+            column < self.columns && row < self.rows,
+            "node outside the image"
+        );
+        self.quality.resize(self.z_mm.len(), NodeQuality::default());
+        self.quality[column * self.rows + row] = quality;
+    }
+
+    /// Sets or masks (`None`) a node. Its quality, which told of the value before, is
+    /// forgotten.
     ///
     /// # Panics
     /// When the node lies outside the image.
@@ -148,13 +179,25 @@ impl RangeImage {
             column < self.columns && row < self.rows,
             "node outside the image"
         );
-        self.z_mm[column * self.rows + row] = z_mm.unwrap_or(f64::NAN);
+        let index = column * self.rows + row;
+        self.z_mm[index] = z_mm.unwrap_or(f64::NAN);
+        if let Some(quality) = self.quality.get_mut(index) {
+            *quality = NodeQuality::default();
+        }
     }
 
     /// All values column by column, upwards within a column; NaN where masked.
     #[must_use]
     pub fn raw_z_mm(&self) -> &[f64] {
         &self.z_mm
+    }
+
+    /// The qualities of all nodes with a value of which one is known, column by column.
+    pub fn qualities(&self) -> impl Iterator<Item = NodeQuality> {
+        let valued = self.z_mm.iter().zip(&self.quality);
+        valued
+            .filter(|(z, quality)| !z.is_nan() && quality.samples > 0)
+            .map(|(_, quality)| *quality)
     }
 
     /// Number of nodes that have a value.
@@ -198,9 +241,14 @@ impl RangeImageBuilder {
         let Some(last) = column.z_mm.iter().rposition(|z| !z.is_nan()) else {
             return;
         };
+        if column.quality.len() != column.z_mm.len() {
+            column.quality.clear();
+        }
         column.z_mm.truncate(last + 1);
+        column.quality.truncate(last + 1);
         let lead = column.z_mm.iter().take_while(|z| z.is_nan()).count();
         column.z_mm.drain(..lead);
+        column.quality.drain(..lead.min(column.quality.len()));
         column.j_first += lead as i64;
         self.columns.push(column);
     }
@@ -221,9 +269,15 @@ impl RangeImageBuilder {
             .unwrap_or(j_first);
         let (columns, rows) = ((i_last - i_first + 1) as usize, (j_end - j_first) as usize);
         let mut image = RangeImage::masked(self.lattice, i_first, j_first, columns, rows);
+        if self.columns.iter().any(|c| !c.quality.is_empty()) {
+            image.quality = vec![NodeQuality::default(); image.z_mm.len()];
+        }
         for column in &self.columns {
             let start = (column.i - i_first) as usize * rows + (column.j_first - j_first) as usize;
             image.z_mm[start..start + column.z_mm.len()].copy_from_slice(&column.z_mm);
+            if !column.quality.is_empty() {
+                image.quality[start..start + column.quality.len()].copy_from_slice(&column.quality);
+            }
         }
         image
     }
@@ -237,22 +291,31 @@ mod tests {
     fn builder_crops_to_the_nodes_with_values() {
         let mut builder = RangeImageBuilder::new(Lattice { pitch_mm: 0.5 });
         let nan = f64::NAN;
+        let of = |inliers| NodeQuality {
+            inliers,
+            samples: 8,
+            scale_mm: 0.5,
+            nearest_mm: 0.25,
+        };
         builder.push(GridColumn {
             i: 4,
             j_first: -3,
             z_mm: vec![nan, 1.0, nan, 2.0, nan],
+            quality: (0..5).map(of).collect(),
         });
         builder.push(GridColumn {
             i: 5,
             j_first: 0,
             z_mm: vec![nan, nan],
+            quality: Vec::new(),
         });
         builder.push(GridColumn {
             i: 2,
             j_first: -1,
             z_mm: vec![3.0],
+            quality: Vec::new(),
         });
-        let image = builder.finish();
+        let mut image = builder.finish();
         assert_eq!(
             (image.columns(), image.rows(), image.origin()),
             (3, 3, (2, -2))
@@ -263,6 +326,19 @@ mod tests {
         assert_eq!((image.x_mm(0), image.y_mm(1)), (1.0, -0.5));
         assert_eq!(image.valid_nodes(), 3);
         assert_eq!(image.z_extent_mm(), Some((1.0, 3.0)));
+        assert_eq!(image.quality(2, 0), Some(of(1)));
+        assert_eq!(image.quality(2, 2), Some(of(3)));
+        assert_eq!(of(3).inlier_share(), 0.375);
+        assert_eq!(image.quality(2, 1), None, "masked");
+        assert_eq!(image.quality(0, 1), None, "not known");
+        assert_eq!(image.quality(2, 3), None, "outside");
+        let inliers: Vec<u16> = image.qualities().map(|q| q.inliers).collect();
+        assert_eq!(inliers, [1, 3]);
+        image.set_z_mm(2, 0, Some(7.0));
+        assert_eq!(image.quality(2, 0), None, "of another value");
+        image.set_quality(0, 1, of(6));
+        assert_eq!(image.quality(0, 1), Some(of(6)));
+        assert_eq!(image.masked_like().quality(0, 1), None);
     }
 
     #[test]

@@ -8,6 +8,7 @@ pub mod column;
 pub mod frame;
 pub mod image;
 pub mod monitor;
+pub mod quality;
 pub mod region_map;
 
 pub use calibration::Calibration;
@@ -15,4 +16,5 @@ pub use column::{Column, Sample};
 pub use frame::{Part, Position, Sensor};
 pub use image::{GridColumn, Lattice, RangeImage, RangeImageBuilder};
 pub use monitor::{Cancelled, Monitor, Unmonitored};
+pub use quality::NodeQuality;
 pub use region_map::RegionMap;

@@ -2,11 +2,11 @@
 
 use core::f64::consts::PI;
 
-use range_image::{GridColumn, Lattice};
+use range_image::{GridColumn, Lattice, NodeQuality};
 
 use crate::draws::Draws;
 use crate::neighbours::{Neighbour, Search};
-use crate::plane::PlaneFinder;
+use crate::plane::{Plane, PlaneFinder};
 use crate::settings::{Estimator, LEAST_WINDOW, RegridSettings};
 use crate::strip::{Strip, typical};
 use crate::support::Surroundings;
@@ -59,6 +59,7 @@ impl GridWorker {
             i,
             j_first: 0,
             z_mm: Vec::new(),
+            quality: Vec::new(),
         };
         self.search.begin(&window);
         self.search.advance(&window, f64::NEG_INFINITY);
@@ -85,15 +86,15 @@ impl GridWorker {
                 next = above.map(|y| first_row(y).max(j + 1));
                 continue;
             }
-            if let Some(z_mm) = self.node(&window, x_mm, y_mm, (i, j), settings) {
-                append(&mut column, j, z_mm);
+            if let Some(value) = self.node(&window, x_mm, y_mm, (i, j), settings) {
+                append(&mut column, j, value);
             }
             next = Some(j + 1);
         }
         (!column.z_mm.is_empty()).then_some(column)
     }
 
-    /// z at a node, or `None` to mask it.
+    /// z at a node and its quality, or `None` to mask it.
     fn node(
         &mut self,
         window: &Window<'_>,
@@ -101,7 +102,7 @@ impl GridWorker {
         y_mm: f64,
         (i, j): (i64, i64),
         settings: &RegridSettings,
-    ) -> Option<f64> {
+    ) -> Option<(f64, NodeQuality)> {
         let nearest = self.search.nearest(window, x_mm, y_mm, settings.neighbours);
         if nearest.len() < LEAST_WINDOW {
             return None;
@@ -121,8 +122,8 @@ impl GridWorker {
             let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm, dense);
             let supported = self
                 .surroundings
-                .supported(nearest, spacing, support, agrees);
-            return supported.then_some(fit.plane.c);
+                .supported(nearest, spacing, support, &agrees);
+            return supported.then(|| (fit.plane.c, quality(nearest, &fit.plane, agrees)));
         }
         self.samples.clear();
         self.samples.extend_from_slice(nearest);
@@ -142,7 +143,7 @@ impl GridWorker {
                 .surroundings
                 .supported(nearest, spacing, support, &agrees)
             {
-                return Some(fit.plane.c);
+                return Some((fit.plane.c, quality(nearest, &fit.plane, agrees)));
             }
             // The majority lies on another surface than the node, as at a corner in front of
             // a wall. Without it the node's own surface may be found.
@@ -176,11 +177,35 @@ fn local_spacing(window: &Window<'_>, nearest: &[Neighbour], lengths: &mut Vec<f
 }
 
 /// Adds a node above all others of the column, masking those in between.
-fn append(column: &mut GridColumn, j: i64, z_mm: f64) {
+fn append(column: &mut GridColumn, j: i64, (z_mm, quality): (f64, NodeQuality)) {
     if column.z_mm.is_empty() {
         column.j_first = j;
     }
     let row = (j - column.j_first).unsigned_abs();
     column.z_mm.resize(row as usize, f64::NAN);
     column.z_mm.push(z_mm);
+    column.quality.resize(row as usize, NodeQuality::default());
+    column.quality.push(quality);
+}
+
+/// What is told of a node with this plane.
+fn quality(
+    window: &[Neighbour],
+    plane: &Plane,
+    agrees: impl Fn(&Neighbour) -> bool,
+) -> NodeQuality {
+    let (mut inliers, mut squares, mut nearest2) = (0_u16, 0.0, f64::INFINITY);
+    for n in window.iter().filter(|n| agrees(n)) {
+        let residual = plane.residual(n);
+        inliers = inliers.saturating_add(1);
+        squares += residual * residual;
+        nearest2 = n.distance2.min(nearest2);
+    }
+    let freedom = f64::from(inliers) - 3.0;
+    NodeQuality {
+        inliers,
+        samples: u16::try_from(window.len()).unwrap_or(u16::MAX),
+        scale_mm: (squares / freedom.max(1.0)).sqrt() as f32,
+        nearest_mm: nearest2.sqrt() as f32,
+    }
 }

@@ -6,7 +6,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use common::{Noise, columns, image, steps};
-use range_image::{Column, Lattice, Monitor, RangeImage, RangeImageBuilder, Sample, Unmonitored};
+use range_image::{
+    Column, Lattice, Monitor, NodeQuality, RangeImage, RangeImageBuilder, Sample, Unmonitored,
+};
 use regrid::{RegridError, RegridSettings, Regridder, regrid};
 
 /// A wavy part with a step, a hole, noise, dropouts and empty columns at both ends.
@@ -31,10 +33,15 @@ fn part(length: i32, seed: u64) -> Vec<Column> {
     })
 }
 
-fn bits(image: &RangeImage) -> (i64, i64, usize, Vec<u64>) {
+type Bits = (i64, i64, usize, Vec<u64>, Vec<NodeQuality>);
+
+fn bits(image: &RangeImage) -> Bits {
     let (i, j) = image.origin();
     let z = image.raw_z_mm().iter().map(|z| z.to_bits()).collect();
-    (i, j, image.columns(), z)
+    let qualities: Vec<NodeQuality> = image.qualities().collect();
+    assert_eq!(qualities.len(), image.valid_nodes(), "one for each node");
+    assert!(qualities.iter().all(|q| q.inliers <= q.samples));
+    (i, j, image.columns(), z, qualities)
 }
 
 fn streamed(columns: &[Column], settings: &RegridSettings) -> RangeImage {
