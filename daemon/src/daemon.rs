@@ -23,6 +23,9 @@ use crate::store::{Store, StoreError};
 /// How long connections may take to end once the service stops.
 const DRAIN: Duration = Duration::from_secs(5);
 
+/// How long a predecessor that is just ending may hold the records, as in a restart.
+const HANDOVER: Duration = Duration::from_secs(3);
+
 /// The service cannot start.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
@@ -97,7 +100,8 @@ impl Daemon {
     /// Any [`StartError`] but [`StartError::Scanner`].
     pub async fn start_with(config: Config, scanner: Arc<dyn Scanner>) -> Result<Self, StartError> {
         let scans_dir = prepare_state(&config.service.state_dir)?;
-        let store = Store::open(&config.service.state_dir.join("reliefd.redb"))?;
+        let records = config.service.state_dir.join("reliefd.redb");
+        let store = Store::open_soon(&records, HANDOVER).await?;
         remove_grids(&scans_dir);
         let spool = Spool::open(&config.service.spool_dir)?;
         let unix = bind_socket(&config.service.socket).await?;
@@ -197,7 +201,8 @@ impl Daemon {
 
     /// Brings the service to an orderly end: a scan under way is aborted and kept, with
     /// the laser off; running jobs stop at their next opportunity and are taken up by the
-    /// next start; connections are drained.
+    /// next start; connections are drained. When this returns, another service may take
+    /// over the folders and the socket.
     pub async fn shutdown(self) {
         let service = Arc::clone(&self.service);
         service.begin_stop();
@@ -233,6 +238,14 @@ impl Daemon {
             tracing::warn!("some connections were cut");
         }
         remove_if_there(&self.socket);
+        // A connection, or a request that waits for the scanner, may hold the service for
+        // longer than it is waited for above. The records are given up here in any case,
+        // and last: who waits for them finds all else given up too.
+        let service = self.service;
+        let closed = tokio::task::spawn_blocking(move || service.store.close()).await;
+        if closed.is_err() {
+            tracing::error!("the records were not closed in good order");
+        }
         tracing::info!("reliefd has ended");
     }
 }

@@ -24,8 +24,6 @@ pub(crate) enum Slot {
         scan: Box<Scan>,
         /// Ends it early.
         abort: Arc<AbortRequest>,
-        /// Its thread.
-        thread: Option<JoinHandle<()>>,
     },
 }
 
@@ -94,10 +92,10 @@ impl Service {
                 .name("scan".into())
                 .spawn(move || run(&service, ticket))
                 .map_err(ServiceError::Thread)?;
+            self.hold_scan_thread(thread);
             *slot = Slot::Taken {
                 scan: Box::new(scan.clone()),
                 abort,
-                thread: Some(thread),
             };
             reservation.used = true;
         }
@@ -153,16 +151,21 @@ impl Service {
         self.scan(&scan.id)
     }
 
-    /// Waits until no scan is under way.
+    /// Keeps a scan's thread until it is joined. The place of a scan is free a moment
+    /// before its thread has ended, so that the thread is not kept there.
+    fn hold_scan_thread(&self, thread: JoinHandle<()>) {
+        let mut threads = lock(&self.scan_threads);
+        threads.retain(|thread| !thread.is_finished());
+        threads.push(thread);
+    }
+
+    /// Waits until the threads of all scans have ended.
     pub(crate) fn join_scan(&self) {
-        let thread = match &mut *lock(&self.slot) {
-            Slot::Taken { thread, .. } => thread.take(),
-            _ => None,
-        };
-        if let Some(thread) = thread
-            && thread.join().is_err()
-        {
-            tracing::error!("the scan's thread ended by a panic");
+        let threads = std::mem::take(&mut *lock(&self.scan_threads));
+        for thread in threads {
+            if thread.join().is_err() {
+                tracing::error!("the scan's thread ended by a panic");
+            }
         }
     }
 

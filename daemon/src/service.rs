@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, RwLock};
+use std::thread::JoinHandle;
 use std::time::Duration;
 
 use regrid::RegridSettings;
@@ -30,6 +31,8 @@ pub(crate) struct Service {
     pub(crate) queue: Queue,
     /// The scan under way, if any.
     pub(crate) slot: Mutex<Slot>,
+    /// Threads of scans; all but the last are about to end, if they have not yet.
+    pub(crate) scan_threads: Mutex<Vec<JoinHandle<()>>>,
     config: RwLock<Arc<Config>>,
     scans_dir: PathBuf,
     scanner_status: Mutex<ScannerStatus>,
@@ -63,6 +66,7 @@ impl Service {
             ids: Ids::default(),
             queue: Queue::default(),
             slot: Mutex::new(Slot::Free),
+            scan_threads: Mutex::default(),
             config: RwLock::new(Arc::new(config)),
             scans_dir,
             scanner_status: Mutex::new(ScannerStatus {

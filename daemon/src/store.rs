@@ -4,6 +4,8 @@
 //! tell what it reads. redb locks the file, which keeps a second service out.
 
 use std::path::{Path, PathBuf};
+use std::sync::{PoisonError, RwLock};
+use std::time::{Duration, Instant};
 
 use redb::{Database, ReadableDatabase, ReadableTable, TableDefinition};
 use relief_api::{Job, JobId, Scan};
@@ -12,6 +14,9 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 const SCANS: TableDefinition<'_, &str, &[u8]> = TableDefinition::new("scans");
 const JOBS: TableDefinition<'_, JobId, &[u8]> = TableDefinition::new("jobs");
 const RECORD_VERSION: u32 = 1;
+
+/// How often a locked file is tried again.
+const RETRY: Duration = Duration::from_millis(20);
 
 /// The records cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -22,6 +27,12 @@ pub enum StoreError {
         path.display()
     )]
     Locked {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The service has ended.
+    #[error("the records in {} are closed, since the service ends", path.display())]
+    Closed {
         /// The file.
         path: PathBuf,
     },
@@ -50,7 +61,8 @@ pub enum StoreError {
 /// The records.
 #[derive(Debug)]
 pub(crate) struct Store {
-    database: Database,
+    /// `None` once closed: whoever still holds the service then holds no lock on the file.
+    database: RwLock<Option<Database>>,
     path: PathBuf,
 }
 
@@ -62,6 +74,19 @@ struct Envelope<T> {
 }
 
 impl Store {
+    /// Opens the records, waiting a while for a service that is just about to end.
+    pub(crate) async fn open_soon(path: &Path, longest: Duration) -> Result<Self, StoreError> {
+        let begun = Instant::now();
+        loop {
+            match Self::open(path) {
+                Err(StoreError::Locked { .. }) if begun.elapsed() < longest => {
+                    tokio::time::sleep(RETRY).await;
+                }
+                other => return other,
+            }
+        }
+    }
+
     /// Opens the records, making them if there are none.
     pub(crate) fn open(path: &Path) -> Result<Self, StoreError> {
         let unusable = |message: String| StoreError::Unusable {
@@ -74,98 +99,120 @@ impl Store {
             },
             other => unusable(other.to_string()),
         })?;
-        let store = Self {
-            database,
-            path: path.to_owned(),
-        };
         let make = || -> Result<(), redb::Error> {
-            let transaction = store.database.begin_write()?;
+            let transaction = database.begin_write()?;
             transaction.open_table(SCANS)?;
             transaction.open_table(JOBS)?;
             transaction.commit()?;
             Ok(())
         };
         make().map_err(|error| unusable(error.to_string()))?;
-        Ok(store)
+        Ok(Self {
+            database: RwLock::new(Some(database)),
+            path: path.to_owned(),
+        })
+    }
+
+    /// Closes the records, once what is being read or written is done; the next service
+    /// may open them when this returns.
+    pub(crate) fn close(&self) {
+        let mut database = self
+            .database
+            .write()
+            .unwrap_or_else(PoisonError::into_inner);
+        *database = None;
+    }
+
+    fn with<T>(
+        &self,
+        work: impl FnOnce(&Database) -> Result<T, redb::Error>,
+    ) -> Result<T, StoreError> {
+        let database = self.database.read().unwrap_or_else(PoisonError::into_inner);
+        let Some(database) = &*database else {
+            return Err(StoreError::Closed {
+                path: self.path.clone(),
+            });
+        };
+        work(database).map_err(|error| self.unusable(&error))
     }
 
     /// All scans, oldest first.
     pub(crate) fn scans(&self) -> Result<Vec<Scan>, StoreError> {
-        let read = || -> Result<Vec<Vec<u8>>, redb::Error> {
-            let table = self.database.begin_read()?.open_table(SCANS)?;
+        let read = |database: &Database| -> Result<Vec<Vec<u8>>, redb::Error> {
+            let table = database.begin_read()?.open_table(SCANS)?;
             table
                 .iter()?
                 .map(|row| Ok(row?.1.value().to_vec()))
                 .collect()
         };
-        self.decode_all(read().map_err(|e| self.unusable(&e))?)
+        self.decode_all(self.with(read)?)
     }
 
     /// One scan.
     pub(crate) fn scan(&self, id: &str) -> Result<Option<Scan>, StoreError> {
-        let read = || -> Result<Option<Vec<u8>>, redb::Error> {
-            let table = self.database.begin_read()?.open_table(SCANS)?;
+        let read = |database: &Database| -> Result<Option<Vec<u8>>, redb::Error> {
+            let table = database.begin_read()?.open_table(SCANS)?;
             Ok(table.get(id)?.map(|bytes| bytes.value().to_vec()))
         };
-        let bytes = read().map_err(|e| self.unusable(&e))?;
+        let bytes = self.with(read)?;
         bytes.map(|bytes| self.decode(&bytes)).transpose()
     }
 
     /// Keeps a scan's record in place of any earlier one.
     pub(crate) fn put_scan(&self, scan: &Scan) -> Result<(), StoreError> {
         let bytes = self.encode(scan)?;
-        let write = || -> Result<(), redb::Error> {
-            let transaction = self.database.begin_write()?;
+        let write = |database: &Database| -> Result<(), redb::Error> {
+            let transaction = database.begin_write()?;
             transaction
                 .open_table(SCANS)?
                 .insert(scan.id.as_str(), bytes.as_slice())?;
             transaction.commit()?;
             Ok(())
         };
-        write().map_err(|e| self.unusable(&e))
+        self.with(write)
     }
 
     /// All jobs, oldest first.
     pub(crate) fn jobs(&self) -> Result<Vec<Job>, StoreError> {
-        let read = || -> Result<Vec<Vec<u8>>, redb::Error> {
-            let table = self.database.begin_read()?.open_table(JOBS)?;
+        let read = |database: &Database| -> Result<Vec<Vec<u8>>, redb::Error> {
+            let table = database.begin_read()?.open_table(JOBS)?;
             table
                 .iter()?
                 .map(|row| Ok(row?.1.value().to_vec()))
                 .collect()
         };
-        self.decode_all(read().map_err(|e| self.unusable(&e))?)
+        self.decode_all(self.with(read)?)
     }
 
     /// One job.
     pub(crate) fn job(&self, id: JobId) -> Result<Option<Job>, StoreError> {
-        let read = || -> Result<Option<Vec<u8>>, redb::Error> {
-            let table = self.database.begin_read()?.open_table(JOBS)?;
+        let read = |database: &Database| -> Result<Option<Vec<u8>>, redb::Error> {
+            let table = database.begin_read()?.open_table(JOBS)?;
             Ok(table.get(id)?.map(|bytes| bytes.value().to_vec()))
         };
-        let bytes = read().map_err(|e| self.unusable(&e))?;
+        let bytes = self.with(read)?;
         bytes.map(|bytes| self.decode(&bytes)).transpose()
     }
 
     /// Keeps a job's record in place of any earlier one.
     pub(crate) fn put_job(&self, job: &Job) -> Result<(), StoreError> {
         let bytes = self.encode(job)?;
-        let write = || -> Result<(), redb::Error> {
-            let transaction = self.database.begin_write()?;
+        let write = |database: &Database| -> Result<(), redb::Error> {
+            let transaction = database.begin_write()?;
             transaction
                 .open_table(JOBS)?
                 .insert(job.id, bytes.as_slice())?;
             transaction.commit()?;
             Ok(())
         };
-        write().map_err(|e| self.unusable(&e))
+        self.with(write)
     }
 
     /// Keeps a new job under the next number, and notes it on its scan, both or neither.
     /// `finished` is the state in which the scan is kept.
     pub(crate) fn add_job(&self, mut job: Job, scan: &mut Scan) -> Result<Job, StoreError> {
-        let write = || -> Result<Job, redb::Error> {
-            let transaction = self.database.begin_write()?;
+        let write = |database: &Database| -> Result<Job, redb::Error> {
+            let transaction = database.begin_write()?;
             {
                 let mut jobs = transaction.open_table(JOBS)?;
                 job.id = jobs.last()?.map_or(1, |(id, _)| id.value() + 1);
@@ -188,7 +235,7 @@ impl Store {
             transaction.commit()?;
             Ok(job)
         };
-        write().map_err(|e| self.unusable(&e))
+        self.with(write)
     }
 
     fn encode<T: Serialize>(&self, record: &T) -> Result<Vec<u8>, StoreError> {
@@ -224,5 +271,27 @@ impl Store {
             path: self.path.clone(),
             message: error.to_string(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn who_waits_for_the_records_has_them_as_soon_as_they_are_closed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("store");
+        let first = Store::open(&path).unwrap();
+        let error = Store::open_soon(&path, Duration::ZERO).await.unwrap_err();
+        assert!(matches!(error, StoreError::Locked { .. }), "{error}");
+        let (second, ()) = tokio::join!(
+            // Far longer than this takes.
+            Store::open_soon(&path, Duration::from_secs(600)),
+            async { first.close() }
+        );
+        assert_eq!(second.unwrap().jobs().unwrap(), []);
+        let error = first.jobs().unwrap_err();
+        assert!(matches!(error, StoreError::Closed { .. }), "{error}");
     }
 }

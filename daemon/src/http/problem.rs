@@ -9,6 +9,7 @@ use scanner_driver::ScannerError;
 use serde::de::DeserializeOwned;
 
 use crate::error::ServiceError;
+use crate::store::StoreError;
 
 /// A refused request.
 #[derive(Debug)]
@@ -64,7 +65,7 @@ impl From<ServiceError> for Refusal {
     fn from(error: ServiceError) -> Self {
         use StatusCode as S;
         let (status, kind, hint): (_, _, Option<String>) = match &error {
-            ServiceError::Stopping => (
+            ServiceError::Stopping | ServiceError::Store(StoreError::Closed { .. }) => (
                 S::SERVICE_UNAVAILABLE,
                 "service-stopping",
                 Some("try again once it runs again".into()),

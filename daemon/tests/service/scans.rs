@@ -224,6 +224,32 @@ async fn stopping_the_service_ends_its_scan_with_the_laser_off() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_service_can_follow_another_at_once() {
+    let mut rig = Rig::new().await;
+    let mut streams = Vec::new();
+    for round in 0..40 {
+        // Open streams, one of which nobody reads; on every other round a scan under way.
+        let mut events = rig.client.events().await;
+        streams.push(rig.client.events().await);
+        if round % 2 == 0 {
+            rig.scanner.allow(2);
+            rig.start_scan("cut").await;
+            events
+                .until(|event| matches!(event, Event::Column { columns: 2, .. }).then_some(()))
+                .await;
+        }
+        rig.daemon.shutdown().await;
+        // Without any waiting: what has ended holds nothing.
+        let store = redb::Database::create(rig.folder.path().join("state/reliefd.redb"));
+        drop(store.unwrap());
+        rig = Rig::start(rig.folder, |_| {}).await;
+    }
+    let list: ScanList = rig.client.get(path::SCANS).await;
+    assert_eq!(list.scans.len(), 20);
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn streamed_and_regridded_give_the_same_bytes() {
     let rig = Rig::new().await;
     let (scan, _) = rig.scan_to_result("same").await;
