@@ -2,7 +2,7 @@ use relief_api::{Event, Job, JobState, Rerun, Scan, ScanState, Status, path};
 use serde_json::json;
 
 use crate::client::Events;
-use crate::rig::{Rig, ended, job_becomes, job_over, json as read_json};
+use crate::rig::{Rig, ended, job_over, json as read_json};
 
 /// Settings with which regridding takes a hundred times longer than a scan.
 fn endless() -> Rerun {
@@ -175,7 +175,7 @@ async fn an_unwritable_spool_fails_the_job_and_a_retry_mends_it() {
     std::fs::remove_file(&spool).unwrap();
     std::fs::create_dir(&spool).unwrap();
     let _: Job = rig.client.ask(&path::job_retry(job.id)).await;
-    let job = job_becomes(&mut events, job.id, JobState::is_over).await;
+    let job = job_over(&mut events, &rig, job.id).await;
     assert_eq!(
         (job.state, job.attempts),
         (JobState::Done, 2),

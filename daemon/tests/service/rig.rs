@@ -86,26 +86,20 @@ pub(crate) async fn ended(events: &mut Events, id: &str) -> Scan {
     events.until(find).await.1
 }
 
-/// Waits for a job's end, which may be over already.
+/// Waits for a job's end, which may be over already. The stream may still hold the end of
+/// an earlier attempt, so that it only tells when to ask again.
 pub(crate) async fn job_over(events: &mut Events, rig: &Rig, id: JobId) -> Job {
-    let job: Job = rig.client.get(&path::job(id)).await;
-    if job.state.is_over() {
-        return job;
+    loop {
+        let job: Job = rig.client.get(&path::job(id)).await;
+        if job.state.is_over() {
+            return job;
+        }
+        let over = |event: &Event| match event {
+            Event::Job(job) if job.id == id && job.state.is_over() => Some(()),
+            _ => None,
+        };
+        events.until(over).await;
     }
-    job_becomes(events, id, JobState::is_over).await
-}
-
-/// Waits for a job to be told in a state.
-pub(crate) async fn job_becomes(
-    events: &mut Events,
-    id: JobId,
-    wanted: impl Fn(JobState) -> bool,
-) -> Job {
-    let find = |event: &Event| match event {
-        Event::Job(job) if job.id == id && wanted(job.state) => Some(job.clone()),
-        _ => None,
-    };
-    events.until(find).await.1
 }
 
 pub(crate) fn json(path: &Path) -> serde_json::Value {
