@@ -22,6 +22,8 @@ pub enum Purpose {
     Line = 5,
     /// The lie of a column's rays.
     Fan = 6,
+    /// The shape of a scene that is drawn from a seed.
+    Scene = 7,
 }
 
 /// A stream of draws.

@@ -4,7 +4,12 @@
 //! [`rig`] starts them and waits on events, never for a while. [`direct`] takes the other
 //! road from a scan to a CAD file, without a service, for comparison. The tests proper lie
 //! in `tests/`; the program `scan-scene` scans a scene for judges outside.
+//!
+//! The program `study-segmentation` judges the segmentation: [`scenes`] draws objects from
+//! seeds, scans them and knows the face over each node; [`score`] compares labels with it.
 
 pub mod direct;
 pub mod iges;
 pub mod rig;
+pub mod scenes;
+pub mod score;

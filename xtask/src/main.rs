@@ -3,6 +3,7 @@
 mod judge;
 mod rules;
 mod shell;
+mod study;
 
 use clap::{Parser, Subcommand};
 
@@ -22,6 +23,9 @@ enum Chore {
     ///
     /// Needs Python 3; installs the judge's packages into `target/judges`.
     Judge(judge::Options),
+    /// Measure one part of the product at length.
+    #[command(subcommand)]
+    Study(study::Study),
     /// Everything: tests, lints, rules, judges with all seeds, FreeCAD.
     Full,
 }
@@ -30,6 +34,7 @@ fn main() -> anyhow::Result<()> {
     match Arguments::parse().chore {
         Chore::Rules => rules::check(),
         Chore::Judge(options) => judge::run(&options),
+        Chore::Study(study) => study::run(&study),
         Chore::Full => full(),
     }
 }

@@ -67,7 +67,7 @@ pub struct Overrides {
 }
 
 /// Why a scanner cannot be made.
-#[derive(Debug, Error, PartialEq)]
+#[derive(Debug, Clone, Error, PartialEq)]
 pub enum SetupError {
     /// A setting is out of its range.
     #[error("{0}")]

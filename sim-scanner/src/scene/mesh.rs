@@ -95,10 +95,32 @@ impl Mesh {
                 normals.push(normal.normalize());
             }
         }
+        let groups = coplanar_groups(&indices, &normals);
+        Self::grouped(vertices_mm, indices, groups)
+    }
+
+    /// A mesh that stands for one curved face, whatever the angles between its triangles.
+    ///
+    /// # Errors
+    /// As [`Mesh::new`].
+    pub fn one_face(
+        vertices_mm: Vec<Vec3>,
+        faces: impl IntoIterator<Item = [usize; 3]>,
+    ) -> Result<Self, StlError> {
+        let mut mesh = Self::new(vertices_mm, faces)?;
+        mesh.groups.fill(0);
+        mesh.group_count = 1;
+        Ok(mesh)
+    }
+
+    fn grouped(
+        vertices_mm: Vec<Vec3>,
+        indices: Vec<[u32; 3]>,
+        groups: Vec<usize>,
+    ) -> Result<Self, StlError> {
         if indices.is_empty() {
             return Err(StlError::Empty);
         }
-        let groups = coplanar_groups(&indices, &normals);
         let group_count = groups.iter().max().map_or(0, |last| last + 1);
         let triangles = TriMesh::new(vertices_mm, indices)
             .map_err(|error| StlError::Build(error.to_string()))?;
@@ -216,6 +238,19 @@ mod tests {
         assert!(normal.distance(Vec3::Z) < 1e-12);
         assert_eq!(hit(-0.5, 0.25).map(|(_, _, g)| g), Some(group));
         assert!(hit(1.5, 0.0).is_none());
+    }
+
+    #[test]
+    fn a_curved_face_is_one_whatever_its_triangles() {
+        let vertices = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(1.0, 1.0, 0.4)];
+        let faces = [[0, 1, 2], [1, 3, 2]];
+        let bent = Mesh::new(vertices.clone(), faces).expect("two triangles");
+        assert_eq!(bent.group_count(), 2);
+        let face = Mesh::one_face(vertices, faces).expect("two triangles");
+        assert_eq!(face.group_count(), 1);
+        let hit = face.enter(Vec3::new(0.8, 0.8, 9.0), Vec3::NEG_Z);
+        assert_eq!(hit.map(|(_, _, group)| group), Some(0));
+        assert!(Mesh::one_face(Vec::new(), []).is_err());
     }
 
     #[test]

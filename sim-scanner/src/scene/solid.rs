@@ -1,4 +1,4 @@
-//! Convex solids bounded by planes, cylinders and spheres, met in closed form.
+//! Convex solids bounded by planes, cylinders, spheres and cones, met in closed form.
 
 use crate::Vec3;
 
@@ -27,6 +27,15 @@ pub enum Surface {
         centre_mm: Vec3,
         /// Radius, millimetres.
         radius_mm: f64,
+    },
+    /// The points that an apex sees within an angle of an axis.
+    Cone {
+        /// The apex, millimetres.
+        apex_mm: Vec3,
+        /// Unit direction of the axis, from the apex into the solid.
+        axis: Vec3,
+        /// Angle between axis and side, radians, below a right angle.
+        half_angle_rad: f64,
     },
 }
 
@@ -60,6 +69,11 @@ impl Surface {
                 centre_mm,
                 radius_mm,
             } => quadratic_span(direction, origin - centre_mm, radius_mm),
+            Self::Cone {
+                apex_mm,
+                axis,
+                half_angle_rad,
+            } => cone_span(direction, origin - apex_mm, axis, half_angle_rad),
         }
     }
 
@@ -77,6 +91,21 @@ impl Surface {
                 centre_mm,
                 radius_mm,
             } => point_mm.distance(centre_mm) - radius_mm,
+            Self::Cone {
+                apex_mm,
+                axis,
+                half_angle_rad,
+            } => {
+                let offset = point_mm - apex_mm;
+                let (sin, cos) = libm::sincos(half_angle_rad);
+                let (along, across) = (axis.dot(offset), axis.cross(offset).length());
+                // Behind the apex the apex itself is nearest.
+                if along * cos + across * sin < 0.0 {
+                    offset.length()
+                } else {
+                    across * cos - along * sin
+                }
+            }
         }
     }
 
@@ -90,6 +119,16 @@ impl Surface {
                 (offset - axis * axis.dot(offset)).normalize_or_zero()
             }
             Self::Sphere { centre_mm, .. } => (point_mm - centre_mm).normalize_or_zero(),
+            Self::Cone {
+                apex_mm,
+                axis,
+                half_angle_rad,
+            } => {
+                let offset = point_mm - apex_mm;
+                let across = (offset - axis * axis.dot(offset)).normalize_or_zero();
+                let (sin, cos) = libm::sincos(half_angle_rad);
+                (across * cos - axis * sin).normalize_or_zero()
+            }
         }
     }
 }
@@ -110,6 +149,51 @@ fn quadratic_span(across: Vec3, offset: Vec3, radius: f64) -> Option<(f64, f64)>
     }
     let half = libm::sqrt(reach);
     Some((foot_at - half, foot_at + half))
+}
+
+/// Where `offset + t direction`, seen from the apex, is within the angle of the axis.
+fn cone_span(
+    direction: Vec3,
+    offset: Vec3,
+    axis: Vec3,
+    half_angle_rad: f64,
+) -> Option<(f64, f64)> {
+    let cos2 = libm::cos(half_angle_rad) * libm::cos(half_angle_rad);
+    // (axis . p)^2 - cos^2 p^2 is above 0 inside of the cone and of its mirror image. Counted
+    // from the ray's nearest point to the apex, since far origins would cost digits.
+    let foot_at = -direction.dot(offset);
+    let foot = offset + direction * foot_at;
+    let (ahead, height) = (axis.dot(direction), axis.dot(foot));
+    let a = ahead * ahead - cos2;
+    let b = ahead * height;
+    let c = height * height - cos2 * foot.length_squared();
+    let forwards = |t: f64| height + ahead * t >= 0.0;
+    if a == 0.0 {
+        // Along the side: in at one end, or never.
+        let root = -c / (2.0 * b);
+        return match () {
+            () if b > 0.0 && ahead > 0.0 => Some((foot_at + root, f64::INFINITY)),
+            () if b < 0.0 && ahead < 0.0 => Some((f64::NEG_INFINITY, foot_at + root)),
+            () => None,
+        };
+    }
+    let square = b * b - a * c;
+    if a < 0.0 {
+        if square < 0.0 {
+            return None;
+        }
+        let root = libm::sqrt(square);
+        let (low, high) = ((-b + root) / a, (-b - root) / a);
+        return forwards((low + high) / 2.0).then_some((foot_at + low, foot_at + high));
+    }
+    // Steeper than the side: every such ray is inside at one end.
+    let root = libm::sqrt(square.max(0.0));
+    let (low, high) = ((-b - root) / a, (-b + root) / a);
+    Some(if ahead > 0.0 {
+        (foot_at + high, f64::INFINITY)
+    } else {
+        (f64::NEG_INFINITY, foot_at + low)
+    })
 }
 
 /// The common inside of its bounding surfaces.
@@ -201,6 +285,47 @@ mod tests {
                 .is_none()
         );
         assert!(ball.enter(Vec3::new(1.0, 2.0, 753.0), Vec3::Z).is_none());
+    }
+
+    #[test]
+    fn a_cone_is_entered_on_its_side_and_on_its_side_only() {
+        let (axis, half_angle_rad) = (Vec3::new(0.2, -0.3, -0.9).normalize(), 0.5);
+        let apex_mm = Vec3::new(4.0, -2.0, 12.0);
+        let cone = Surface::Cone {
+            apex_mm,
+            axis,
+            half_angle_rad,
+        };
+        let hat = ConvexSolid::new(vec![
+            cone,
+            Surface::Plane {
+                normal: axis,
+                offset_mm: axis.dot(apex_mm) + 30.0,
+            },
+        ]);
+        let mut met = [0; 2];
+        for k in 0..2000 {
+            let turn = f64::from(k);
+            let side = if k % 3 == 0 { -600.0 } else { 400.0 };
+            let origin = Vec3::new(500.0 * libm::sin(turn), 400.0 * libm::cos(turn * 1.3), side);
+            let aim = apex_mm + axis * (f64::from(k % 40) - 5.0) + Vec3::X * f64::from(k % 23);
+            let direction = (aim - origin).normalize();
+            let Some((distance, normal, face)) = hat.enter(origin, direction) else {
+                // Then no place along the ray is inside.
+                for step in 0..4000 {
+                    let point = origin + direction * (f64::from(step) * 0.3);
+                    assert!(!hat.contains(point, -0.2), "{k} {step}");
+                }
+                continue;
+            };
+            met[face] += 1;
+            let point = origin + direction * distance;
+            assert!(hat.contains(point, 1e-7), "{k}");
+            assert!(!hat.contains(point - direction * 0.01, 0.0), "{k}");
+            assert!(hat.faces()[face].signed_distance_mm(point).abs() < 1e-7);
+            assert!(normal.dot(direction) <= 0.0 && (normal.length() - 1.0).abs() < 1e-12);
+        }
+        assert!(met.iter().all(|count| *count > 50), "{met:?}");
     }
 
     #[test]

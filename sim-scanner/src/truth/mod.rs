@@ -36,6 +36,8 @@ pub struct SampleTruth {
 pub struct GraphNode {
     /// Height, millimetres.
     pub z_mm: f64,
+    /// Unit normal there, out of the body.
+    pub normal: Vec3,
     /// The face met.
     pub face: FaceId,
     /// Whether light comes back from that point: laser and sensor both see it along their
@@ -128,6 +130,7 @@ pub fn graph_node(scanner: &Scanner, x_mm: f64, y_mm: f64) -> Option<GraphNode> 
     let lit = hit.normal.dot(beam) > libm::cos(scanner.noise.incidence_max_rad);
     Some(GraphNode {
         z_mm: hit.point_mm.z,
+        normal: hit.normal,
         face: hit.face,
         seen: lit && sees(optics.laser_mm(x_mm)) && sees(optics.sensor_mm(x_mm)),
     })

@@ -109,7 +109,9 @@ pub(super) fn visible_faces(
                 let side = side.ok_or(TruthError::Surface(index))?;
                 side.visible(viewers, id)
             }
-            Surface::Sphere { .. } => return Err(TruthError::Surface(index)),
+            Surface::Sphere { .. } | Surface::Cone { .. } => {
+                return Err(TruthError::Surface(index));
+            }
         };
         faces.extend(face);
     }
@@ -235,7 +237,7 @@ fn side_of(solid: &ConvexSolid) -> Option<Side> {
                 radius_mm,
             } => found = Some((base_mm, axis, radius_mm)),
             Surface::Plane { normal, offset_mm } => ends.push((normal, offset_mm)),
-            Surface::Sphere { .. } => return None,
+            Surface::Sphere { .. } | Surface::Cone { .. } => return None,
         }
     }
     let (base_mm, axis, radius_mm) = found?;

@@ -1,0 +1,68 @@
+//! What is judged.
+
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use range_image::{RangeImage, Unmonitored};
+use relief_tests::scenes::View;
+use segment::SegmentSettings;
+
+use crate::material::Subject;
+
+/// A segmentation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Method {
+    /// The service's default.
+    Relief,
+    /// The baseline of the paper.
+    ShimLee,
+}
+
+impl Method {
+    pub(crate) const OURS: [Self; 2] = [Self::Relief, Self::ShimLee];
+
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Relief => "relief",
+            Self::ShimLee => "shim-lee",
+        }
+    }
+}
+
+/// The labels that a method gave to the nodes of an image.
+#[derive(Debug)]
+pub(crate) struct Labelled {
+    pub(crate) method: Method,
+    pub(crate) labels: Vec<u16>,
+    pub(crate) seconds: f64,
+}
+
+/// The labels by each of our methods.
+pub(crate) fn all(subject: &Subject, image: &RangeImage, view: View) -> Result<Vec<Labelled>> {
+    Method::OURS
+        .into_iter()
+        .map(|method| {
+            let started = Instant::now();
+            let labels = ours(method, image)
+                .with_context(|| format!("{} {}", subject.set.name(), subject.seed))?;
+            Ok(Labelled {
+                method,
+                labels,
+                seconds: started.elapsed().as_secs_f64(),
+            })
+        })
+        .collect::<Result<_>>()
+        .with_context(|| format!("view {}", view.name()))
+}
+
+fn ours(method: Method, image: &RangeImage) -> Result<Vec<u16>> {
+    let settings = SegmentSettings {
+        method: match method {
+            Method::Relief => segment::Method::Relief,
+            Method::ShimLee => segment::Method::ShimLee,
+        },
+        ..pipeline::Settings::new(image.pitch_mm()).segment
+    };
+    let regions = segment::segment(image, &settings, &Unmonitored)?;
+    Ok(regions.raw_labels().to_vec())
+}

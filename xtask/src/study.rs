@@ -1,0 +1,36 @@
+//! Studies: longer measurements, with their tables.
+
+use std::ffi::OsString;
+
+use anyhow::Result;
+use clap::Subcommand;
+
+use crate::shell;
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Study {
+    /// Score the segmentation on scenes whose true faces are known.
+    #[command(disable_help_flag = true)]
+    Segmentation {
+        /// Options of the study; `--help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
+}
+
+pub(crate) fn run(study: &Study) -> Result<()> {
+    match study {
+        Study::Segmentation { options } => program("study-segmentation", options),
+    }
+}
+
+/// Runs a program of the tests' crate, built for speed.
+fn program(name: &str, options: &[OsString]) -> Result<()> {
+    let mut words: Vec<String> = ["run", "--release", "--package", "relief-tests", "--bin", name]
+        .map(String::from)
+        .to_vec();
+    words.push("--".into());
+    words.extend(options.iter().map(|o| o.to_string_lossy().into_owned()));
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    shell::run("cargo", &words)
+}
