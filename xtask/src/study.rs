@@ -26,9 +26,16 @@ pub(crate) fn run(study: &Study) -> Result<()> {
 
 /// Runs a program of the tests' crate, built for speed.
 fn program(name: &str, options: &[OsString]) -> Result<()> {
-    let mut words: Vec<String> = ["run", "--release", "--package", "relief-tests", "--bin", name]
-        .map(String::from)
-        .to_vec();
+    let mut words: Vec<String> = [
+        "run",
+        "--release",
+        "--package",
+        "relief-tests",
+        "--bin",
+        name,
+    ]
+    .map(String::from)
+    .to_vec();
     words.push("--".into());
     words.extend(options.iter().map(|o| o.to_string_lossy().into_owned()));
     let words: Vec<&str> = words.iter().map(String::as_str).collect();

@@ -152,12 +152,7 @@ fn quadratic_span(across: Vec3, offset: Vec3, radius: f64) -> Option<(f64, f64)>
 }
 
 /// Where `offset + t direction`, seen from the apex, is within the angle of the axis.
-fn cone_span(
-    direction: Vec3,
-    offset: Vec3,
-    axis: Vec3,
-    half_angle_rad: f64,
-) -> Option<(f64, f64)> {
+fn cone_span(direction: Vec3, offset: Vec3, axis: Vec3, half_angle_rad: f64) -> Option<(f64, f64)> {
     let cos2 = libm::cos(half_angle_rad) * libm::cos(half_angle_rad);
     // (axis . p)^2 - cos^2 p^2 is above 0 inside of the cone and of its mirror image. Counted
     // from the ray's nearest point to the apex, since far origins would cost digits.

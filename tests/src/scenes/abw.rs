@@ -25,7 +25,14 @@ pub(super) fn draw(dice: &mut Dice) -> (&'static str, Vec<Body>) {
     for _ in 0..dice.count(3, 5) {
         object(dice, &pose, &mut bodies);
     }
-    (if wall.is_some() { "floor and wall" } else { "floor" }, bodies)
+    (
+        if wall.is_some() {
+            "floor and wall"
+        } else {
+            "floor"
+        },
+        bodies,
+    )
 }
 
 /// Planes without end; what is stated as their extent is what the scan covers of them.
@@ -68,7 +75,12 @@ fn object(dice: &mut Dice, pose: &Pose, bodies: &mut Vec<Body>) {
         0 => bodies.extend(polyhedron(&block(x, y, height), &place)),
         1 => bodies.extend(polyhedron(&wedge(dice, x, y, height), &place)),
         2 => {
-            let prism = frustum(dice.count(3, 6), x.max(14.0), dice.degrees(0.0, 35.0), height);
+            let prism = frustum(
+                dice.count(3, 6),
+                x.max(14.0),
+                dice.degrees(0.0, 35.0),
+                height,
+            );
             bodies.extend(polyhedron(&prism, &place));
         }
         3 => bodies.extend(polyhedron(

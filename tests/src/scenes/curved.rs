@@ -171,13 +171,23 @@ fn capsule(dice: &mut Dice, place: &Pose) -> Vec<Body> {
     let end = DVec3::X * length;
     let caps = [half(DVec3::X, length), half(DVec3::NEG_X, length)];
     let up = DVec3::Z * height;
-    let mut bodies = vec![round(side, &caps, (up - end - reach, up + end + reach), place)];
+    let mut bodies = vec![round(
+        side,
+        &caps,
+        (up - end - reach, up + end + reach),
+        place,
+    )];
     for centre_mm in [up - end, up + end] {
         let ball = Surface::Sphere {
             centre_mm,
             radius_mm,
         };
-        bodies.push(round(ball, &[], (centre_mm - reach, centre_mm + reach), place));
+        bodies.push(round(
+            ball,
+            &[],
+            (centre_mm - reach, centre_mm + reach),
+            place,
+        ));
     }
     bodies
 }
@@ -190,7 +200,12 @@ fn free_form(dice: &mut Dice, pose: &Pose) -> Vec<Body> {
             // Radius of curvature above 12 mm each, slopes below 0.4.
             let height = length / TAU * dice.between(0.1, 0.35);
             let (sin, cos) = libm::sincos(dice.turn());
-            (height, TAU / length * cos, TAU / length * sin, dice.between(-PI, PI))
+            (
+                height,
+                TAU / length * cos,
+                TAU / length * sin,
+                dice.between(-PI, PI),
+            )
         })
         .collect();
     let share = libm::sqrt(waves.len() as f64);

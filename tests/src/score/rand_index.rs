@@ -31,7 +31,11 @@ pub fn adjusted_rand_index(one: &[u16], other: &[u16]) -> Agreement {
     let in_one: f64 = overlaps.truth().map(|(_, size)| pairs(size)).sum();
     let in_other: f64 = overlaps.machine().map(|(_, size)| pairs(size)).sum();
     let all = pairs(nodes);
-    let by_chance = if all > 0.0 { in_one * in_other / all } else { 0.0 };
+    let by_chance = if all > 0.0 {
+        in_one * in_other / all
+    } else {
+        0.0
+    };
     let most = (in_one + in_other) / 2.0;
     let index = if most > by_chance {
         (together - by_chance) / (most - by_chance)

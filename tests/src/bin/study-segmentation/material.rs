@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
-use range_image::{Lattice, RangeImage};
+use range_image::{Lattice, NodeQuality, RangeImage};
 use relief_tests::scenes::truth::Region;
 use relief_tests::scenes::{self, Drawn, Set, Truth, View, scan};
 use sha2::{Digest, Sha256};
@@ -49,12 +49,14 @@ impl Store {
         for source in SOURCES {
             add(&mut hash, &root.join(source))?;
         }
-        let key: String = hash.finalize()[..8].iter().map(|b| format!("{b:02x}")).collect();
-        let target = std::env::var_os("CARGO_TARGET_DIR")
-            .map_or_else(|| root.join("target"), PathBuf::from);
+        let key: String = hash.finalize()[..8]
+            .iter()
+            .map(|b| format!("{b:02x}"))
+            .collect();
+        let target =
+            std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
         let folder = target.join("studies/segmentation").join(key);
-        fs::create_dir_all(&folder)
-            .with_context(|| format!("cannot make {}", folder.display()))?;
+        fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
         Ok(Self { folder })
     }
 
@@ -68,7 +70,7 @@ impl Store {
         let name = format!("{}-{seed}", set.name());
         let truth_file = self.folder.join(format!("{name}.truth"));
         let mut drawn: Option<Drawn> = None;
-        let subject = match read(&truth_file, |bytes| read_truth(bytes))? {
+        let subject = match read(&truth_file, read_truth)? {
             Some((kind, truth)) => Subject {
                 set,
                 seed,
@@ -89,7 +91,7 @@ impl Store {
         let mut images = Vec::new();
         for view in views {
             let file = self.folder.join(format!("{name}-{}.image", view.name()));
-            let image = match read(&file, |bytes| read_image(bytes))? {
+            let image = match read(&file, read_image)? {
                 Some(image) => image,
                 None => {
                     let drawn = match &drawn {
@@ -130,11 +132,7 @@ fn read<T>(path: &Path, take: impl FnOnce(&mut Bytes<'_>) -> Option<T>) -> Resul
     }
     let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let taken = take(&mut Bytes(&bytes));
-    ensure!(
-        taken.is_some(),
-        "{} is damaged: remove it",
-        path.display()
-    );
+    ensure!(taken.is_some(), "{} is damaged: remove it", path.display());
     Ok(taken)
 }
 
@@ -173,8 +171,17 @@ fn image_bytes(image: &RangeImage) -> Vec<u8> {
     for number in [i, j, image.columns() as i64, image.rows() as i64] {
         out.extend(number.to_le_bytes());
     }
-    for z in image.raw_z_mm() {
+    for (node, z) in image.raw_z_mm().iter().enumerate() {
         out.extend(z.to_le_bytes());
+        if z.is_nan() {
+            continue;
+        }
+        let (column, row) = (node / image.rows(), node % image.rows());
+        let quality = image.quality(column, row).unwrap_or_default();
+        let counts = [quality.inliers, quality.samples, 0, 0].map(u16::to_le_bytes);
+        out.extend(counts.concat());
+        let lengths = [quality.scale_mm, quality.nearest_mm].map(f32::to_le_bytes);
+        out.extend(lengths.concat());
     }
     out
 }
@@ -187,7 +194,22 @@ fn read_image(bytes: &mut Bytes<'_>) -> Option<RangeImage> {
     for column in 0..columns {
         for row in 0..rows {
             let z = bytes.number()?;
-            image.set_z_mm(column, row, (!z.is_nan()).then_some(z));
+            if z.is_nan() {
+                continue;
+            }
+            image.set_z_mm(column, row, Some(z));
+            let [a, b, c, d, ..] = bytes.take()?;
+            let [e, f, g, h, i, j, k, l] = bytes.take()?;
+            let quality = NodeQuality {
+                inliers: u16::from_le_bytes([a, b]),
+                samples: u16::from_le_bytes([c, d]),
+                scale_mm: f32::from_le_bytes([e, f, g, h]),
+                nearest_mm: f32::from_le_bytes([i, j, k, l]),
+            };
+            // Set only where one is known, so that an image without any stays so.
+            if quality.samples > 0 {
+                image.set_quality(column, row, quality);
+            }
         }
     }
     Some(image)

@@ -51,7 +51,12 @@ pub(crate) fn write(
             }
         }
     }
-    let name = format!("{}-{}-{}.png", subject.set.name(), subject.seed, view.name());
+    let name = format!(
+        "{}-{}-{}.png",
+        subject.set.name(),
+        subject.seed,
+        view.name()
+    );
     let path = folder.join(name);
     let file = File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
     let mut encoder = png::Encoder::new(BufWriter::new(file), width as u32, rows as u32);
@@ -81,7 +86,11 @@ fn paint(label: u16) -> [u8; 3] {
 fn shaded(z_mm: &[f64], columns: usize, rows: usize, pitch_mm: f64) -> Vec<[u8; 3]> {
     let at = |column: usize, row: usize| {
         let inside = column < columns && row < rows;
-        if inside { z_mm[column * rows + row] } else { f64::NAN }
+        if inside {
+            z_mm[column * rows + row]
+        } else {
+            f64::NAN
+        }
     };
     (0..columns)
         .flat_map(|column| (0..rows).map(move |row| (column, row)))
@@ -90,7 +99,13 @@ fn shaded(z_mm: &[f64], columns: usize, rows: usize, pitch_mm: f64) -> Vec<[u8; 
             if here.is_nan() {
                 return [0, 0, 60];
             }
-            let slope = |other: f64| if other.is_nan() { 0.0 } else { (other - here) / pitch_mm };
+            let slope = |other: f64| {
+                if other.is_nan() {
+                    0.0
+                } else {
+                    (other - here) / pitch_mm
+                }
+            };
             let (p, q) = (slope(at(column + 1, row)), slope(at(column, row + 1)));
             let light = (1.0 + 0.5 * p - 0.5 * q) / (1.0 + p * p + q * q).sqrt() / 1.23;
             [(60.0 + 195.0 * light.clamp(0.0, 1.0)) as u8; 3]

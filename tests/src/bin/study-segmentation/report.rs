@@ -21,7 +21,10 @@ pub(crate) fn print(set: Set, view: View, tallies: &[Tally], findings: &[Vec<Fin
     for tolerance in TOLERANCES {
         print!("{:>8}", format!("{:.0} %", tolerance * 100.0));
     }
-    println!("{:>8}{:>8}{:>8}{:>10}{:>9}", "over", "under", "missed", "noise/sc.", "s/scene");
+    println!(
+        "{:>8}{:>8}{:>8}{:>10}{:>9}",
+        "over", "under", "missed", "noise/sc.", "s/scene"
+    );
     for tally in tallies {
         print!("{:<12}", tally.method.name());
         for counts in &tally.at {
@@ -66,7 +69,11 @@ pub(crate) fn print(set: Set, view: View, tallies: &[Tally], findings: &[Vec<Fin
                 failure.nodes,
                 failure.depth,
                 failure.valued * 100.0,
-                if shares.is_empty() { "none".into() } else { shares.join(", ") },
+                if shares.is_empty() {
+                    "none".into()
+                } else {
+                    shares.join(", ")
+                },
             );
         }
     }
@@ -93,11 +100,17 @@ pub(crate) fn check(set: Set, view: View, tallies: &[Tally]) -> bool {
     )];
     if view == View::Plain {
         bars.push((
-            format!("noise: {:.3} a scene, at most 0.05", relief.noise_per_scene()),
+            format!(
+                "noise: {:.3} a scene, at most 0.05",
+                relief.noise_per_scene()
+            ),
             relief.noise_per_scene() <= 0.05,
         ));
         if set == Set::Polyhedral {
-            bars.push((format!("missed: {}, none allowed", bar.missed), bar.missed == 0));
+            bars.push((
+                format!("missed: {}, none allowed", bar.missed),
+                bar.missed == 0,
+            ));
         }
     }
     for (what, holds) in &bars {
