@@ -5,8 +5,10 @@
 //! cargo xtask study segmentation --scene 17 --only abw --pictures pictures
 //! ```
 
+mod agree;
 mod material;
 mod methods;
+mod peers;
 mod pictures;
 mod report;
 mod tally;
@@ -21,6 +23,8 @@ use relief_tests::scenes::{Purpose, Set, View};
 
 use crate::material::Store;
 use crate::methods::Method;
+use crate::peers::Peer;
+use crate::report::Bar;
 use crate::tally::{Finding, Tally};
 
 /// Score the segmentation on scenes whose true faces are known
@@ -45,7 +49,22 @@ struct Options {
     /// Write truth and labels side by side as PNG files into this folder
     #[arg(long, value_name = "DIR")]
     pictures: Option<PathBuf>,
-    /// Fail unless the bars hold
+    /// Every way to scan, not one
+    #[arg(long, conflicts_with = "view")]
+    full: bool,
+    /// Run Open3D and CGAL on the same range images; installs what is not there
+    #[arg(long)]
+    peers: bool,
+    /// Other parameters for Open3D, to choose them on the scenes for tuning
+    #[arg(long, value_name = "WORDS", requires = "peers")]
+    open3d: Option<String>,
+    /// Other parameters for CGAL
+    #[arg(long, value_name = "WORDS", requires = "peers")]
+    cgal: Option<String>,
+    /// Write the tables to docs/studies/segmentation.md
+    #[arg(long)]
+    write: bool,
+    /// Fail unless every bar holds
     #[arg(long)]
     check: bool,
 }
@@ -101,6 +120,14 @@ impl Options {
         }
     }
 
+    fn parameters<'a>(&'a self, peer: &Peer, set: Set) -> &'a str {
+        let other = match peer.method {
+            Method::Open3d => &self.open3d,
+            _ => &self.cgal,
+        };
+        other.as_deref().unwrap_or_else(|| peer.parameters(set))
+    }
+
     fn view(&self) -> View {
         match self.view {
             ViewName::Plain => View::Plain,
@@ -124,40 +151,142 @@ fn main() -> ExitCode {
     }
 }
 
+/// Scenes of the ABW kind that are scanned at half the pitch: each has a million nodes.
+const ABW_HALF_PITCH: usize = 10;
+/// Scenes that a peer is given at once.
+const BATCH: usize = 5;
+
+/// Prints as it goes, and keeps what it printed.
+#[derive(Debug, Default)]
+struct Account(String);
+
+impl Account {
+    fn say(&mut self, text: &str) {
+        print!("{text}");
+        self.0.push_str(text);
+    }
+}
+
 /// Whether everything that was checked holds.
 fn run(options: &Options) -> Result<bool> {
     let store = Store::open()?;
-    let view = options.view();
+    let mut account = Account::default();
     if let Some(folder) = &options.pictures {
         std::fs::create_dir_all(folder)
             .with_context(|| format!("cannot make {}", folder.display()))?;
     }
-    let mut holds = true;
+    let (peers, missing) = if options.peers {
+        peers::ready()
+    } else {
+        Default::default()
+    };
+    for peer in &peers {
+        let (name, version) = (peer.method.name(), &peer.version);
+        account.say(&format!("\n{name} {version}: {}", peer.meaning()));
+        for set in options.sets() {
+            let parameters = options.parameters(peer, set);
+            account.say(&format!("; {} {parameters}", set.name()));
+        }
+        account.say(".\n");
+    }
+    for line in missing {
+        account.say(&format!("\n{line}\n"));
+    }
+    let mut bars = Vec::new();
     for set in options.sets() {
-        let findings: Vec<Vec<Finding>> = options
-            .seeds(set)
-            .into_par_iter()
-            .map(|seed| {
-                let (subject, images) = store.get(set, seed, &[view])?;
-                let image = images.first().context("no range image")?;
-                let labels = methods::all(&subject, image, view)?;
-                if let Some(folder) = &options.pictures {
-                    pictures::write(folder, &subject, image, view, &labels)?;
-                }
-                Ok(labels
-                    .iter()
-                    .map(|labelled| tally::judge(&subject, image, view, labelled))
-                    .collect())
-            })
-            .collect::<Result<_>>()?;
-        let tallies: Vec<Tally> = Method::OURS
-            .iter()
-            .map(|method| Tally::of(set, *method, findings.iter().flatten()))
-            .collect();
-        report::print(set, view, &tallies, &findings);
-        if options.check {
-            holds &= report::check(set, view, &tallies);
+        let seeds = options.seeds(set);
+        let view = options.view();
+        bars.extend(one_view(options, &store, set, view, &peers, &mut account)?);
+        if !options.full {
+            continue;
+        }
+        bars.extend(one_view(
+            options,
+            &store,
+            set,
+            View::Outliers,
+            &[],
+            &mut account,
+        )?);
+        for view in [View::Mirrored, View::HalfPitch, View::OtherSeed] {
+            let seeds = match (set, view) {
+                (Set::Abw, View::HalfPitch) => &seeds[..ABW_HALF_PITCH.min(seeds.len())],
+                _ => &seeds[..],
+            };
+            let agreed = agree::views(&store, set, seeds, view)?;
+            bars.push(report::agreement(set, &agreed));
+        }
+        if set != Set::Abw {
+            let found = agree::clutter(&store, set, &seeds)?;
+            bars.push(report::clutter(set, &found));
         }
     }
-    Ok(holds)
+    account.say(&report::verdicts(&bars));
+    if options.write {
+        let file = material::root().join("docs/studies/segmentation.md");
+        let text = format!("{}{}", include_str!("preface.md"), account.0);
+        std::fs::create_dir_all(file.parent().context("no folder")?)?;
+        std::fs::write(&file, text).with_context(|| format!("cannot write {}", file.display()))?;
+    }
+    Ok(!options.check || bars.iter().all(|bar| bar.holds))
+}
+
+/// Scores every method on the scenes of a set, scanned in one way.
+fn one_view(
+    options: &Options,
+    store: &Store,
+    set: Set,
+    view: View,
+    peers: &[Peer],
+    account: &mut Account,
+) -> Result<Vec<Bar>> {
+    let findings: Vec<Vec<Finding>> = options
+        .seeds(set)
+        .par_chunks(if peers.is_empty() { 1 } else { BATCH })
+        .map(|seeds| batch(options, store, set, view, seeds, peers))
+        .collect::<Result<_>>()?;
+    let findings: Vec<Finding> = findings.into_iter().flatten().collect();
+    let methods = Method::OURS
+        .into_iter()
+        .chain(peers.iter().map(|p| p.method));
+    let tallies: Vec<Tally> = methods
+        .map(|method| Tally::of(method, findings.iter()))
+        .collect();
+    account.say(&report::table(set, view, &tallies));
+    account.say(&report::failures(&findings));
+    Ok(report::bars(set, view, &tallies))
+}
+
+fn batch(
+    options: &Options,
+    store: &Store,
+    set: Set,
+    view: View,
+    seeds: &[u64],
+    peers: &[Peer],
+) -> Result<Vec<Finding>> {
+    let mut scenes = Vec::new();
+    for seed in seeds {
+        let (subject, images) = store.get(set, *seed, &[view])?;
+        let image = images.into_iter().next().context("no range image")?;
+        let labels = methods::all(&subject, &image, view)?;
+        scenes.push((subject, image, labels));
+    }
+    for peer in peers {
+        let parameters = options.parameters(peer, set);
+        let given: Vec<_> = scenes.iter().map(|(s, i, _)| (s, i)).collect();
+        let labelled = peer.label(parameters, &given)?;
+        for (scene, labelled) in scenes.iter_mut().zip(labelled) {
+            scene.2.push(labelled);
+        }
+    }
+    let mut findings = Vec::new();
+    for (subject, image, labels) in &scenes {
+        if let Some(folder) = &options.pictures {
+            pictures::write(folder, subject, image, view, labels)?;
+        }
+        let judged = labels.iter();
+        findings.extend(judged.map(|labelled| tally::judge(subject, image, view, labelled)));
+    }
+    Ok(findings)
 }

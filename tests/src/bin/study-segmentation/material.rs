@@ -31,6 +31,17 @@ pub(crate) struct Store {
     folder: PathBuf,
 }
 
+/// The workspace's folder.
+pub(crate) fn root() -> PathBuf {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR"));
+    own.parent().unwrap_or(own).to_owned()
+}
+
+/// Where builds and studies leave their files.
+pub(crate) fn target() -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from)
+}
+
 /// One scene as it is judged.
 #[derive(Debug)]
 pub(crate) struct Subject {
@@ -43,8 +54,7 @@ pub(crate) struct Subject {
 impl Store {
     /// The store for the sources as they are.
     pub(crate) fn open() -> Result<Self> {
-        let own = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let root = own.parent().unwrap_or(own);
+        let root = root();
         let mut hash = Sha256::new();
         for source in SOURCES {
             add(&mut hash, &root.join(source))?;
@@ -53,9 +63,7 @@ impl Store {
             .iter()
             .map(|b| format!("{b:02x}"))
             .collect();
-        let target =
-            std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
-        let folder = target.join("studies/segmentation").join(key);
+        let folder = target().join("studies/segmentation").join(key);
         fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
         Ok(Self { folder })
     }

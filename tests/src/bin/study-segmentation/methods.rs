@@ -16,6 +16,10 @@ pub(crate) enum Method {
     Relief,
     /// The baseline of the paper.
     ShimLee,
+    /// Planar patches of Open3D.
+    Open3d,
+    /// Region growing of CGAL.
+    Cgal,
 }
 
 impl Method {
@@ -25,6 +29,8 @@ impl Method {
         match self {
             Self::Relief => "relief",
             Self::ShimLee => "shim-lee",
+            Self::Open3d => "Open3D",
+            Self::Cgal => "CGAL",
         }
     }
 }
@@ -55,14 +61,21 @@ pub(crate) fn all(subject: &Subject, image: &RangeImage, view: View) -> Result<V
         .with_context(|| format!("view {}", view.name()))
 }
 
-fn ours(method: Method, image: &RangeImage) -> Result<Vec<u16>> {
+/// The labels by one of our methods.
+pub(crate) fn ours(method: Method, image: &RangeImage) -> Result<Vec<u16>> {
     let settings = SegmentSettings {
         method: match method {
-            Method::Relief => segment::Method::Relief,
             Method::ShimLee => segment::Method::ShimLee,
+            _ => segment::Method::Relief,
         },
         ..pipeline::Settings::new(image.pitch_mm()).segment
     };
     let regions = segment::segment(image, &settings, &Unmonitored)?;
     Ok(regions.raw_labels().to_vec())
+}
+
+/// The part's own faces by the default method. What stands around the part is taken off
+/// where a view shows it.
+pub(crate) fn part(image: &RangeImage, _view: View) -> Result<Vec<u16>> {
+    ours(Method::Relief, image)
 }

@@ -1,7 +1,7 @@
 //! From the labels of one scene to the figures of a set.
 
 use range_image::RangeImage;
-use relief_tests::scenes::{LEAST_NODES, Set, View};
+use relief_tests::scenes::{LEAST_NODES, View};
 use relief_tests::score::{MachineClass, Overlaps, TruthClass, classify};
 
 use crate::material::Subject;
@@ -225,11 +225,7 @@ pub(crate) struct Tally {
 
 impl Tally {
     /// Adds up the findings of a method.
-    pub(crate) fn of<'a>(
-        _set: Set,
-        method: Method,
-        findings: impl Iterator<Item = &'a Finding>,
-    ) -> Self {
+    pub(crate) fn of<'a>(method: Method, findings: impl Iterator<Item = &'a Finding>) -> Self {
         let mut tally = Self {
             method,
             scenes: 0,
