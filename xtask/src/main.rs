@@ -26,7 +26,7 @@ enum Chore {
     /// Measure one part of the product at length.
     #[command(subcommand)]
     Study(study::Study),
-    /// Everything: tests, lints, rules, judges with all seeds, FreeCAD.
+    /// Everything: tests, lints, rules, studies, judges with all seeds, FreeCAD.
     Full,
 }
 
@@ -58,5 +58,10 @@ fn full() -> anyhow::Result<()> {
         seeds: 10,
         freecad: true,
         out: None,
+    })?;
+    study::run(&study::Study::Segmentation {
+        options: ["--set", "judge", "--full", "--peers", "--check"]
+            .map(Into::into)
+            .to_vec(),
     })
 }

@@ -12,6 +12,8 @@ mod polyhedral;
 mod promise;
 pub mod scan;
 mod shapes;
+#[cfg(test)]
+mod tests;
 pub mod truth;
 
 use sim_scanner::preset::{Overrides, Preset};

@@ -16,7 +16,7 @@ mod tally;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::{Parser, ValueEnum};
 use rayon::prelude::*;
 use relief_tests::scenes::{Purpose, Set, View};
@@ -67,6 +67,9 @@ struct Options {
     /// Fail unless every bar holds
     #[arg(long)]
     check: bool,
+    /// Fail unless this share of the regions of each set is correct, whatever the bars
+    #[arg(long, value_name = "PERCENT")]
+    at_least: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -253,6 +256,14 @@ fn one_view(
         .map(|method| Tally::of(method, findings.iter()))
         .collect();
     account.say(&report::table(set, view, &tallies));
+    if let (Some(least), Some(relief)) = (options.at_least, tallies.first()) {
+        let share = relief.bar().correct_share() * 100.0;
+        ensure!(
+            share >= least,
+            "{}: {share:.2} % of regions are correct at 80 %, less than {least} %",
+            set.name()
+        );
+    }
     account.say(&report::failures(&findings));
     Ok(report::bars(set, view, &tallies))
 }
@@ -289,4 +300,15 @@ fn batch(
         findings.extend(judged.map(|labelled| tally::judge(subject, image, view, labelled)));
     }
     Ok(findings)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Options::command().debug_assert();
+    }
 }
