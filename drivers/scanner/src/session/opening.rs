@@ -36,6 +36,15 @@ impl Session {
             let error = self.version_error(reply.version, reply.version);
             return self.lose(error);
         }
+        // Nothing could be fed in that time, so that the laser would never stay on; and a
+        // device that means "never" would leave it on with nobody there.
+        if reply.dead_man_ms == 0 {
+            return self.lose(ScannerError::Protocol(
+                "it announces a dead-man time of 0 ms; it must turn the laser off by itself \
+                 after some milliseconds of silence, so see to its firmware"
+                    .to_owned(),
+            ));
+        }
         // A device that insists on a shorter time must be fed in that time.
         let dead_man = Duration::from_millis(u64::from(reply.dead_man_ms));
         let interval = (dead_man / 4).max(Duration::from_millis(1));

@@ -162,6 +162,19 @@ fn a_device_with_a_short_dead_man_time_is_fed_in_time() {
 }
 
 #[test]
+fn a_device_without_a_dead_man_time_is_refused() {
+    let mut bench = Bench::new(Device {
+        dead_man_limit_ms: 0,
+        ..Device::new()
+    });
+    bench.run_until("loss", |bench| bench.lost.is_some());
+    assert_eq!(bench.ready, 0);
+    let text = bench.lost.unwrap().to_string();
+    assert!(text.contains("a dead-man time of 0 ms"), "{text}");
+    assert!(text.contains("firmware"), "{text}");
+}
+
+#[test]
 fn a_device_that_falls_silent_is_given_up() {
     let mut bench = Bench::ready(Device::new());
     bench.cut = true;
