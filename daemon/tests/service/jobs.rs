@@ -1,4 +1,8 @@
+use std::io::Write as _;
+use std::task::Poll;
+
 use relief_api::{Event, Job, JobState, Rerun, Scan, ScanState, Status, path};
+use rustix::fs::FileType;
 use serde_json::json;
 
 use crate::client::Events;
@@ -120,13 +124,41 @@ async fn a_job_cut_short_by_a_stop_is_finished_after_the_restart() {
     let rig = Rig::new().await;
     let (scan, _) = rig.scan_to_result("a").await;
     let mut events = rig.client.events().await;
-    // Long enough to be met half done, short enough to be waited for.
-    let rerun = Rerun {
-        settings: [("regrid.draws".to_owned(), json!(6_000))].into(),
-        ..Rerun::default()
+    let busy = running(&rig, &mut events, &scan.id, &endless()).await;
+    let job: Job = rig
+        .client
+        .post(&path::scan_rerun(&scan.id), &Rerun::default())
+        .await;
+    // The job gets its columns through a pipe, so that it stands still in their midst for
+    // as long as the test likes.
+    let journal = rig.journal(&scan.id);
+    let kept = std::fs::read(&journal).unwrap();
+    std::fs::remove_file(&journal).unwrap();
+    let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
+    rustix::fs::mknodat(rustix::fs::CWD, &journal, FileType::Fifo, mode, 0).unwrap();
+    let _: Job = rig.client.ask(&path::job_cancel(busy.id)).await;
+    let (pipe, half) = (journal.clone(), kept[..kept.len() / 2].to_vec());
+    let feed = move || {
+        let mut pipe = std::fs::File::create(pipe).unwrap();
+        pipe.write_all(&half).unwrap();
+        pipe
     };
-    let job = running(&rig, &mut events, &scan.id, &rerun).await;
-    let rig = rig.restart().await;
+    let pipe = tokio::task::spawn_blocking(feed).await.unwrap();
+    let reading = |event: &Event| match event {
+        Event::Progress { job: id, stage, .. } if *id == job.id && stage == "regrid" => Some(()),
+        _ => None,
+    };
+    events.until(reading).await;
+    let Rig { daemon, folder, .. } = rig;
+    let mut end = Box::pin(daemon.shutdown());
+    let begun = std::future::poll_fn(|cx| Poll::Ready(end.as_mut().poll(cx))).await;
+    assert!(begun.is_pending());
+    // Only now, when the job has been asked to stop, does it learn that nothing more comes.
+    drop(pipe);
+    end.await;
+    std::fs::remove_file(&journal).unwrap();
+    std::fs::write(&journal, kept).unwrap();
+    let rig = Rig::start(folder, |_| {}).await;
     let mut events = rig.client.events().await;
     let job = job_over(&mut events, &rig, job.id).await;
     assert_eq!(

@@ -86,12 +86,29 @@ fn plug() -> (mpsc::Sender<MemoryTransport>, impl Connector) {
     (sockets, connector)
 }
 
+/// Nothing is lost between these two, so that a thread that has to wait long for a busy
+/// processor must not pass for a device that is gone.
+fn unhurried() -> LinkSettings {
+    LinkSettings {
+        request_timeout: Duration::from_secs(20),
+        dead_man: Duration::from_secs(60),
+        silence: Duration::from_secs(120),
+        resend_timeout: Duration::from_secs(20),
+        column_timeout: Duration::from_secs(120),
+        ..LinkSettings::default()
+    }
+}
+
 fn connect(device: Device) -> (LinkScanner, Running, mpsc::Sender<MemoryTransport>) {
     let (sockets, connector) = plug();
     let (ours, theirs) = memory::pair();
     sockets.send(ours).unwrap();
+    let device = Device {
+        dead_man_limit_ms: 60_000,
+        ..device
+    };
     let running = Running::serve(Arc::new(Mutex::new(device)), theirs);
-    let scanner = LinkScanner::start(connector, LinkSettings::default()).unwrap();
+    let scanner = LinkScanner::start(connector, unhurried()).unwrap();
     (scanner, running, sockets)
 }
 

@@ -2,6 +2,7 @@
 
 use std::io;
 use std::os::fd::OwnedFd;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -166,19 +167,21 @@ fn a_hang_up_in_a_scan_is_a_lost_connection() {
 fn a_shell_is_no_scanner() {
     let _turn = turn();
     let (mut master, path) = pty();
+    let over = Arc::new(AtomicBool::new(false));
+    let heard = Arc::clone(&over);
     let chatter = std::thread::spawn(move || {
-        let until = Instant::now() + Duration::from_secs(4);
-        while Instant::now() < until {
+        while !heard.load(Ordering::Relaxed) {
             let _ = master.read(&mut [0; 64], Duration::from_millis(20));
             let _ = master.write(b"login: ", Duration::from_millis(20));
         }
     });
     let error = open(&path).identify().unwrap_err();
+    over.store(true, Ordering::Relaxed);
+    chatter.join().unwrap();
     assert!(
         matches!(&error, ScannerError::WrongDevice { heard, .. } if heard.contains("login: ")),
         "{error:?}"
     );
-    chatter.join().unwrap();
 }
 
 #[test]
