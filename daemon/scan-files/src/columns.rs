@@ -31,6 +31,7 @@ struct Group {
 
 pub(crate) fn build(mut gather: Gather<'_>) -> Result<PointScan, ScanFileError> {
     let mut points = std::mem::take(&mut gather.points);
+    leave_out_unmeasured(points.len(), &mut gather)?;
     points.sort_unstable();
     let read = points.len();
     points.dedup_by_key(|p| (p.x, p.y, p.z));
@@ -56,7 +57,7 @@ pub(crate) fn build(mut gather: Gather<'_>) -> Result<PointScan, ScanFileError> 
     if gather.options.units.is_none() && size_mm < SMALL_PART_MM {
         gather.note(format!(
             "the part is only {size_mm:.3} across in x and y, taken as millimetres; \
-             if the file is in metres or inches, say so"
+             if the file is in metres or inches, say so with --units m or --units inch"
         ));
     }
     let intensity_scale = intensity_scale(&points, &mut gather);
@@ -86,6 +87,27 @@ pub(crate) fn build(mut gather: Gather<'_>) -> Result<PointScan, ScanFileError> 
         sample_spacing_mm: spacing_mm.unwrap_or(fallback_mm),
         notes: gather.notes,
     })
+}
+
+/// Notes how many points had no measurement; refuses a file that holds mostly such.
+fn leave_out_unmeasured(measured: usize, gather: &mut Gather<'_>) -> Result<(), ScanFileError> {
+    let Some(first) = gather.first_unmeasured else {
+        return Ok(());
+    };
+    let unmeasured = gather.unmeasured;
+    if unmeasured > measured {
+        return Err(ScanFileError::Unmeasured {
+            file: gather.file.to_owned(),
+            unmeasured,
+            all: measured + unmeasured,
+            first,
+        });
+    }
+    gather.note(format!(
+        "{unmeasured} point(s) without a measurement (a coordinate is NaN or infinite) were \
+         left out, the first at {first}"
+    ));
+    Ok(())
 }
 
 /// Points put into columns.

@@ -113,20 +113,25 @@ pub enum ScanFileError {
         /// Values found.
         found: usize,
     },
-    /// A coordinate is NaN or infinite.
-    #[error("{file}, {place}: a coordinate is {value}; remove points without a measurement")]
-    NotFinite {
+    /// Most points have a coordinate that is NaN or infinite.
+    #[error(
+        "{file}: {unmeasured} of {all} points have a coordinate that is not a finite number, \
+         the first at {first}; is this a file of measured points?"
+    )]
+    Unmeasured {
         /// The file.
         file: String,
-        /// Where.
-        place: Place,
-        /// The value.
-        value: f64,
+        /// Points with such a coordinate.
+        unmeasured: usize,
+        /// Points in all.
+        all: usize,
+        /// Where the first is.
+        first: Place,
     },
     /// A coordinate beyond what the 10 nm lattice reaches.
     #[error(
-        "{file}, {place}: a coordinate of {value_mm} mm is beyond the limit of 21474 mm; \
-         check the units, or move the part to the origin"
+        "{file}, {place}: a coordinate of {} mm is beyond the limit of 21474 mm; \
+         check the units, or move the part to the origin", short(*value_mm)
     )]
     TooFar {
         /// The file.
@@ -197,4 +202,13 @@ pub enum ScanFileError {
         /// The pitch.
         pitch_mm: f64,
     },
+}
+
+/// A number as people write it, whatever its size.
+fn short(value: f64) -> String {
+    if value.abs() < 1e9 {
+        format!("{value}")
+    } else {
+        format!("{value:e}")
+    }
 }

@@ -31,6 +31,9 @@ pub(crate) struct Gather<'a> {
     pub(crate) options: &'a ReadOptions,
     pub(crate) points: Vec<Point>,
     pub(crate) notes: Vec<String>,
+    /// Points left out since a coordinate was no finite number, and the first of them.
+    pub(crate) unmeasured: usize,
+    pub(crate) first_unmeasured: Option<Place>,
 }
 
 impl<'a> Gather<'a> {
@@ -45,10 +48,13 @@ impl<'a> Gather<'a> {
             options,
             points: Vec::new(),
             notes: Vec::new(),
+            unmeasured: 0,
+            first_unmeasured: None,
         })
     }
 
-    /// Takes a point in the file's units.
+    /// Takes a point in the file's units. Points without a measurement, which many
+    /// programs write as NaN, are counted and left out.
     pub(crate) fn push(
         &mut self,
         xyz: [f64; 3],
@@ -62,15 +68,13 @@ impl<'a> Gather<'a> {
                 limit: self.options.max_points,
             });
         }
+        if xyz.iter().any(|value| !value.is_finite()) {
+            self.unmeasured += 1;
+            self.first_unmeasured.get_or_insert(place);
+            return Ok(());
+        }
         let mut counts = [0; 3];
         for (count, value) in counts.iter_mut().zip(xyz) {
-            if !value.is_finite() {
-                return Err(ScanFileError::NotFinite {
-                    file: self.file.to_owned(),
-                    place,
-                    value,
-                });
-            }
             let value_mm = value * units.in_mm();
             *count = lattice_counts(value_mm).ok_or_else(|| ScanFileError::TooFar {
                 file: self.file.to_owned(),

@@ -142,7 +142,8 @@ pub fn read_from(
 /// source in errors. [`ReadOptions::units`] plays no part.
 ///
 /// # Errors
-/// [`ScanFileError`] for coordinates that are not finite or too large, and when there is
+/// [`ScanFileError`] when most points are not finite, for coordinates too large, and when
+/// there is
 /// no point at all.
 pub fn from_points_mm(
     points: impl IntoIterator<Item = [f64; 3]>,

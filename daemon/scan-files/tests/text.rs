@@ -158,8 +158,11 @@ fn errors_name_file_place_and_cause() {
         ("# only a comment\n", &["holds no points"]),
         ("1 2 3\n4 5\n", &["line 2", "2 value(s)"]),
         ("1 2 3\n\n4 x 6\n", &["line 3", "`x`"]),
-        ("1 2 3\n4 nan 6\n", &["line 2", "NaN"]),
-        ("1 2 3\r\n4 inf 6\r\n", &["line 2", "inf"]),
+        (
+            "1 2 3\n4 nan 6\n7 8 inf\n",
+            &["2 of 3 points", "not a finite number", "first at line 2"],
+        ),
+        ("1 2 1e300\n", &["line 1", "a coordinate of 1e300 mm"]),
         ("1,5 2,0 3,1\n", &["line 1", "decimal commas", "semicolons"]),
         ("1 2 30000\n", &["line 1", "30000", "units"]),
         ("1 2 3\n1 2 4\n1 2 5\n", &["share one x and y"]),
@@ -188,6 +191,22 @@ fn errors_name_file_place_and_cause() {
         many,
         Err(ScanFileError::TooManyPoints { limit: 2, .. })
     ));
+}
+
+#[test]
+fn points_without_a_measurement_are_left_out_with_a_note() {
+    let scan = read_text("0 0 0\r\n1 nan 0\r\n0 1 inf\r\n0 2 0\r\n1 0 0\r\n1 2 0\r\n").unwrap();
+    assert_eq!(scan.points(), 4);
+    assert!(
+        scan.notes
+            .iter()
+            .any(|note| note.starts_with("2 point(s) without a measurement")
+                && note.ends_with("the first at line 2")),
+        "{:?}",
+        scan.notes
+    );
+    let half = read_text("0 0 0\nnan nan nan\n1 1 0\nnan nan nan\n").unwrap();
+    assert_eq!(half.points(), 2);
 }
 
 #[test]
