@@ -1,10 +1,11 @@
 //! One attempt at a job: from the kept columns to a folder in the spool.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use deliverables::{CadOptions, DeliverError, Entities, Inputs, ScanReport, Stopwatch};
 use pipeline::{Observer, PipelineError, Stage};
-use range_image::{Cancelled, Column, Lattice, Monitor, RangeImage};
+use range_image::{Cancelled, Lattice, Monitor, RangeImage};
 use relief_api::{Job, Scan};
 use scan_record::{Ending, Header, JournalReader, ReadError};
 
@@ -194,6 +195,22 @@ fn count(journal: &mut Journal, progress: &Progress<'_>) -> Result<Kept, Stop> {
     Ok(kept)
 }
 
+/// Ends the regridding when the journal cannot be read on.
+struct Reading<'a> {
+    watch: &'a Stopwatch<'a>,
+    broken: AtomicBool,
+}
+
+impl Monitor for Reading<'_> {
+    fn is_cancelled(&self) -> bool {
+        self.broken.load(Ordering::Relaxed) || self.watch.is_cancelled()
+    }
+
+    fn progress(&self, fraction: f64) {
+        self.watch.progress(fraction);
+    }
+}
+
 /// The range image of the journal's columns.
 fn regrid(
     journal: &mut Journal,
@@ -203,31 +220,37 @@ fn regrid(
     watch: &Stopwatch<'_>,
 ) -> Result<(RangeImage, Kept), Stop> {
     let mut kept = Kept::default();
+    let reading = Reading {
+        watch,
+        broken: AtomicBool::new(false),
+    };
     let mut failure = None;
+    // Column by column, so that no second copy of the scan is ever in memory.
     let columns = std::iter::from_fn(|| match journal.next_column() {
+        _ if watch.is_cancelled() => None,
         Ok(column) => column.map(|raw| {
             kept.add(&raw);
             raw.calibrated(&header.calibration)
         }),
         Err(error) => {
+            reading.broken.store(true, Ordering::Relaxed);
             failure = Some(error);
             None
         }
     });
-    // The iterator tells where it is, not how far the estimation has come.
-    let columns: Vec<Column> = columns.collect();
+    let image = regrid::regrid(columns.fuse(), settings, &reading);
     if let Some(error) = failure {
         return Err(error.into());
     }
-    kept.end(journal.ending());
-    tracing::debug!(scan = %scan.id, columns = columns.len(), "regridding");
-    let image = regrid::regrid(columns, settings, watch).map_err(|error| {
+    let image = image.map_err(|error| {
         if watch.is_cancelled() {
             Stop::Asked
         } else {
             Stop::from(PipelineError::Regrid(error))
         }
     })?;
+    kept.end(journal.ending());
+    tracing::debug!(scan = %scan.id, columns = kept.columns, "regridded");
     Ok((image, kept))
 }
 

@@ -29,8 +29,15 @@ pub(crate) enum JobOutcome {
     },
 }
 
+/// By how much jobs are nicer than the taking of scans.
+const NICER: i32 = 10;
+
 /// Works until the service stops. Runs on a thread of its own.
 pub(crate) fn work(service: &Arc<Service>) {
+    // On Linux this holds for this thread, and for those that it starts.
+    if let Err(error) = rustix::process::nice(NICER) {
+        tracing::warn!(%error, "jobs run with the priority of scans");
+    }
     while let Some((id, flag)) = service.queue.take() {
         if let Err(error) = attempt(service, id, &flag) {
             // The record still says that the job waits or runs, so the next start of the
