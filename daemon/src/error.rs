@@ -34,6 +34,15 @@ pub enum ServiceError {
     /// A setting is wrong.
     #[error("{0}")]
     Setting(#[from] OverrideError),
+    /// It would have to be cut.
+    #[error(
+        "the name has {chars} characters; at most {} are allowed",
+        relief_api::MAX_NAME_CHARS
+    )]
+    LongName {
+        /// Characters it has.
+        chars: usize,
+    },
     /// There is no such scan.
     #[error("there is no scan {id}")]
     NoSuchScan {

@@ -3,6 +3,9 @@
 use std::sync::Mutex;
 
 use jiff::Timestamp;
+use relief_api::MAX_NAME_CHARS;
+
+use crate::error::ServiceError;
 
 /// Longest part of an id that comes from the user.
 const NAME_BYTES: usize = 48;
@@ -66,18 +69,18 @@ pub(crate) fn safe_name(name: &str) -> String {
 }
 
 /// The name as it is shown and stands in files: one line, not endless, not empty.
-pub(crate) fn shown_name(name: &str) -> String {
-    const LONGEST: usize = 100;
-    let shown: String = name
-        .trim()
-        .chars()
-        .filter(|c| !c.is_control())
-        .take(LONGEST)
-        .collect();
-    if shown.is_empty() {
-        "scan".to_owned()
+///
+/// # Errors
+/// [`ServiceError::LongName`] for what would have to be cut.
+pub(crate) fn shown_name(name: &str) -> Result<String, ServiceError> {
+    let shown: String = name.trim().chars().filter(|c| !c.is_control()).collect();
+    let chars = shown.chars().count();
+    if chars > MAX_NAME_CHARS {
+        Err(ServiceError::LongName { chars })
+    } else if shown.is_empty() {
+        Ok("scan".to_owned())
     } else {
-        shown
+        Ok(shown)
     }
 }
 
@@ -107,6 +110,19 @@ mod tests {
             assert_eq!(safe_name(name), safe, "{name:?}");
         }
         assert_eq!(safe_name(&"x".repeat(500)).len(), NAME_BYTES);
+    }
+
+    #[test]
+    fn long_names_are_refused_and_not_cut() {
+        assert_eq!(shown_name(" a\nb\t ").unwrap(), "ab");
+        assert_eq!(shown_name("\n").unwrap(), "scan");
+        let longest = "\u{e4}".repeat(MAX_NAME_CHARS);
+        assert_eq!(shown_name(&longest).unwrap(), longest);
+        let error = shown_name(&format!("{longest}x")).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "the name has 101 characters; at most 100 are allowed"
+        );
     }
 
     #[test]

@@ -46,6 +46,7 @@ impl Service {
     /// is not there, or a plan that it cannot do, is refused at once.
     pub(crate) fn start_scan(self: &Arc<Self>, request: &StartScan) -> Result<Scan, ServiceError> {
         self.check_running()?;
+        let name = shown_name(&request.name)?;
         let config = self.config();
         let processing = config.processing().with_overrides(&request.settings)?;
         let mut reservation = self.reserve()?;
@@ -60,7 +61,7 @@ impl Service {
         });
         let scan = Scan {
             id,
-            name: shown_name(&request.name),
+            name,
             part: request.part.clone(),
             operator: request.operator.clone(),
             note: request.note.clone(),

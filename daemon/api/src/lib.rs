@@ -35,5 +35,7 @@ mod status;
 pub use event::{Event, LiveColumn};
 pub use job::{Job, JobId, JobList, JobState, Rerun, SpoolEntry, SpoolFile, StageTiming};
 pub use problem::Problem;
-pub use scan::{PlanRequest, Scan, ScanList, ScanState, SettingOverrides, StartScan};
+pub use scan::{
+    MAX_NAME_CHARS, PlanRequest, Scan, ScanList, ScanState, SettingOverrides, StartScan,
+};
 pub use status::{ScannerLink, ScannerStatus, Status};

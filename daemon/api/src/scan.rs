@@ -10,11 +10,14 @@ use crate::job::JobId;
 /// in the configuration file: `regrid.neighbours`, `reconstruct.tolerance_mm`.
 pub type SettingOverrides = BTreeMap<String, serde_json::Value>;
 
+/// Most characters in the name of a scan or of a rerun.
+pub const MAX_NAME_CHARS: usize = 100;
+
 /// Asks for a scan.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct StartScan {
-    /// Names the deliverables; `scan` if empty.
+    /// Names the deliverables; `scan` if empty. At most [`MAX_NAME_CHARS`] characters.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub name: String,
     /// The part measured, such as its number; carried into the report.

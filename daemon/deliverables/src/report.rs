@@ -87,7 +87,8 @@ pub struct SettingsReport {
     pub step_factor: f64,
     /// Smaller regions are left out.
     pub minimum_nodes: usize,
-    /// How far a fitted surface may lie from the nodes.
+    /// Root mean square distance from the nodes at which a fitted surface is not made
+    /// nearer still; no bound on how far it may lie off.
     pub tolerance_mm: f64,
     /// IGES entities of the surfaces: 114 or 128.
     pub iges_entities: u16,

@@ -113,7 +113,8 @@ pub struct ReconstructConfig {
     /// Which road is taken.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<Method>,
-    /// How far a surface may lie off the range image.
+    /// Root mean square distance from the range image at which a surface is near enough and
+    /// gets no further knots; no bound on how far it may lie off.
     #[serde(
         deserialize_with = "value::positive",
         skip_serializing_if = "Option::is_none"

@@ -1,6 +1,6 @@
 //! From the service's refusals to HTTP: the only place that knows both.
 
-use axum::extract::rejection::{JsonRejection, PathRejection};
+use axum::extract::rejection::JsonRejection;
 use axum::extract::{FromRequest, Request};
 use axum::http::{HeaderValue, Method, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Json, Response};
@@ -81,6 +81,7 @@ impl From<ServiceError> for Refusal {
             }
             ServiceError::Plan(_) => (S::BAD_REQUEST, "impossible-scan", None),
             ServiceError::Setting(_) => (S::BAD_REQUEST, "wrong-setting", None),
+            ServiceError::LongName { .. } => (S::BAD_REQUEST, "long-name", None),
             ServiceError::NoSuchScan { .. } => (
                 S::NOT_FOUND,
                 "no-such-scan",
@@ -221,14 +222,4 @@ fn wrong_body(rejection: &JsonRejection) -> Refusal {
         ),
     };
     Refusal::new(status, "wrong-body", rejection.body_text(), hint)
-}
-
-/// A path that does not parse, such as a job's number with letters in it.
-pub(crate) fn wrong_path(rejection: &PathRejection) -> Refusal {
-    Refusal::new(
-        StatusCode::NOT_FOUND,
-        "no-such-path",
-        rejection.body_text(),
-        None,
-    )
 }

@@ -29,6 +29,10 @@ impl Service {
     /// Queues a kept scan to be processed again.
     pub(crate) fn rerun(&self, id: &str, request: &Rerun) -> Result<Job, ServiceError> {
         self.check_running()?;
+        let name = match request.name.as_str() {
+            "" => None,
+            name => Some(shown_name(name)?),
+        };
         // The job is noted on the scan as it is read here: two requests at once would lose
         // one of the notes.
         let _order = self.queue.changing();
@@ -49,11 +53,7 @@ impl Service {
         if !matches!(journal.next_column(), Ok(Some(_))) {
             return Err(nothing("it ended before its first column".into()));
         }
-        let name = if request.name.is_empty() {
-            scan.name.clone()
-        } else {
-            shown_name(&request.name)
-        };
+        let name = name.unwrap_or_else(|| scan.name.clone());
         let result = self.ids.next(&name, |id| {
             self.spool.has(id) || self.journal_path(id).exists()
         });

@@ -78,7 +78,7 @@ async fn wrong_requests_are_refused_with_a_way_out() {
     for (method, path, status, kind) in [
         ("GET", "/v1/scans/nothing", 404, "no-such-scan"),
         ("GET", "/v1/jobs/77", 404, "no-such-job"),
-        ("GET", "/v1/jobs/x", 404, "no-such-path"),
+        ("GET", "/v1/jobs/x", 404, "no-such-job"),
         ("POST", "/v1/jobs/77/retry", 404, "no-such-job"),
         ("POST", "/v1/abort", 409, "nothing-to-abort"),
         ("GET", "/v2/status", 404, "no-such-path"),
