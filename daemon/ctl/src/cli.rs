@@ -6,7 +6,7 @@ use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    abort, cancel, convert, demo, doctor, fetch, jobs, rerun, retry, scan, scans, status, watch,
+    abort, change, convert, demo, doctor, fetch, jobs, rerun, scan, scans, status, watch,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
@@ -34,8 +34,8 @@ pub(crate) enum Command {
     Status(status::Args),
     Scans(scans::Args),
     Jobs(jobs::Args),
-    Retry(retry::Args),
-    Cancel(cancel::Args),
+    Retry(change::RetryArgs),
+    Cancel(change::CancelArgs),
     Rerun(rerun::Args),
     Watch(watch::Args),
     Fetch(fetch::Args),

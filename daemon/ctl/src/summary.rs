@@ -28,13 +28,15 @@ pub(crate) fn lines(report: &Report) -> Vec<String> {
         report.scan.columns
     ));
     lines.push(format!(
-        "model        {} faces, {} edges shared, {} free",
-        model.faces, model.edges_shared, model.free_edges
+        "model        {}, {} shared, {} free",
+        output::counted(model.faces, "face"),
+        output::counted(model.edges_shared, "edge"),
+        model.free_edges
     ));
     lines.push(format!(
-        "agreement    SNR {} dB, {} nodes lost, {} invented",
+        "agreement    SNR {} dB, {} lost, {} invented",
         decibels(report.snr_db),
-        report.lost_nodes,
+        output::counted(report.lost_nodes, "node"),
         report.invented_nodes
     ));
     let mut stages: Vec<(&String, &f64)> = report.timings_s.iter().collect();

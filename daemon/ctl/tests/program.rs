@@ -197,6 +197,56 @@ fn failures_are_told_in_one_line_with_exit_code_1() {
 }
 
 #[test]
+fn what_cannot_become_a_part_is_told_before_the_work() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let write = |name: &str, text: &str| fs::write(at.join(name), text).unwrap();
+    write("roof.xyz", &roof());
+    let line = |point: fn(i32) -> String| (0..40).map(point).collect::<String>();
+    write("column.xyz", &line(|i| format!("1 {i} {i}\n")));
+    write("slanted.xyz", &line(|i| format!("{i} {} 5\n", 2 * i)));
+    write("far.xyz", "1 2 3\n1 2 1e300\n");
+    write(
+        "holes.xyz",
+        &line(|_| "nan nan nan\n1 2 3\nnan 1 2\n".into()),
+    );
+    let convert = |arguments: &[&str]| relief(at, &[&["convert"], arguments].concat());
+    refused(&convert(&["column.xyz"]), 1, "at one x, a single column");
+    refused(&convert(&["slanted.xyz"]), 1, "on one slanted line");
+    refused(&convert(&["far.xyz"]), 1, "a coordinate of 1e300 mm");
+    refused(&convert(&["holes.xyz"]), 1, "80 of 120 points");
+    // 24 mm square over 2^24 nodes.
+    refused(
+        &convert(&["roof.xyz", "--pitch-mm", "0.001"]),
+        2,
+        "--pitch-mm 0.0059",
+    );
+    let name = "x".repeat(5000);
+    refused(&convert(&["roof.xyz", "--name", &name]), 2, "at most 100");
+    for places in [
+        &["-o", "none/roof.igs"][..],
+        &["--report", "none/r.json"],
+        &["--pictures", "roof.xyz/pictures"],
+    ] {
+        let output = convert(&[&["roof.xyz"], places].concat());
+        refused(&output, 2, "directory");
+        assert!(!at.join("roof.igs").exists(), "{places:?}");
+    }
+}
+
+#[test]
+fn points_without_a_measurement_are_left_out_and_told() {
+    let directory = tempfile::tempdir().unwrap();
+    let text = roof() + "nan nan nan\n";
+    fs::write(directory.path().join("roof.xyz"), text).unwrap();
+    let output = relief(directory.path(), &["convert", "roof.xyz"]);
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{told}");
+    assert!(told.contains("1 point(s) without a measurement"), "{told}");
+    assert!(told.contains("1 edge shared"), "{told}");
+}
+
+#[test]
 fn four_dots_are_no_part_and_the_user_learns_why() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
@@ -367,5 +417,10 @@ fn the_demo_tells_at_once_what_it_cannot_do() {
         &relief(at, &["demo", "--outliers", "-0.1"]),
         2,
         "between 0 and 1",
+    );
+    refused(
+        &relief(at, &["demo", "--dropouts", "1"]),
+        2,
+        "choose a share below 1",
     );
 }

@@ -16,7 +16,8 @@ use crate::service::{Client, EndpointArgs};
 /// Copy the deliverables of a scan here and check them against their manifest
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The scan or its name (of several the newest), the result of a rerun, or `latest`
+    /// The scan or its name (of several the newest), the result of a rerun or the name it was
+    /// given, or `latest`
     #[arg(value_name = "SCAN")]
     scan: String,
     /// Directory for the files, instead of one named after the scan
@@ -39,7 +40,7 @@ pub(crate) struct Fetched {
 
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
     let client = Client::new(args.endpoint.endpoint());
-    let result = named::scan_id(&client, args.scan).await?;
+    let result = named::result(&client, args.scan).await?;
     let directory = args.output.unwrap_or_else(|| PathBuf::from(&result));
     let fetched = into_directory(&client, &result, directory).await?;
     output::either(json, &fetched, |fetched| {

@@ -4,7 +4,7 @@ use relief_api::{Job, JobList, path};
 
 use crate::failure::Failure;
 use crate::output;
-use crate::service::{Client, EndpointArgs};
+use crate::service::EndpointArgs;
 
 /// List the jobs, newest first
 #[derive(Debug, clap::Args)]
@@ -14,9 +14,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
-    let client = Client::new(args.endpoint.endpoint());
-    let jobs: JobList = client.get(path::JOBS).await?;
-    output::either(json, &jobs, told)
+    args.endpoint.show(path::JOBS, json, told).await
 }
 
 fn told(list: &JobList) -> String {

@@ -1,7 +1,7 @@
 //! The commands, one small file each.
 
 pub(crate) mod abort;
-pub(crate) mod cancel;
+pub(crate) mod change;
 pub(crate) mod convert;
 pub(crate) mod demo;
 pub(crate) mod doctor;
@@ -9,7 +9,6 @@ pub(crate) mod fetch;
 pub(crate) mod jobs;
 mod named;
 pub(crate) mod rerun;
-pub(crate) mod retry;
 pub(crate) mod scan;
 pub(crate) mod scans;
 mod setting;
@@ -32,8 +31,8 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Status(args) => block_on(status::run(args, json)),
         Command::Scans(args) => block_on(scans::run(args, json)),
         Command::Jobs(args) => block_on(jobs::run(args, json)),
-        Command::Retry(args) => block_on(retry::run(args, json)),
-        Command::Cancel(args) => block_on(cancel::run(args, json)),
+        Command::Retry(args) => block_on(change::retry(args, json)),
+        Command::Cancel(args) => block_on(change::cancel(args, json)),
         Command::Rerun(args) => block_on(rerun::run(args, json)),
         Command::Watch(args) => block_on(watch::run(args, json)),
         Command::Doctor(args) => block_on(doctor::run(args, json)),

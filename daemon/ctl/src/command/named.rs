@@ -1,6 +1,6 @@
 //! Scans as users name them.
 
-use relief_api::{Scan, ScanList, path};
+use relief_api::{Job, JobList, JobState, Scan, ScanList, path};
 
 use crate::failure::Failure;
 use crate::service::Client;
@@ -18,6 +18,26 @@ pub(super) async fn scan_id(client: &Client, said: String) -> Result<String, Fai
         None if said == LATEST => Err(Failure::Failed("there is no scan yet".into())),
         None => Ok(said),
     }
+}
+
+/// The result in the spool that a user means: that of a scan, by what names the scan, or
+/// that of a rerun, by the result's own name or the one the rerun was given.
+pub(super) async fn result(client: &Client, said: String) -> Result<String, Failure> {
+    let result = scan_id(client, said).await?;
+    let list: JobList = client.get(path::JOBS).await?;
+    Ok(rerun(&list.jobs, &result)
+        .map(|job| job.result.clone())
+        .unwrap_or(result))
+}
+
+/// The newest finished rerun of this name, unless the name is that of a result.
+fn rerun<'a>(newest_first: &'a [Job], said: &str) -> Option<&'a Job> {
+    if newest_first.iter().any(|job| job.result == said) {
+        return None;
+    }
+    newest_first
+        .iter()
+        .find(|job| job.name == said && job.state == JobState::Done)
 }
 
 /// Identifiers come first; of several scans of one name the newest is meant.
@@ -53,6 +73,27 @@ mod tests {
         assert_eq!(id("latest"), Some("3-lid"));
         assert_eq!(id("bo"), None);
         assert_eq!(meant(&[], "latest"), None);
+    }
+
+    #[test]
+    fn a_name_of_reruns_means_the_newest_that_is_done() {
+        let job = |id: u64, result: &str, name: &str, state: &str| -> Job {
+            let job = serde_json::json!({
+                "id": id, "scan": "1-box", "result": result, "name": name, "state": state,
+                "attempts": 1, "queued_at": "2026-11-21T09:30:00Z",
+            });
+            serde_json::from_value(job).unwrap()
+        };
+        let jobs = [
+            job(4, "4-fine", "fine", "failed"),
+            job(3, "3-fine", "fine", "done"),
+            job(2, "2-fine", "fine", "done"),
+            job(1, "1-box", "box", "done"),
+        ];
+        let result = |said| rerun(&jobs, said).map(|job| job.result.as_str());
+        assert_eq!(result("fine"), Some("3-fine"));
+        assert_eq!(result("2-fine"), None, "it names a result itself");
+        assert_eq!(result("fin"), None);
     }
 
     #[test]

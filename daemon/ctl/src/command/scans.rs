@@ -4,7 +4,7 @@ use relief_api::{ScanList, path};
 
 use crate::failure::Failure;
 use crate::output;
-use crate::service::{Client, EndpointArgs};
+use crate::service::EndpointArgs;
 
 /// List the kept scans, newest first
 #[derive(Debug, clap::Args)]
@@ -14,9 +14,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
-    let client = Client::new(args.endpoint.endpoint());
-    let scans: ScanList = client.get(path::SCANS).await?;
-    output::either(json, &scans, told)
+    args.endpoint.show(path::SCANS, json, told).await
 }
 
 fn told(list: &ScanList) -> String {

@@ -3,8 +3,8 @@
 use relief_api::{ScannerLink, Status, path};
 
 use crate::failure::Failure;
-use crate::output::{self, counted};
-use crate::service::{Client, EndpointArgs};
+use crate::output::counted;
+use crate::service::EndpointArgs;
 
 /// Show the service, its scanner and what is under way
 #[derive(Debug, clap::Args)]
@@ -14,9 +14,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
-    let client = Client::new(args.endpoint.endpoint());
-    let status: Status = client.get(path::STATUS).await?;
-    output::either(json, &status, told)
+    args.endpoint.show(path::STATUS, json, told).await
 }
 
 fn told(status: &Status) -> String {

@@ -3,6 +3,12 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use serde::{Serialize, de::DeserializeOwned};
+
+use super::Client;
+use crate::failure::Failure;
+use crate::output;
+
 /// Where to find the service, as the user says it.
 #[derive(Debug, Clone, clap::Args)]
 pub(crate) struct EndpointArgs {
@@ -23,6 +29,17 @@ impl EndpointArgs {
         self.url
             .clone()
             .unwrap_or_else(|| Endpoint::Socket(self.socket.clone()))
+    }
+
+    /// Asks the service for something and prints it, as JSON or as it is told to people.
+    pub(crate) async fn show<T: Serialize + DeserializeOwned>(
+        &self,
+        path: &str,
+        json: bool,
+        told: impl FnOnce(&T) -> String,
+    ) -> Result<(), Failure> {
+        let answer: T = Client::new(self.endpoint()).get(path).await?;
+        output::either(json, &answer, told)
     }
 }
 

@@ -141,6 +141,20 @@ impl Args {
         Ok(path.clone())
     }
 
+    /// Refuses a name that would be cut.
+    pub(super) fn check_name(&self) -> Result<(), Failure> {
+        match &self.name {
+            Some(name) if name.chars().count() > relief_api::MAX_NAME_CHARS => {
+                Err(Failure::Usage(format!(
+                    "the name has {} characters; at most {} are allowed",
+                    name.chars().count(),
+                    relief_api::MAX_NAME_CHARS
+                )))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Name of the part.
     pub(super) fn name(&self, kept: Option<&str>) -> String {
         let given = self

@@ -1,6 +1,8 @@
 //! `relief convert`.
 
 mod args;
+mod extent;
+mod places;
 mod run;
 
 pub(crate) use args::Args;

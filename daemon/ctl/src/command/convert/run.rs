@@ -10,9 +10,10 @@ use pipeline::{Observer, PipelineError, Stage};
 use range_image::Monitor;
 use serde::Serialize;
 
-use super::Args;
+use super::extent::Extent;
+use super::{Args, places};
 use crate::failure::Failure;
-use crate::input;
+use crate::input::{self, Input};
 use crate::output;
 use crate::progress::Progress;
 
@@ -89,6 +90,12 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
 
 fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
     let output = args.output()?;
+    args.check_name()?;
+    places::check_file(&output)?;
+    args.report.as_deref().map_or(Ok(()), places::check_file)?;
+    args.pictures
+        .as_deref()
+        .map_or(Ok(()), places::check_directory)?;
     let input = input::read(&args.input, args.units())?;
     let settings = args
         .settings(input.settings())
@@ -98,6 +105,7 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
             }
             other => other,
         })?;
+    check_extent(&args.input, &input, settings.regrid.pitch_mm)?;
     let cad = args.cad(input.scan.operator.as_deref());
     let timestamp = args.timestamp(input.timestamp)?;
     let name = args.name(input.name.as_deref());
@@ -147,6 +155,29 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
         file,
         report,
     })
+}
+
+/// Refuses samples without a surface, and grids that are absurdly fine for them.
+fn check_extent(file: &Path, input: &Input, pitch_mm: f64) -> Result<(), Failure> {
+    let Some(extent) = Extent::of(&input.columns) else {
+        return Ok(());
+    };
+    if let Some(line) = extent.line(&input.columns, input.column_pitch_mm) {
+        return Err(Failure::Failed(format!(
+            "{}: all its samples lie {line}, so that there is no surface between them; x runs \
+             along the table, y up and z towards the camera",
+            file.display()
+        )));
+    }
+    let finest_mm = extent.finest_pitch_mm();
+    if pitch_mm < finest_mm {
+        return Err(Failure::Usage(format!(
+            "a grid of {pitch_mm} mm is too fine for {}: --pitch-mm {finest_mm} is the least that \
+             its size and its number of samples allow",
+            file.display()
+        )));
+    }
+    Ok(())
 }
 
 fn too_dense(input: &Path, pitch_mm: f64) -> Failure {

@@ -39,6 +39,12 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
             args.out.display()
         )));
     }
+    if let Some(share) = args.dropouts.filter(|share| *share >= 1.0) {
+        return Err(Failure::Usage(format!(
+            "--dropouts {share} drops every sample, so that nothing would be left of the scan; \
+             choose a share below 1"
+        )));
+    }
     let bench = Bench::set_up(&args).await?;
     eprintln!(
         "A simulated scanner at {} scans the {}; a private service processes it.",

@@ -6,7 +6,7 @@ mod machine;
 mod port;
 mod reach;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use reliefd::Config;
 use serde::Serialize;
@@ -23,12 +23,15 @@ use finding::{Finding, Grade};
 /// whether the service answers. Changes nothing.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The service's configuration
-    #[arg(long, value_name = "FILE", default_value = "/etc/relief/reliefd.toml")]
-    config: PathBuf,
+    /// The service's configuration [default: /etc/relief/reliefd.toml]
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
     #[command(flatten)]
     endpoint: EndpointArgs,
 }
+
+/// Where the package keeps the configuration.
+const PACKAGED: &str = "/etc/relief/reliefd.toml";
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -39,11 +42,21 @@ struct Told {
 
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
     let mut findings = Vec::new();
-    let config = match Config::load(&args.config) {
+    let path = args.config.as_deref().unwrap_or(Path::new(PACKAGED));
+    let config = match Config::load(path) {
         Ok(config) => {
-            let said = format!("{} is sound", args.config.display());
+            let said = format!("{} is sound", path.display());
             findings.push(Finding::good("configuration", said));
             config
+        }
+        // On a machine without the package that is no trouble in itself.
+        Err(_) if args.config.is_none() && !path.exists() => {
+            findings.push(Finding::doubtful(
+                "configuration",
+                format!("there is no {PACKAGED}; the checks below take the defaults"),
+                "name the configuration that reliefd runs with by --config, or install one there",
+            ));
+            Config::default()
         }
         Err(error) => {
             findings.push(Finding::bad(

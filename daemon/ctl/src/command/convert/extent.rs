@@ -1,0 +1,147 @@
+//! Whether samples and grid go together: a surface to find, and a grid of a sensible size.
+
+use range_image::{Column, Sample};
+
+/// Nodes that every scan may have, however few its samples: some minutes of work.
+const NODES_ALWAYS: f64 = (1_u32 << 24) as f64;
+/// Nodes for each sample beyond which a finer grid shows nothing more.
+const NODES_PER_SAMPLE: f64 = 4.0;
+/// Points this near to a line are on it: coordinates in files are rounded.
+const LINE_MM: f64 = 1e-4;
+/// Samples this share of the column pitch from a line may have been moved there; less than
+/// what parts the corners of the smallest square of samples from its diagonal.
+const MOVED_SHARE: f64 = 0.6;
+
+/// What the samples cover, as the camera sees them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Extent {
+    samples: usize,
+    first: [f64; 2],
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+impl Extent {
+    /// `None` where there is no sample.
+    pub(super) fn of(columns: &[Column]) -> Option<Self> {
+        let mut points = points(columns);
+        let first = points.next()?;
+        let start = Self {
+            samples: 1,
+            first,
+            low: first,
+            high: first,
+        };
+        Some(points.fold(start, |extent, [x, y]| Self {
+            samples: extent.samples + 1,
+            first,
+            low: [extent.low[0].min(x), extent.low[1].min(y)],
+            high: [extent.high[0].max(x), extent.high[1].max(y)],
+        }))
+    }
+
+    fn sides_mm(&self) -> [f64; 2] {
+        [self.high[0] - self.low[0], self.high[1] - self.low[1]]
+    }
+
+    /// Why there is no surface between the samples, if so. A cloud's samples have been
+    /// moved into columns of this pitch.
+    pub(super) fn line(&self, columns: &[Column], pitch_mm: f64) -> Option<&'static str> {
+        let [width, height] = self.sides_mm();
+        if width <= LINE_MM && height <= LINE_MM {
+            return Some("at one point in x and y");
+        }
+        if width <= LINE_MM {
+            return Some("at one x, a single column");
+        }
+        if height <= LINE_MM {
+            return Some("at one y");
+        }
+        // The line, if there is one, is a diagonal of the extent, and begins at the first
+        // sample or ends there.
+        let [x0, y0] = self.first;
+        let ux = if x0 == self.low[0] { width } else { -width };
+        let uy = if y0 == self.low[1] { height } else { -height };
+        let near = LINE_MM.max(pitch_mm * MOVED_SHARE) * ux.hypot(uy);
+        points(columns)
+            .all(|[x, y]| ((x - x0) * uy - (y - y0) * ux).abs() <= near)
+            .then_some("on one slanted line in x and y")
+    }
+
+    /// The finest grid for these samples, millimetres between its nodes.
+    pub(super) fn finest_pitch_mm(&self) -> f64 {
+        let [width, height] = self.sides_mm();
+        let nodes = NODES_ALWAYS.max(self.samples as f64 * NODES_PER_SAMPLE);
+        let pitch_mm = (width * height / nodes).sqrt();
+        // Two digits, not finer than what is allowed.
+        let digit = 10_f64.powf(pitch_mm.log10().floor() - 1.0);
+        format!("{:.1e}", (pitch_mm / digit).ceil() * digit)
+            .parse()
+            .unwrap_or(pitch_mm)
+    }
+}
+
+fn points(columns: &[Column]) -> impl Iterator<Item = [f64; 2]> {
+    columns.iter().flat_map(|column| {
+        let point = |sample: &Sample| [column.x_mm(), sample.y_mm];
+        column.samples().iter().map(point)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn columns(points: &[[f64; 2]]) -> Vec<Column> {
+        let column = |&[x, y_mm]: &[f64; 2]| {
+            let sample = Sample {
+                y_mm,
+                z_mm: 1.0,
+                intensity: 255,
+            };
+            Column::new(x, vec![sample])
+        };
+        points.iter().map(column).collect()
+    }
+
+    #[test]
+    fn samples_on_a_line_enclose_nothing() {
+        let line = |points: &[[f64; 2]]| {
+            let columns = columns(points);
+            Extent::of(&columns).unwrap().line(&columns, 0.0)
+        };
+        assert_eq!(line(&[[1.0, 2.0]]), Some("at one point in x and y"));
+        assert_eq!(
+            line(&[[1.0, 2.0], [1.0, 3.0]]),
+            Some("at one x, a single column")
+        );
+        assert_eq!(line(&[[1.0, 2.0], [4.0, 2.0]]), Some("at one y"));
+        let slanted = Some("on one slanted line in x and y");
+        assert_eq!(line(&[[0.0, 0.0], [0.1, 0.3], [0.2, 0.6]]), slanted);
+        assert_eq!(line(&[[0.0, 0.6], [0.1, 0.3], [0.2, 0.0]]), slanted);
+        assert_eq!(line(&[[0.0, 0.0], [0.1, 0.3], [0.2, 0.7]]), None);
+        assert_eq!(
+            line(&[[0.1, 0.3], [0.0, 0.0], [0.2, 0.6], [0.3, 0.1]]),
+            None
+        );
+        assert_eq!(Extent::of(&[]), None);
+        let square = columns(&[[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]]);
+        assert_eq!(Extent::of(&square).unwrap().line(&square, 1.0), None);
+        let moved = columns(&[[0.0, 0.0], [2.0, 3.0], [2.0, 5.0], [4.0, 8.0]]);
+        assert_eq!(Extent::of(&moved).unwrap().line(&moved, 2.0), slanted);
+    }
+
+    #[test]
+    fn the_finest_grid_follows_from_area_and_samples() {
+        let extent = |samples| Extent {
+            samples,
+            first: [0.0; 2],
+            low: [0.0; 2],
+            high: [100.0, 100.0],
+        };
+        // 10^4 mm^2 over 2^24 nodes: 0.0244 mm.
+        assert_eq!(extent(60_000).finest_pitch_mm(), 0.025);
+        // Over 4 x 10^7: 0.0158 mm.
+        assert_eq!(extent(10_000_000).finest_pitch_mm(), 0.016);
+    }
+}
