@@ -55,6 +55,18 @@ pub(crate) fn table(set: Set, view: View, tallies: &[Tally]) -> String {
             tally.seconds / tally.scenes.max(1) as f64
         );
     }
+    let names = ["1", "2", "3 to 5", "6 and more"];
+    let shares: Vec<String> = names
+        .iter()
+        .zip(first.by_depth)
+        .map(|(name, (all, correct))| format!("{name}: {correct} of {all}"))
+        .collect();
+    let _ = writeln!(
+        out,
+        "\nCorrect by `{}` at 80 %, by nodes from a region's border to its innermost: {}.",
+        first.method.name(),
+        shares.join("; ")
+    );
     out
 }
 

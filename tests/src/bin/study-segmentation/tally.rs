@@ -26,7 +26,12 @@ pub(crate) struct Finding {
     pub(crate) failures: Vec<Failure>,
     /// Truth regions too small to count.
     pub(crate) small: usize,
+    /// Regions that count, and the correct ones among them at [`BAR`], by [`DEPTHS`].
+    pub(crate) by_depth: [(usize, usize); 4],
 }
+
+/// Least depths of the classes of slivers: nodes from the border to the innermost one.
+pub(crate) const DEPTHS: [usize; 4] = [1, 2, 3, 6];
 
 /// Regions that count, by their class.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -96,6 +101,7 @@ pub(crate) fn judge(
     let overlaps = Overlaps::new(&given, &machine);
     let mut at = Vec::new();
     let mut failures = Vec::new();
+    let mut by_depth = [(0, 0); 4];
     for tolerance in TOLERANCES {
         let classes = classify(&overlaps, tolerance, |t| truth.counts(t), LEAST_NODES);
         let mut counts = Counts::default();
@@ -103,6 +109,16 @@ pub(crate) fn judge(
             // A region without any node left is not in the overlaps.
             let class = classes.truth.get(&region.label);
             let class = class.copied().unwrap_or(TruthClass::Missed);
+            let (depth, place) = if tolerance == BAR {
+                innermost(&truth.labels, truth.rows, region.label)
+            } else {
+                (0, (0, 0))
+            };
+            let deep = DEPTHS.iter().rposition(|least| depth >= *least);
+            if let Some(slot) = deep.and_then(|k| by_depth.get_mut(k)) {
+                slot.0 += 1;
+                slot.1 += usize::from(class == TruthClass::Correct);
+            }
             let what = match class {
                 TruthClass::Correct => {
                     counts.correct += 1;
@@ -122,14 +138,13 @@ pub(crate) fn judge(
                 }
             };
             if tolerance == BAR {
-                let (depth, at) = innermost(&truth.labels, truth.rows, region.label);
                 failures.push(Failure {
                     what,
                     label: region.label,
                     nodes: region.nodes,
                     depth,
                     valued: overlaps.truth_nodes(region.label) as f64 / region.nodes as f64,
-                    at,
+                    at: place,
                     shares: overlaps
                         .pairs()
                         .filter(|pair| pair.0 == region.label)
@@ -175,6 +190,7 @@ pub(crate) fn judge(
         at,
         failures,
         small: truth.regions.iter().filter(|r| !r.counts()).count(),
+        by_depth,
     }
 }
 
@@ -221,6 +237,7 @@ pub(crate) struct Tally {
     pub(crate) nodes: (usize, usize),
     pub(crate) seconds: f64,
     pub(crate) at: Vec<Counts>,
+    pub(crate) by_depth: [(usize, usize); 4],
 }
 
 impl Tally {
@@ -233,6 +250,7 @@ impl Tally {
             nodes: (0, 0),
             seconds: 0.0,
             at: vec![Counts::default(); TOLERANCES.len()],
+            by_depth: [(0, 0); 4],
         };
         for finding in findings.filter(|finding| finding.method == method) {
             tally.scenes += 1;
@@ -242,6 +260,9 @@ impl Tally {
             tally.seconds += finding.seconds;
             for (sum, counts) in tally.at.iter_mut().zip(&finding.at) {
                 sum.add(*counts);
+            }
+            for (sum, found) in tally.by_depth.iter_mut().zip(finding.by_depth) {
+                *sum = (sum.0 + found.0, sum.1 + found.1);
             }
         }
         tally
