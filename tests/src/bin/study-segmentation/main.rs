@@ -217,11 +217,11 @@ fn run(options: &Options) -> Result<bool> {
                 _ => &seeds[..],
             };
             let agreed = agree::views(&store, set, seeds, view)?;
-            bars.push(report::agreement(set, &agreed));
+            told(&mut bars, report::agreement(set, &agreed));
         }
         if set != Set::Abw {
             let found = agree::clutter(&store, set, &seeds)?;
-            bars.push(report::clutter(set, &found));
+            told(&mut bars, report::clutter(set, &found));
         }
     }
     account.say(&report::verdicts(&bars));
@@ -232,6 +232,12 @@ fn run(options: &Options) -> Result<bool> {
         std::fs::write(&file, text).with_context(|| format!("cannot write {}", file.display()))?;
     }
     Ok(!options.check || bars.iter().all(|bar| bar.holds))
+}
+
+/// Keeps a bar, and tells of it at once: the others take minutes.
+fn told(bars: &mut Vec<Bar>, bar: Bar) {
+    eprintln!("{} {}", bar.set.name(), bar.what);
+    bars.push(bar);
 }
 
 /// Scores every method on the scenes of a set, scanned in one way.

@@ -117,16 +117,14 @@ fn said(program: &Path, words: &[&str]) -> Result<String> {
 }
 
 impl Peer {
-    /// Parameters chosen on the scenes for tuning, by set, from the grid that
-    /// [`Peer::tried`] states.
+    /// Parameters chosen on the scenes for tuning, by set; `tests/peers/README.md` says which
+    /// were tried.
     pub(crate) fn parameters(&self, set: Set) -> &'static str {
         match (self.method, set) {
-            (Method::Open3d, Set::Polyhedral) => "30 60 75 0.5",
-            (Method::Open3d, Set::Curved) => "30 60 75 0.5",
-            (Method::Open3d, Set::Abw) => "30 60 75 0.5",
-            (_, Set::Polyhedral) => "16 0.3 20 60",
-            (_, Set::Curved) => "16 0.3 20 60",
-            (_, Set::Abw) => "16 0.6 20 60",
+            (Method::Open3d, Set::Polyhedral | Set::Curved) => "30 5 88 0.5",
+            (Method::Open3d, Set::Abw) => "30 40 60 0.5",
+            (_, Set::Polyhedral | Set::Curved) => "12 0.25 20 60",
+            (_, Set::Abw) => "16 0.5 20 60",
         }
     }
 
