@@ -15,14 +15,23 @@ use sha2::{Digest, Sha256};
 use sim_scanner::scene::FaceId;
 
 /// Sources that decide what a range image or a truth is.
-const SOURCES: [&str; 7] = [
-    "Cargo.lock",
+const SOURCES: [&str; 6] = [
     "daemon/scan-files/src/pitch.rs",
     "geometry/pipeline/src/settings.rs",
     "geometry/range-image/src",
     "geometry/regrid/src",
     "sim-scanner/src",
     "tests/src/scenes",
+];
+
+/// Libraries whose versions do, too.
+const LIBRARIES: [&str; 6] = [
+    "glam",
+    "libm",
+    "nalgebra",
+    "parry3d-f64",
+    "rand_core",
+    "rand_xoshiro",
 ];
 
 /// Where the material is.
@@ -58,6 +67,12 @@ impl Store {
         let mut hash = Sha256::new();
         for source in SOURCES {
             add(&mut hash, &root.join(source))?;
+        }
+        let lock = fs::read_to_string(root.join("Cargo.lock")).context("no Cargo.lock")?;
+        let of = |name: &str| format!("\nname = \"{name}\"\n");
+        let entries = lock.split("[[package]]");
+        for entry in entries.filter(|e| LIBRARIES.iter().any(|name| e.contains(&of(name)))) {
+            hash.update(entry);
         }
         let key: String = hash.finalize()[..8]
             .iter()
