@@ -29,7 +29,15 @@ pub enum Object {
 
 impl Object {
     /// The objects that come with the simulator.
-    pub const BUILT_IN: [&'static str; 4] = ["house", "cylinder", "figure", "groove"];
+    pub const BUILT_IN: [&'static str; 7] = [
+        "house",
+        "cylinder",
+        "figure",
+        "groove",
+        "house-on-table",
+        "cylinder-on-table",
+        "house-before-plane",
+    ];
 }
 
 impl Default for Object {
@@ -86,7 +94,7 @@ pub struct SimConfig {
 #[derive(Debug, Error)]
 pub enum SimError {
     /// No object of that name.
-    #[error("no object is called {0:?}: use house, cylinder, figure, groove, or an STL file")]
+    #[error("no object is called {0:?}: use {known}, or an STL file", known = Object::BUILT_IN.join(", "))]
     UnknownObject(String),
     /// The object's file cannot be opened.
     #[error("cannot open {path}: {source}; objects are house, cylinder, or an STL file")]

@@ -25,8 +25,9 @@ struct Cli {
     #[arg(long, value_name = "LINK")]
     pty: PathBuf,
 
-    /// What stands on the table: house, cylinder, figure, groove, or an STL file in mm, which
-    /// keeps its own coordinates
+    /// What stands on the table: house, cylinder, figure, groove; house-on-table,
+    /// cylinder-on-table, house-before-plane, which have a background; or an STL file in mm,
+    /// which keeps its own coordinates
     #[arg(long, default_value = "house", value_name = "OBJECT|FILE.stl")]
     object: Object,
 

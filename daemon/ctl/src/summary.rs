@@ -34,6 +34,18 @@ pub(crate) fn lines(report: &Report) -> Vec<String> {
         model.free_edges
     ));
     lines.push(format!(
+        "part         {} regions of at least {} nodes, {}",
+        report.regions.count,
+        report.settings.minimum_nodes,
+        crumbs(report)
+    ));
+    lines.extend(report.background.list.iter().map(|region| {
+        format!(
+            "left out     {} of {} nodes: {}",
+            region.kind, region.nodes, region.why
+        )
+    }));
+    lines.push(format!(
         "agreement    SNR {} dB, {} lost, {} invented",
         decibels(report.snr_db),
         output::counted(report.lost_nodes, "node"),
@@ -71,19 +83,33 @@ fn regions(report: &Report) -> String {
         largest.truncate(MOST_REGIONS);
     }
     output::table(
-        &["REGION", "SURFACE", "NODES", "RMS MM", "MAX MM", "PSNR DB"],
-        &[0, 2, 3, 4, 5],
+        &[
+            "REGION", "SURFACE", "NODES", "AREA MM2", "RMS MM", "MAX MM", "PSNR DB",
+        ],
+        &[0, 2, 3, 4, 5, 6],
         largest.into_iter().map(|region| {
             vec![
                 region.label.to_string(),
                 region.kind.clone(),
                 region.nodes.to_string(),
+                region
+                    .area_mm2
+                    .map_or_else(|| "-".into(), |area| format!("{area:.1}")),
                 millimetres(region.rms_mm),
                 millimetres(region.max_mm),
                 decibels(region.psnr_db),
             ]
         }),
     )
+}
+
+/// What belongs to no region.
+fn crumbs(report: &Report) -> String {
+    match report.crumbs.count {
+        0 => "no crumbs".into(),
+        1 => format!("1 crumb of {} nodes", report.crumbs.nodes),
+        count => format!("{count} crumbs of {} nodes in all", report.crumbs.nodes),
+    }
 }
 
 fn millimetres(length_mm: Option<f64>) -> String {

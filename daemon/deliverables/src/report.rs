@@ -20,8 +20,14 @@ pub struct Report {
     pub settings: SettingsReport,
     /// The uniform range image.
     pub range_image: RangeImageReport,
-    /// The surface regions found in it.
+    /// The surface regions of the part.
     pub regions: RegionsReport,
+    /// Regions recognised as table, back plane or fixture, and removed.
+    #[serde(default)]
+    pub background: BackgroundReport,
+    /// Nodes that belong to no region.
+    #[serde(default)]
+    pub crumbs: CrumbsReport,
     /// The trimmed faces made of them.
     pub model: ModelReport,
     /// Signal-to-noise ratio of the whole restored image against the range image,
@@ -87,6 +93,21 @@ pub struct SettingsReport {
     pub step_factor: f64,
     /// Smaller regions are left out.
     pub minimum_nodes: usize,
+    /// Regions that cover less, seen from the camera, are left out.
+    #[serde(default)]
+    pub minimum_area_mm2: f64,
+    /// What is done with a table or back plane: `remove` or `keep`.
+    #[serde(default)]
+    pub background: String,
+    /// Region of interest, least and greatest x; `null` where there is no limit.
+    #[serde(default)]
+    pub roi_x_mm: [Option<f64>; 2],
+    /// Region of interest, least and greatest y.
+    #[serde(default)]
+    pub roi_y_mm: [Option<f64>; 2],
+    /// Region of interest, least and greatest z.
+    #[serde(default)]
+    pub roi_z_mm: [Option<f64>; 2],
     /// Root mean square distance from the nodes at which a fitted surface is not made
     /// nearer still; no bound on how far it may lie off.
     pub tolerance_mm: f64,
@@ -133,12 +154,68 @@ pub struct RegionReport {
     pub patches: usize,
     /// Its nodes in the range image.
     pub nodes: usize,
+    /// Area of its trimmed faces on the surface.
+    #[serde(default)]
+    pub area_mm2: Option<f64>,
     /// Root mean square distance of the nodes from the surface, along z.
     pub rms_mm: Option<f64>,
     /// Largest distance of a node from the surface, along z.
     pub max_mm: Option<f64>,
     /// Peak signal-to-noise ratio of the surface at the region's nodes.
     pub psnr_db: Option<f64>,
+}
+
+/// What was removed as background.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct BackgroundReport {
+    /// Regions removed.
+    pub count: usize,
+    /// Nodes removed, scraps beside the regions included.
+    pub nodes: usize,
+    /// One entry for each region.
+    pub list: Vec<BackgroundRegionReport>,
+}
+
+/// One removed region.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BackgroundRegionReport {
+    /// `table`, `back plane` or `fixture`.
+    pub kind: String,
+    /// Its nodes in the range image.
+    pub nodes: usize,
+    /// Unit normal of its plane in the part frame; absent for a fixture.
+    pub normal: Option<[f64; 3]>,
+    /// Distance of its plane from the origin along the normal.
+    pub offset_mm: Option<f64>,
+    /// Root mean square distance of its nodes from the plane.
+    pub rms_mm: Option<f64>,
+    /// The evidence.
+    pub why: String,
+}
+
+/// Nodes that belong to no region.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct CrumbsReport {
+    /// Connected pieces.
+    pub count: usize,
+    /// Nodes in all of them.
+    pub nodes: usize,
+    /// The largest of them, at most [`CrumbsReport::LISTED`].
+    pub list: Vec<CrumbReport>,
+}
+
+impl CrumbsReport {
+    /// Most crumbs that are listed one by one.
+    pub const LISTED: usize = 50;
+}
+
+/// Connected nodes that belong to no region.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CrumbReport {
+    /// How many.
+    pub nodes: usize,
+    /// Their mean place.
+    pub centre_mm: [f64; 3],
 }
 
 /// The trimmed faces.

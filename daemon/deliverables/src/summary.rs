@@ -2,14 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use pipeline::{Outcome, Settings};
+use pipeline::{NodeRole, Outcome, Settings};
 use range_image::RangeImage;
 use reconstruct::{Face, Model, Surface};
 use regrid::Estimator;
 
 use crate::export::CadOptions;
 use crate::report::{
-    ModelReport, RangeImageReport, RegionReport, RegionsReport, Report, SettingsReport,
+    BackgroundRegionReport, BackgroundReport, CrumbReport, CrumbsReport, ModelReport,
+    RangeImageReport, RegionReport, RegionsReport, Report, SettingsReport,
 };
 use crate::write::Inputs;
 
@@ -19,6 +20,7 @@ impl Report {
     pub fn new(inputs: &Inputs<'_>, timings_s: BTreeMap<String, f64>) -> Self {
         let reconstruction = &inputs.outcome.reconstruction;
         let mut warnings = inputs.warnings.clone();
+        warnings.extend(inputs.outcome.background.notes.iter().cloned());
         warnings.extend(reconstruction.warnings.iter().cloned());
         let mut versions = inputs.versions.clone();
         versions.insert("relief".into(), env!("CARGO_PKG_VERSION").into());
@@ -29,6 +31,8 @@ impl Report {
             settings: settings(inputs.settings, inputs.cad),
             range_image: range_image(inputs.image),
             regions: regions(inputs.outcome),
+            background: background(inputs.outcome),
+            crumbs: crumbs(inputs.outcome),
             model: model(&reconstruction.model),
             snr_db: finite(reconstruction.metrics.snr_db),
             lost_nodes: reconstruction.metrics.lost_nodes,
@@ -62,9 +66,18 @@ fn settings(settings: &Settings, cad: &CadOptions) -> SettingsReport {
         crease_angle_rad: settings.segment.crease_angle_rad,
         step_factor: settings.segment.step_factor,
         minimum_nodes: settings.segment.minimum_nodes,
+        minimum_area_mm2: settings.segment.minimum_area_mm2,
+        background: settings.background.as_str().to_owned(),
+        roi_x_mm: limits(settings.regrid.roi.x_mm),
+        roi_y_mm: limits(settings.regrid.roi.y_mm),
+        roi_z_mm: limits(settings.regrid.roi.z_mm),
         tolerance_mm: settings.reconstruct.tolerance_mm,
         iges_entities: cad.entity_number(),
     }
+}
+
+fn limits((low, high): (f64, f64)) -> [Option<f64>; 2] {
+    [finite(low), finite(high)]
 }
 
 fn range_image(image: &RangeImage) -> RangeImageReport {
@@ -93,6 +106,7 @@ fn regions(outcome: &Outcome) -> RegionsReport {
                 faces: own().map(|face| face.name.clone()).collect(),
                 patches: fit.patches,
                 nodes: fit.nodes,
+                area_mm2: finite(fit.area_mm2),
                 rms_mm: finite(fit.rms_mm),
                 max_mm: finite(fit.max_mm),
                 psnr_db: finite(fit.psnr_db),
@@ -102,6 +116,42 @@ fn regions(outcome: &Outcome) -> RegionsReport {
     RegionsReport {
         count: usize::from(outcome.regions.regions()),
         list,
+    }
+}
+
+fn background(outcome: &Outcome) -> BackgroundReport {
+    let regions = &outcome.background.regions;
+    let nodes = outcome.roles.iter();
+    BackgroundReport {
+        count: regions.len(),
+        nodes: nodes.filter(|&&r| r == NodeRole::Background).count(),
+        list: regions
+            .iter()
+            .map(|region| BackgroundRegionReport {
+                kind: region.kind.as_str().to_owned(),
+                nodes: region.nodes,
+                normal: region.plane.map(|plane| plane.normal),
+                offset_mm: region.plane.map(|plane| plane.offset_mm),
+                rms_mm: region.plane.map(|plane| plane.rms_mm),
+                why: region.why.clone(),
+            })
+            .collect(),
+    }
+}
+
+fn crumbs(outcome: &Outcome) -> CrumbsReport {
+    let crumbs = &outcome.crumbs;
+    CrumbsReport {
+        count: crumbs.len(),
+        nodes: crumbs.iter().map(|crumb| crumb.nodes).sum(),
+        list: crumbs
+            .iter()
+            .take(CrumbsReport::LISTED)
+            .map(|crumb| CrumbReport {
+                nodes: crumb.nodes,
+                centre_mm: crumb.centre_mm,
+            })
+            .collect(),
     }
 }
 

@@ -79,6 +79,16 @@ pub enum Method {
     ShimLee,
 }
 
+/// What is done with a recognised table, back plane or fixture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BackgroundPolicy {
+    /// It gives no faces; the report lists it.
+    Remove,
+    /// Nothing is looked for; every region is a face of the part.
+    Keep,
+}
+
 /// From the range image to regions.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -104,6 +114,12 @@ pub struct SegmentConfig {
     /// Smaller regions are left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub minimum_nodes: Option<usize>,
+    /// Regions that cover less, seen from the camera, are left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub minimum_area_mm2: Option<f64>,
+    /// What is done with a recognised table, back plane or fixture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub background: Option<BackgroundPolicy>,
 }
 
 /// From regions to trimmed surfaces.
@@ -232,6 +248,13 @@ impl Processing {
         }
         self.regrid.apply(&mut settings.regrid);
         self.segment.apply(&mut settings.segment);
+        set(
+            &mut settings.background,
+            self.segment.background.map(|policy| match policy {
+                BackgroundPolicy::Remove => pipeline::BackgroundPolicy::Remove,
+                BackgroundPolicy::Keep => pipeline::BackgroundPolicy::Keep,
+            }),
+        );
         self.reconstruct.apply(&mut settings.reconstruct);
         settings
     }
@@ -284,6 +307,7 @@ impl SegmentConfig {
         set(&mut settings.crease_angle_rad, self.crease_angle_rad);
         set(&mut settings.step_factor, self.step_factor);
         set(&mut settings.minimum_nodes, self.minimum_nodes);
+        set(&mut settings.minimum_area_mm2, self.minimum_area_mm2);
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use deliverables::{CadOptions, DeliverError, Entities, Inputs, ScanReport, Stopwatch};
-use pipeline::{Observer, PipelineError, Stage};
+use pipeline::{Observer, PipelineError, Stage, View};
 use range_image::{Cancelled, Lattice, Monitor, RangeImage};
 use relief_api::{Job, Scan};
 use scan_record::{Ending, Header, JournalReader, ReadError};
@@ -108,13 +108,13 @@ fn attempt(
 
     let watch = Stopwatch::new(progress);
     let (image, kept) = match streamed(service, job, &settings.regrid) {
-        Some(image) => (image, count(&mut journal, progress)?),
+        Some(image) => (image, count(&mut journal, &header, progress)?),
         None => {
             watch.stage(Stage::Regrid);
             regrid(&mut journal, &header, &settings.regrid, &scan, &watch)?
         }
     };
-    let outcome = pipeline::process(&image, &settings, &watch)?;
+    let outcome = pipeline::process_in_view(&image, &kept.view, &settings, &watch)?;
     let timestamp = scan
         .started_at
         .parse()
@@ -144,11 +144,16 @@ struct Kept {
     columns: u64,
     samples: u64,
     dropouts: u64,
+    /// Where the table was, columns without samples included.
+    view: View,
     warnings: Vec<String>,
 }
 
 impl Kept {
-    fn add(&mut self, column: &scan_record::RawColumn) {
+    fn add(&mut self, column: &scan_record::RawColumn, header: &Header) {
+        let x = header.calibration.x_mm(column.table_counts);
+        let (low, high) = self.view.x_mm.unwrap_or((x, x));
+        self.view.x_mm = Some((low.min(x), high.max(x)));
         self.columns += 1;
         self.samples += column.samples.len() as u64;
         self.dropouts += u64::from(column.dropouts);
@@ -185,10 +190,10 @@ fn streamed(service: &Service, job: &Job, settings: &regrid::RegridSettings) -> 
 }
 
 /// Counts what the journal holds, and whether it is whole.
-fn count(journal: &mut Journal, progress: &Progress<'_>) -> Result<Kept, Stop> {
+fn count(journal: &mut Journal, header: &Header, progress: &Progress<'_>) -> Result<Kept, Stop> {
     let mut kept = Kept::default();
     while let Some(column) = journal.next_column()? {
-        kept.add(&column);
+        kept.add(&column, header);
         progress.check()?;
     }
     kept.end(journal.ending());
@@ -229,7 +234,7 @@ fn regrid(
     let columns = std::iter::from_fn(|| match journal.next_column() {
         _ if watch.is_cancelled() => None,
         Ok(column) => column.map(|raw| {
-            kept.add(&raw);
+            kept.add(&raw, header);
             raw.calibrated(&header.calibration)
         }),
         Err(error) => {

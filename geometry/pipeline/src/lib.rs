@@ -3,17 +3,22 @@
 //! ```text
 //! columns --> regrid --> RangeImage --> segment --> RegionMap --> reconstruct --> Model
 //!             (process_columns)         (process ............................)
+//!                                          |
+//!                                          +--> background, crumbs: listed, not exported
 //! ```
 //!
 //! Everything is pure: the caller brings a monitor for progress and cancellation, and an
 //! [`Observer`] learns when each stage begins, so that time is measured outside.
 
+mod background;
 mod method;
 mod observer;
 mod process;
 mod settings;
 
+pub use background::{BackgroundPolicy, Crumb, NodeRole, UnknownPolicy};
 pub use method::{Method, UnknownMethod};
 pub use observer::{Observer, Stage};
-pub use process::{Outcome, PipelineError, process, process_columns};
+pub use process::{Outcome, PipelineError, process, process_columns, process_in_view};
+pub use segment::{Background, BackgroundKind, BackgroundRegion, Plane, View};
 pub use settings::{Settings, SettingsError};

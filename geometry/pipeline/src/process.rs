@@ -5,13 +5,22 @@ use reconstruct::{ReconstructError, Reconstruction};
 use regrid::RegridError;
 use segment::SegmentError;
 
+use crate::background::separate;
+use crate::{Background, Crumb, NodeRole, View};
 use crate::{Observer, Settings, SettingsError, Stage};
 
 /// What became of a range image.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// Its regions.
+    /// The regions of the part; those of the background have label 0.
     pub regions: RegionMap,
+    /// What was recognised as background and removed. Its labels are those before the
+    /// removal; what they lay at is told by `roles`.
+    pub background: Background,
+    /// What each node counts as, column by column as [`RangeImage::raw_z_mm`].
+    pub roles: Vec<NodeRole>,
+    /// Connected nodes that belong to no region, the largest first.
+    pub crumbs: Vec<Crumb>,
     /// The model made of them, and how well it fits.
     pub reconstruction: Reconstruction,
     /// The stages that ran, in order.
@@ -31,6 +40,12 @@ pub enum PipelineError {
     /// No node of the grid has a value.
     #[error("nothing was measured: no node of the grid has a value")]
     NothingMeasured,
+    /// No node of the grid lies in the region of interest.
+    #[error("nothing was measured in the region of interest: {roi}")]
+    NothingInRoi {
+        /// Its limits.
+        roi: String,
+    },
     /// The grid has values, but no surface.
     #[error("no surface was found among the {nodes} nodes measured, at a pitch of {pitch_mm} mm")]
     NoSurface {
@@ -63,8 +78,12 @@ impl PipelineError {
     pub fn hint(&self) -> Option<&'static str> {
         match self {
             Self::NothingMeasured => Some(
-                "check that the part stands in view, that the laser reaches it, and that no \
-                 region of interest excludes it; if samples are there, choose a larger pitch",
+                "check that the part stands in view and that the laser reaches it; if samples \
+                 are there, choose a larger pitch",
+            ),
+            Self::NothingInRoi { .. } => Some(
+                "the limits are millimetres in the part frame (x along the table, y up, z towards \
+                 the camera); widen them, or leave them out to see where the part lies",
             ),
             Self::NoSurface { .. } => Some(
                 "what was measured is too scattered or too small; choose a larger pitch or a \
@@ -124,8 +143,15 @@ pub fn process_columns(
 ) -> Result<(RangeImage, Outcome), PipelineError> {
     settings.validate()?;
     observer.stage(Stage::Regrid);
+    let mut x_mm: Option<(f64, f64)> = None;
+    let columns = columns.into_iter().inspect(|column| {
+        let x = column.x_mm();
+        let (low, high) = x_mm.unwrap_or((x, x));
+        x_mm = Some((low.min(x), high.max(x)));
+    });
     let image = regrid::regrid(columns, &settings.regrid, observer)?;
-    let mut outcome = process(&image, settings, observer)?;
+    let view = View { x_mm, y_mm: None };
+    let mut outcome = process_in_view(&image, &view, settings, observer)?;
     outcome.stages.insert(0, Stage::Regrid);
     Ok((image, outcome))
 }
@@ -141,11 +167,31 @@ pub fn process(
     settings: &Settings,
     observer: &dyn Observer,
 ) -> Result<Outcome, PipelineError> {
+    process_in_view(image, &View::default(), settings, observer)
+}
+
+/// As [`process`], told what the scanner looked at: a plane that ends before the view does
+/// is not cut off by it, so it is no table.
+///
+/// # Errors
+/// As [`process`].
+pub fn process_in_view(
+    image: &RangeImage,
+    view: &View,
+    settings: &Settings,
+    observer: &dyn Observer,
+) -> Result<Outcome, PipelineError> {
     settings.validate()?;
     observer.check()?;
     let nodes = image.valid_nodes();
+    let roi = settings.regrid.roi;
     if nodes == 0 {
-        return Err(PipelineError::NothingMeasured);
+        return Err(if roi == regrid::Roi::default() {
+            PipelineError::NothingMeasured
+        } else {
+            let roi = roi.to_string();
+            PipelineError::NothingInRoi { roi }
+        });
     }
 
     observer.stage(Stage::Segment);
@@ -155,11 +201,19 @@ pub fn process(
         return Err(PipelineError::NoSurface { nodes, pitch_mm });
     }
 
+    let view = view.within(roi.x_mm, roi.y_mm);
+    let part = separate(image, regions, &view, settings.background);
+    observer.check()?;
+
     observer.stage(Stage::Reconstruct);
+    let part_image = part.image.as_ref().unwrap_or(image);
     let reconstruction =
-        reconstruct::reconstruct(image, &regions, &settings.reconstruct, observer)?;
+        reconstruct::reconstruct(part_image, &part.regions, &settings.reconstruct, observer)?;
     Ok(Outcome {
-        regions,
+        regions: part.regions,
+        background: part.background,
+        roles: part.roles,
+        crumbs: part.crumbs,
         reconstruction,
         stages: vec![Stage::Segment, Stage::Reconstruct],
     })

@@ -4,7 +4,7 @@ use reconstruct::ReconstructSettings;
 use regrid::RegridSettings;
 use segment::SegmentSettings;
 
-use crate::Method;
+use crate::{BackgroundPolicy, Method};
 
 /// The settings of every stage that can change the result.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +13,8 @@ pub struct Settings {
     pub regrid: RegridSettings,
     /// From the range image to regions.
     pub segment: SegmentSettings,
+    /// What is done with a recognised table or back plane.
+    pub background: BackgroundPolicy,
     /// From regions to the model.
     pub reconstruct: ReconstructSettings,
 }
@@ -34,6 +36,7 @@ impl Settings {
         Self {
             regrid: RegridSettings::with_pitch(pitch_mm),
             segment: SegmentSettings::default(),
+            background: BackgroundPolicy::default(),
             reconstruct: ReconstructSettings::default(),
         }
         .with_seed(1)

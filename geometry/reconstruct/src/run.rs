@@ -44,6 +44,8 @@ pub struct RegionFit {
     pub faces: usize,
     /// Patches of its surfaces, in all.
     pub patches: usize,
+    /// Area of its trimmed faces on the surface, square millimetres.
+    pub area_mm2: f64,
     /// Root mean square residual in z, millimetres.
     pub rms_mm: f64,
     /// Greatest residual in z, millimetres.
@@ -143,7 +145,7 @@ pub fn reconstruct(
     }
     let model = model(&planar, carriers, placement);
     monitor.check()?;
-    let restored = restore(image, &model, placement);
+    let restored = restore(image, &model, placement, &mut fits);
     monitor.progress(1.0);
     Ok(Reconstruction {
         metrics: compare(image, &restored),
@@ -282,6 +284,7 @@ fn tally(
             nodes: nodes.len(),
             faces: 1,
             patches: surface.patches.len(),
+            area_mm2: 0.0,
             rms_mm: (sum / count).sqrt(),
             max_mm,
             psnr_db: 0.0,
@@ -304,8 +307,15 @@ fn names(regions: &[u16]) -> Vec<String> {
     names
 }
 
-/// z of the trimmed faces at the nodes of the image.
-fn restore(image: &RangeImage, model: &Model, placement: Placement) -> RangeImage {
+/// z of the trimmed faces at the nodes of the image; their areas go to the account.
+fn restore(
+    image: &RangeImage,
+    model: &Model,
+    placement: Placement,
+    fits: &mut [RegionFit],
+) -> RangeImage {
+    let pitch_mm = image.pitch_mm();
+    let (x_mm, y_mm) = (image.x_mm(0), image.y_mm(0));
     let mut restored = image.masked_like();
     for face in &model.faces {
         let Surface::Patches(surface) = &face.surface;
@@ -316,6 +326,14 @@ fn restore(image: &RangeImage, model: &Model, placement: Placement) -> RangeImag
             let z = surface.z(image.x_mm(column), image.y_mm(row));
             restored.set_z_mm(column, row, Some(z));
         });
+        let area = trim.area(image.columns(), |column, row| {
+            let at = (x_mm + column * pitch_mm, y_mm + row * pitch_mm);
+            let [p, q] = [(1, 0), (0, 1)].map(|(u, v)| surface.z_partial(at.0, at.1, u, v));
+            libm::sqrt(1.0 + p * p + q * q)
+        });
+        if let Some(fit) = fits.iter_mut().find(|fit| fit.label == face.region) {
+            fit.area_mm2 += area * pitch_mm * pitch_mm;
+        }
     }
     restored
 }

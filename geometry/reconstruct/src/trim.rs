@@ -44,6 +44,31 @@ impl Trim {
     /// Calls `visit(column, row)` for each node inside, by even and odd crossings along
     /// each column.
     pub(crate) fn nodes(&self, columns: usize, rows: usize, mut visit: impl FnMut(usize, usize)) {
+        self.spans(columns, |column, low, high| {
+            let first = low.ceil().max(0.0) as usize;
+            let end = (high.ceil().max(0.0) as usize).min(rows);
+            for row in first..end {
+                visit(column, row);
+            }
+        });
+    }
+
+    /// Area inside in square pitches, each place counted with its weight: one strip for
+    /// each column, cut into pieces of at most a pitch.
+    pub(crate) fn area(&self, columns: usize, weight: impl Fn(f64, f64) -> f64) -> f64 {
+        let mut area = 0.0;
+        self.spans(columns, |column, low, high| {
+            let count = (high - low).ceil().max(1.0);
+            let width = (high - low) / count;
+            for k in 0..count as usize {
+                area += width * weight(column as f64, low + (k as f64 + 0.5) * width);
+            }
+        });
+        area
+    }
+
+    /// Calls `visit(column, low, high)` for each stretch of each column that lies inside.
+    fn spans(&self, columns: usize, mut visit: impl FnMut(usize, f64, f64)) {
         let mut crossings: Vec<Vec<f64>> = vec![Vec::new(); columns];
         for [a, b] in &self.segments {
             let (a, b) = if a[0] <= b[0] { (a, b) } else { (b, a) };
@@ -58,11 +83,7 @@ impl Trim {
         for (column, mut found) in crossings.into_iter().enumerate() {
             found.sort_by(f64::total_cmp);
             for pair in found.chunks_exact(2) {
-                let first = pair[0].ceil().max(0.0) as usize;
-                let end = (pair[1].ceil().max(0.0) as usize).min(rows);
-                for row in first..end {
-                    visit(column, row);
-                }
+                visit(column, pair[0], pair[1]);
             }
         }
     }
@@ -91,6 +112,9 @@ mod tests {
         let trim = Trim::new(curves.iter(), 1.0, |p| p);
         let mut inside = vec![false; 21 * 21];
         trim.nodes(21, 21, |column, row| inside[column * 21 + row] = true);
+        let area = trim.area(21, |_, _| 2.0);
+        let expected = 2.0 * core::f64::consts::PI * (64.0 - 9.0);
+        assert!((area / expected - 1.0).abs() < 0.005, "{area} {expected}");
         for column in 0..21 {
             for row in 0..21 {
                 let (x, y) = (column as f64 - 10.3, row as f64 - 10.2);

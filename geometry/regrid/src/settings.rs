@@ -1,6 +1,7 @@
 //! Settings of the regridder.
 
 use core::cmp::Ordering;
+use core::fmt;
 
 /// How z at a node is estimated from its window of samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -34,6 +35,26 @@ impl Default for Roi {
             y_mm: all,
             z_mm: all,
         }
+    }
+}
+
+impl fmt::Display for Roi {
+    /// Such as `x -50 to 50 mm, z from -30 mm`; `everything` without limits.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut separator = "";
+        for (axis, (low, high)) in [("x", self.x_mm), ("y", self.y_mm), ("z", self.z_mm)] {
+            match (low.is_finite(), high.is_finite()) {
+                (true, true) => write!(f, "{separator}{axis} {low} to {high} mm")?,
+                (true, false) => write!(f, "{separator}{axis} from {low} mm")?,
+                (false, true) => write!(f, "{separator}{axis} up to {high} mm")?,
+                (false, false) => continue,
+            }
+            separator = ", ";
+        }
+        if separator.is_empty() {
+            f.write_str("everything")?;
+        }
+        Ok(())
     }
 }
 

@@ -17,6 +17,7 @@
 //! neighbours and are given to these. Steps below about two pitches may be bridged where
 //! noise hides them.
 
+mod background;
 mod cluster;
 mod components;
 mod crease;
@@ -32,6 +33,7 @@ mod scene;
 mod segmentation;
 mod settings;
 
+pub use background::{Background, BackgroundKind, BackgroundRegion, Plane, View, background};
 pub use normals::{Normals, Window, normals};
 pub use segmentation::{
     MAX_Z_MM, Report, SegmentError, Segmentation, segment, segment_with_report,

@@ -123,7 +123,7 @@ pub fn segment_with_report(
     monitor.progress(0.2);
     let (mut labels, components) = clusters(&scene, &normals, settings, monitor)?;
     monitor.progress(0.45);
-    let minimum = settings.minimum_nodes;
+    let minimum = settings.fewest_nodes(grid.pitch_mm);
     let (slim, reaches): (u8, &[usize]) = match settings.method {
         // Mixed normals may have made clusters along creases, up to four nodes wide.
         Method::ShimLee => (2, &[FIT_REACH, 4]),
@@ -146,7 +146,7 @@ pub fn segment_with_report(
     dissolve_slivers(&scene, &mut labels, minimum, 2, Border::All);
     regrow(&scene, &mut labels, monitor)?;
     monitor.progress(0.95);
-    let (labels, crumbs, crumb_nodes) = finish(&scene, &measured, &labels, settings.minimum_nodes);
+    let (labels, crumbs, crumb_nodes) = finish(&scene, &measured, &labels, minimum);
     monitor.progress(1.0);
     Ok(Segmentation {
         regions: RegionMap::new(image, labels),

@@ -41,6 +41,9 @@ pub struct SegmentSettings {
     pub step_factor: f64,
     /// Regions with fewer nodes than this stay unlabelled, at least 1.
     pub minimum_nodes: usize,
+    /// Regions that cover less than this, seen from the camera, stay unlabelled, square
+    /// millimetres; 0 for no such limit.
+    pub minimum_area_mm2: f64,
     /// Seed of the clustering's random starts.
     pub seed: u64,
 }
@@ -53,6 +56,7 @@ impl Default for SegmentSettings {
             crease_angle_rad: 0.2,
             step_factor: 1.0,
             minimum_nodes: 50,
+            minimum_area_mm2: 0.0,
             seed: 0,
         }
     }
@@ -73,6 +77,9 @@ pub enum SettingsError {
     /// Minimum size of a region.
     #[error("minimum_nodes is 0, but a region has at least 1 node")]
     MinimumNodes,
+    /// Minimum area of a region.
+    #[error("minimum_area_mm2 is {0}, but must be 0 or more, and finite")]
+    MinimumArea(f64),
 }
 
 impl SegmentSettings {
@@ -97,6 +104,15 @@ impl SegmentSettings {
         if self.minimum_nodes == 0 {
             return Err(SettingsError::MinimumNodes);
         }
+        if !(self.minimum_area_mm2 >= 0.0 && self.minimum_area_mm2.is_finite()) {
+            return Err(SettingsError::MinimumArea(self.minimum_area_mm2));
+        }
         Ok(())
+    }
+
+    /// Fewest nodes of a region on a grid of this pitch, millimetres.
+    pub(crate) fn fewest_nodes(&self, pitch_mm: f64) -> usize {
+        let by_area = libm::ceil(self.minimum_area_mm2 / (pitch_mm * pitch_mm));
+        self.minimum_nodes.max(by_area as usize)
     }
 }

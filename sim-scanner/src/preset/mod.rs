@@ -4,7 +4,7 @@ use crate::mechanics::Mechanics;
 use crate::noise::NoiseModel;
 use crate::optics::Optics;
 use crate::scanner::{Head, HeadKind, Scanner, Sweep};
-use crate::scene::{Material, Scene, figures};
+use crate::scene::{Material, Scene, benches, figures};
 use thiserror::Error;
 
 mod propose;
@@ -192,12 +192,13 @@ impl Preset {
         let noise = overrides.apply_to(base.noise);
         noise.validate().map_err(SetupError::Setting)?;
         let (low, high) = scene.object_extent_mm();
+        let (view_low, view_high) = scene.view_extent_mm();
         let middle = (low + high) / 2.0;
         let standoff_mm = overrides.standoff_mm.unwrap_or(base.standoff_mm);
         // The object may take up to 4/5 of the way to the camera on the near side.
         let depth_mm = standoff_mm * 0.8;
         for (size_mm, along, most_mm) in [
-            (high.x - low.x, "along the table", TABLE_MM),
+            (view_high.x - view_low.x, "along the table", TABLE_MM),
             (high.y - low.y, "high", standoff_mm),
             (high.z - low.z, "deep", depth_mm * 2.0),
         ] {
@@ -233,7 +234,10 @@ impl Preset {
         };
         // The paper's window reaches 50 mm before and behind the middle; a deeper object
         // widens it.
-        let half_depth = ((high.z - low.z) / 2.0 * 1.1 + 5.0).max(standoff_mm / 15.0);
+        let half_mm = ((high.z - low.z) / 2.0)
+            .max(view_high.z - middle.z)
+            .max(middle.z - view_low.z);
+        let half_depth = (half_mm * 1.1 + 5.0).max(standoff_mm / 15.0);
         let scanner = Scanner {
             scene,
             optics,
@@ -254,7 +258,8 @@ impl Preset {
             noise,
             seed,
         };
-        let sweep = propose::propose(&scanner, &base, overrides, low.to_array(), high.to_array())?;
+        let (low, high) = (view_low.to_array(), view_high.to_array());
+        let sweep = propose::propose(&scanner, &base, overrides, low, high)?;
         Ok((scanner, sweep))
     }
 
@@ -316,6 +321,9 @@ pub fn object(name: &str, material: Material) -> Option<Scene> {
         "cylinder" => vec![figures::cylinder()],
         "figure" => figures::figure(),
         "groove" => figures::groove(),
+        "house-on-table" => return Some(benches::house_on_table(material)),
+        "cylinder-on-table" => return Some(benches::cylinder_on_table(material)),
+        "house-before-plane" => return Some(benches::house_before_plane(material)),
         _ => return None,
     };
     Some(Scene::new(bodies, material))

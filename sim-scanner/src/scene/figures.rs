@@ -20,7 +20,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    fn apply(&self, v: Vec3) -> Vec3 {
+    pub(super) fn apply(&self, v: Vec3) -> Vec3 {
         let (sin, cos) = libm::sincos(self.yaw_rad);
         let v = Vec3::new(cos * v.x + sin * v.z, v.y, cos * v.z - sin * v.x);
         let (sin, cos) = libm::sincos(self.pitch_rad);

@@ -1,9 +1,11 @@
 //! What the laser meets: the object, and what stands around it.
 
+pub mod benches;
 pub mod figures;
 mod mesh;
 mod solid;
 
+pub use benches::{cylinder_on_table, house_before_plane, house_on_table};
 pub use figures::{cylinder, figure, groove, house};
 pub use mesh::{Mesh, StlError, TRIANGLES_MAX};
 pub use solid::{ConvexSolid, Surface};
@@ -70,6 +72,8 @@ pub struct Scene {
     pub bodies: Vec<(Body, Material)>,
     /// How many of the bodies are the object; truth is told of these alone.
     pub object_bodies: usize,
+    /// Lower and upper corner of what a proposed scan takes in, if more than the object.
+    pub view_mm: Option<(Vec3, Vec3)>,
 }
 
 impl Scene {
@@ -79,6 +83,7 @@ impl Scene {
         Self {
             object_bodies: object.len(),
             bodies: object.into_iter().map(|body| (body, material)).collect(),
+            view_mm: None,
         }
     }
 
@@ -92,6 +97,13 @@ impl Scene {
     #[must_use]
     pub fn with_back_plane(self, z_mm: f64, material: Material) -> Self {
         self.with_half_space(Vec3::Z, z_mm, material)
+    }
+
+    /// States the box that a proposed scan takes in; the object is always in it.
+    #[must_use]
+    pub fn with_view_mm(mut self, low: Vec3, high: Vec3) -> Self {
+        self.view_mm = Some((low, high));
+        self
     }
 
     fn with_half_space(mut self, normal: Vec3, offset_mm: f64, material: Material) -> Self {
@@ -153,6 +165,14 @@ impl Scene {
         self.bodies
             .get(face.body)
             .map_or(Material::PLASTER, |(_, material)| *material)
+    }
+
+    /// Lower and upper corner of what a proposed scan takes in, millimetres.
+    #[must_use]
+    pub fn view_extent_mm(&self) -> (Vec3, Vec3) {
+        let (low, high) = self.object_extent_mm();
+        self.view_mm
+            .map_or((low, high), |(l, h)| (low.min(l), high.max(h)))
     }
 
     /// Lower and upper corner of the box around the object, millimetres.

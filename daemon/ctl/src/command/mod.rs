@@ -8,6 +8,7 @@ pub(crate) mod doctor;
 pub(crate) mod fetch;
 pub(crate) mod jobs;
 mod named;
+mod part;
 pub(crate) mod rerun;
 pub(crate) mod scan;
 pub(crate) mod scans;

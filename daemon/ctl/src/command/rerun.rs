@@ -3,6 +3,7 @@
 use relief_api::{Job, Rerun, path};
 
 use super::named;
+use super::part::PartArgs;
 use super::setting::{self, Setting};
 use crate::failure::Failure;
 use crate::follow;
@@ -31,6 +32,8 @@ pub(crate) struct Args {
     #[arg(long)]
     wait: bool,
     #[command(flatten)]
+    processed: PartArgs,
+    #[command(flatten)]
     endpoint: EndpointArgs,
 }
 
@@ -41,9 +44,11 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
     } else {
         None
     };
+    let mut settings = setting::overrides(args.settings);
+    args.processed.add_to(&mut settings);
     let request = Rerun {
         name: args.name,
-        settings: setting::overrides(args.settings),
+        settings,
     };
     let scan = named::scan_id(&client, args.scan).await?;
     let mut job: Job = client.post(&path::scan_rerun(&scan), &request).await?;

@@ -3,6 +3,7 @@
 use relief_api::{Job, PlanRequest, Scan, StartScan, path};
 use serde::Serialize;
 
+use super::part::PartArgs;
 use super::setting::{self, Setting};
 use crate::failure::Failure;
 use crate::follow;
@@ -48,6 +49,8 @@ pub(crate) struct Args {
     settings: Vec<Setting>,
     #[command(flatten)]
     plan: PlanArgs,
+    #[command(flatten)]
+    processed: PartArgs,
     #[command(flatten)]
     endpoint: EndpointArgs,
 }
@@ -110,6 +113,8 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
         None
     };
     let plan = args.plan;
+    let mut settings = setting::overrides(args.settings);
+    args.processed.add_to(&mut settings);
     let request = StartScan {
         name: args.name,
         part: args.part,
@@ -127,7 +132,7 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
             samples: plan.samples,
             exposure_us: plan.exposure_us,
         },
-        settings: setting::overrides(args.settings),
+        settings,
     };
     let scan: Scan = client.post(path::SCANS, &request).await?;
     let told = match events {

@@ -38,7 +38,7 @@ use sim_scanner::source::Source;
 #[derive(Debug, Parser)]
 #[command(name = "scan-scene", version)]
 struct Options {
-    /// What stands on the table: house, cylinder, figure, groove, or an STL file in mm
+    /// What stands on the table: a built-in object of the simulator, or an STL file in mm
     #[arg(long, value_name = "OBJECT|FILE.stl", default_value = "house")]
     object: Object,
     /// Send a recorded scan instead

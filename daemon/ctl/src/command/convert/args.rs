@@ -8,6 +8,7 @@ use jiff::Timestamp;
 use pipeline::{Method, Settings};
 use scan_files::Units;
 
+use crate::command::part::PartArgs;
 use crate::failure::Failure;
 
 /// Turn a scan file into a CAD file, without a service
@@ -79,6 +80,8 @@ pub(crate) struct Args {
         hide_default_value = true
     )]
     organisation: String,
+    #[command(flatten)]
+    part: PartArgs,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -196,6 +199,7 @@ impl Args {
         if let Some(draws) = self.draws {
             settings.regrid.draws = draws;
         }
+        self.part.apply(&mut settings);
         settings.regrid.threads = self.threads;
         settings
             .validate()

@@ -5,6 +5,7 @@ use std::io::BufReader;
 use std::path::Path;
 
 use reliefd::{Config, Daemon};
+use sim_scanner::config::Object;
 use sim_scanner::device::DeviceSettings;
 use sim_scanner::endpoint::pty::{self, PtyServer};
 use sim_scanner::line::LineFaults;
@@ -105,7 +106,8 @@ fn source(args: &Args) -> Result<Source, Failure> {
 fn mesh(object: &str) -> Result<Mesh, Failure> {
     if !object.to_ascii_lowercase().ends_with(".stl") {
         return Err(Failure::Usage(format!(
-            "there is no object `{object}`; known are house, cylinder and files ending in .stl"
+            "there is no object `{object}`; known are {} and files ending in .stl",
+            Object::BUILT_IN.join(", ")
         )));
     }
     let file =

@@ -15,7 +15,8 @@ pub(crate) use run::run;
 /// directory is left behind.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// What stands on the table: house, cylinder, or an STL file in millimetres, which
+    /// What stands on the table: house, cylinder; house-on-table or cylinder-on-table, with
+    /// table and wall in view; house-before-plane; or an STL file in millimetres, which
     /// keeps its coordinates
     #[arg(long, value_name = "NAME|FILE.stl", default_value = "house")]
     object: String,
