@@ -97,7 +97,7 @@ pub enum SimError {
     #[error("no object is called {0:?}: use {known}, or an STL file", known = Object::BUILT_IN.join(", "))]
     UnknownObject(String),
     /// The object's file cannot be opened.
-    #[error("cannot open {path}: {source}; objects are house, cylinder, or an STL file")]
+    #[error("cannot open {path}: {source}; objects are {known}, or an STL file", known = Object::BUILT_IN.join(", "))]
     Open {
         /// The file.
         path: PathBuf,

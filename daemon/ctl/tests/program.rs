@@ -95,7 +95,7 @@ fn a_scan_file_becomes_a_cad_file_a_report_and_pictures() {
     for stage in ["regrid", "segment", "reconstruct", "export", "pictures"] {
         assert!(report["timings_s"][stage].is_f64(), "{stage}");
     }
-    for picture in ["range.png", "regions.png"] {
+    for picture in ["range.png", "regions.png", "residuals.png", "inliers.png"] {
         let bytes = fs::read(directory.path().join("pics").join(picture)).unwrap();
         assert!(bytes.starts_with(b"\x89PNG\r\n\x1a\n"), "{picture}");
     }
@@ -362,10 +362,12 @@ fn the_demo_leaves_the_deliverables_and_nothing_else() {
         names,
         [
             "cylinder.igs",
+            "inliers.png",
             "manifest.json",
             "range.png",
             "regions.png",
-            "report.json"
+            "report.json",
+            "residuals.png"
         ]
     );
     assert_eq!(fs::read_dir(&temporary).unwrap().count(), 0);

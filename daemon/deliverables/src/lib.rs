@@ -21,6 +21,6 @@ pub use manifest::{MANIFEST_NAME, Manifest, ManifestFile};
 pub use report::{Report, ScanReport};
 pub use stopwatch::Stopwatch;
 pub use write::{
-    DeliverError, Delivered, Inputs, RANGE_PICTURE_NAME, REGIONS_PICTURE_NAME, REPORT_NAME, write,
-    write_pictures,
+    DeliverError, Delivered, INLIERS_PICTURE_NAME, Inputs, RANGE_PICTURE_NAME,
+    REGIONS_PICTURE_NAME, REPORT_NAME, RESIDUALS_PICTURE_NAME, write, write_pictures,
 };

@@ -8,6 +8,8 @@ use jiff::Timestamp;
 use pipeline::{Observer, Outcome, Settings, Stage};
 use range_image::{Cancelled, Monitor, RangeImage};
 
+use reconstruct::RegionFit;
+
 use crate::export::{CadOptions, WriteError, file_stem, write_iges};
 use crate::file::{sync_directory, write_synced};
 use crate::manifest::{MANIFEST_NAME, Manifest, ManifestFile};
@@ -72,9 +74,12 @@ pub const REPORT_NAME: &str = "report.json";
 pub const RANGE_PICTURE_NAME: &str = "range.png";
 /// Name of the regions' picture.
 pub const REGIONS_PICTURE_NAME: &str = "regions.png";
+/// Name of the picture of the distances between nodes and trimmed faces.
+pub const RESIDUALS_PICTURE_NAME: &str = "residuals.png";
+/// Name of the picture of the share of inliers around each node.
+pub const INLIERS_PICTURE_NAME: &str = "inliers.png";
 
-/// Writes `<name>.igs`, `range.png`, `regions.png`, `report.json` and `manifest.json` into
-/// an existing directory that nobody else looks at, and syncs them and it. The caller
+/// Writes `<name>.igs`, the pictures, `report.json` and `manifest.json` into an existing directory that nobody else looks at, and syncs them and it. The caller
 /// then puts the directory in its place by one rename.
 ///
 /// The stopwatch that has timed the pipeline goes on with the stages here, so that the
@@ -132,29 +137,48 @@ pub fn write(
     })
 }
 
-/// Writes the two pictures only.
+/// Regions up to this number stand in the legend by their labels, more by their sizes,
+/// since not all of them will find room.
+const LISTED_BY_LABEL: usize = 12;
+
+/// Writes the pictures only: range image, regions, residuals, and the share of inliers
+/// where that is known.
 ///
 /// # Errors
 /// What the file system reports.
-pub fn write_pictures(directory: &Path, inputs: &Inputs<'_>) -> io::Result<[ManifestFile; 2]> {
-    let (image, outcome) = (inputs.image, inputs.outcome);
-    let range = write_synced::<io::Error>(directory, RANGE_PICTURE_NAME, |sink| {
-        picture::write_range(image, inputs.name, sink)
-    })?;
-    let notes: Vec<picture::RegionNote> = outcome
-        .reconstruction
-        .regions
-        .iter()
+pub fn write_pictures(directory: &Path, inputs: &Inputs<'_>) -> io::Result<Vec<ManifestFile>> {
+    let (image, outcome, name) = (inputs.image, inputs.outcome, inputs.name);
+    let mut largest: Vec<&RegionFit> = outcome.reconstruction.regions.iter().collect();
+    if largest.len() > LISTED_BY_LABEL {
+        largest.sort_by_key(|fit| (std::cmp::Reverse(fit.nodes), fit.label));
+    }
+    let notes: Vec<picture::RegionNote> = largest
+        .into_iter()
         .map(|fit| picture::RegionNote {
             label: fit.label,
-            text: format!("{:>6} nodes, rms {:.3} mm", fit.nodes, fit.rms_mm),
+            text: format!(
+                "{:>6} nodes {:>7.0} mm\u{b2}, rms {:.3} mm",
+                fit.nodes, fit.area_mm2, fit.rms_mm
+            ),
         })
         .collect();
-    let regions = write_synced::<io::Error>(directory, REGIONS_PICTURE_NAME, |sink| {
-        let model = &outcome.reconstruction.model;
-        picture::write_regions(image, &outcome.regions, model, &notes, inputs.name, sink)
-    })?;
-    Ok([range, regions])
+    let mut written = vec![
+        write_synced(directory, RANGE_PICTURE_NAME, |sink| {
+            picture::write_range(image, name, sink)
+        })?,
+        write_synced(directory, REGIONS_PICTURE_NAME, |sink| {
+            picture::write_regions(image, outcome, &notes, name, sink)
+        })?,
+        write_synced(directory, RESIDUALS_PICTURE_NAME, |sink| {
+            picture::write_residuals(image, outcome, name, sink)
+        })?,
+    ];
+    if let Some(inliers) = picture::inliers(image, name) {
+        written.push(write_synced(directory, INLIERS_PICTURE_NAME, |sink| {
+            inliers.write(sink)
+        })?);
+    }
+    Ok(written)
 }
 
 fn write_json(

@@ -47,10 +47,12 @@ async fn a_scan_becomes_a_result_in_the_spool() {
         names,
         [
             "Gable roof.igs",
+            "inliers.png",
             "manifest.json",
             "range.png",
             "regions.png",
-            "report.json"
+            "report.json",
+            "residuals.png"
         ]
     );
     let report = json(&directory.join("report.json"));

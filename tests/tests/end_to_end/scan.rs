@@ -69,7 +69,7 @@ async fn a_scan_becomes_a_cad_file_in_the_spool() -> Result<()> {
         "faces of the house"
     );
     assert!(result.file("gable house.igs").is_ok());
-    for picture in ["range.png", "regions.png"] {
+    for picture in ["range.png", "regions.png", "residuals.png", "inliers.png"] {
         assert!(
             result.file(picture)?.starts_with(b"\x89PNG\r\n"),
             "{picture}"

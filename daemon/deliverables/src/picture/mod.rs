@@ -1,14 +1,18 @@
-//! Pictures of a scan, as PNG.
+//! Pictures of a scan, as PNG: y up, axes in millimetres, and what the colours mean.
 
+mod borders;
 mod canvas;
+mod inliers;
 mod plot;
 mod range;
 mod regions;
+mod residuals;
+mod scale;
 
 use std::io::Write;
 
-use range_image::{RangeImage, RegionMap};
-use reconstruct::Model;
+use pipeline::Outcome;
+use range_image::RangeImage;
 
 use canvas::Canvas;
 
@@ -23,19 +27,53 @@ pub fn write_range(image: &RangeImage, name: &str, sink: impl Write) -> std::io:
 }
 
 /// Draws the regions over the shaded part, with trim loops, vertices, numbers and a
-/// legend, and writes it as PNG.
+/// legend, and writes it as PNG. Background and crumbs have colours of their own.
 ///
 /// # Errors
 /// What the sink reports.
 pub fn write_regions(
     image: &RangeImage,
-    regions: &RegionMap,
-    model: &Model,
+    outcome: &Outcome,
     notes: &[RegionNote],
     name: &str,
     sink: impl Write,
 ) -> std::io::Result<()> {
-    encode(&regions::draw(image, regions, model, notes, name), sink)
+    encode(&regions::draw(image, outcome, notes, name), sink)
+}
+
+/// Draws how far the nodes lie off the trimmed faces, along z, and writes it as PNG.
+///
+/// # Errors
+/// What the sink reports.
+pub fn write_residuals(
+    image: &RangeImage,
+    outcome: &Outcome,
+    name: &str,
+    sink: impl Write,
+) -> std::io::Result<()> {
+    let reconstruction = &outcome.reconstruction;
+    let (restored, model) = (&reconstruction.restored, &reconstruction.model);
+    encode(&residuals::draw(image, restored, model, name), sink)
+}
+
+/// Draws the share of inliers among the samples around each node, ready to be written as
+/// PNG; `None` where the image says nothing of its nodes' quality.
+#[must_use]
+pub fn inliers(image: &RangeImage, name: &str) -> Option<Picture> {
+    inliers::draw(image, name).map(Picture)
+}
+
+/// A picture that is drawn but not written.
+pub struct Picture(Canvas);
+
+impl Picture {
+    /// Writes it as PNG.
+    ///
+    /// # Errors
+    /// What the sink reports.
+    pub fn write(&self, sink: impl Write) -> std::io::Result<()> {
+        encode(&self.0, sink)
+    }
 }
 
 fn encode(canvas: &Canvas, sink: impl Write) -> std::io::Result<()> {

@@ -7,10 +7,15 @@ use super::canvas::{Canvas, Rgb, TEXT_HEIGHT, Weight, fitted, text_width};
 
 /// Longer side of the plotted image, pixels, as near as whole pixels allow.
 const PLOT_SIDE: usize = 840;
+/// The same of an image that is [`SLENDER`] times as long as wide, or more.
+const LONG_PLOT_SIDE: usize = 1600;
+const SLENDER: f64 = 4.0;
 /// Nodes are not drawn larger than this many pixels.
 const MAX_PIXELS_PER_NODE: f64 = 12.0;
-/// An image narrower than this still gets a plot this wide, so that its titles fit.
-const MIN_PLOT: usize = 160;
+/// An image narrower than this is stretched across, and says so.
+const MIN_SIDE: f64 = 40.0;
+/// Least width of the canvas, so that titles fit, pixels.
+const MIN_WIDTH: usize = 560;
 
 const LEFT: usize = 76;
 const TOP: usize = 62;
@@ -24,33 +29,75 @@ pub(super) const NOTHING: Rgb = [240, 241, 243];
 /// A canvas with a place on it for the image.
 pub(super) struct Plot {
     pub(super) canvas: Canvas,
-    pixels_per_node: f64,
+    /// Pixels per node along x and y.
+    scale: [f64; 2],
     width: usize,
     height: usize,
 }
 
+/// Pixels per node along x and y.
+fn scale(columns: usize, rows: usize) -> [f64; 2] {
+    let (columns, rows) = (columns.max(1) as f64, rows.max(1) as f64);
+    let (longer, shorter) = (columns.max(rows), columns.min(rows));
+    let slender = ((longer / shorter - 1.0) / (SLENDER - 1.0)).clamp(0.0, 1.0);
+    let side = PLOT_SIDE as f64 + slender * (LONG_PLOT_SIDE - PLOT_SIDE) as f64;
+    let fit = side / longer;
+    // Whole pixels per node keep nodes of one size, as long as there is a choice.
+    let even = if fit >= 2.0 { fit.floor() } else { fit }.min(MAX_PIXELS_PER_NODE);
+    [columns, rows].map(|nodes| even.max(MIN_SIDE / nodes))
+}
+
 impl Plot {
-    /// A canvas with titles and axes for this image, and `right` pixels beside the plot.
-    pub(super) fn new(image: &RangeImage, title: &str, subtitle: &str, right: usize) -> Self {
-        let longer = image.columns().max(image.rows()).max(1) as f64;
-        let fit = PLOT_SIDE as f64 / longer;
-        // Whole pixels per node keep nodes of one size, as long as there is a choice.
-        let pixels_per_node = if fit >= 2.0 { fit.floor() } else { fit }.min(MAX_PIXELS_PER_NODE);
-        let side = |nodes: usize| ((nodes as f64 * pixels_per_node).round() as usize).max(MIN_PLOT);
-        let (width, height) = (side(image.columns()), side(image.rows()));
+    /// A canvas with titles and axes for this image, `right` pixels beside the plot, and
+    /// room for something `least_height` pixels high there.
+    pub(super) fn new(
+        image: &RangeImage,
+        title: &str,
+        subtitle: &str,
+        right: usize,
+        least_height: usize,
+    ) -> Self {
+        let scale = scale(image.columns(), image.rows());
+        let side =
+            |nodes: usize, scale: f64| ((nodes.max(1) as f64 * scale).round() as usize).max(1);
+        let (width, height) = (
+            side(image.columns(), scale[0]),
+            side(image.rows(), scale[1]),
+        );
         let mut plot = Self {
-            canvas: Canvas::new(LEFT + width + right, TOP + height + BOTTOM, PAPER),
-            pixels_per_node,
+            canvas: Canvas::new(
+                (LEFT + width + right).max(MIN_WIDTH),
+                TOP + height.max(least_height) + BOTTOM,
+                PAPER,
+            ),
+            scale,
             width,
             height,
         };
+        let stretched = match scale[0] / scale[1] {
+            ratio if ratio > 1.01 => format!("; x drawn {ratio:.1} times as large as y"),
+            ratio if ratio < 0.99 => format!("; y drawn {:.1} times as large as x", 1.0 / ratio),
+            _ => String::new(),
+        };
         let room = plot.canvas.width() - LEFT - 8;
         plot.canvas
-            .text(LEFT, 12, &fitted(title, room), Weight::Bold, INK);
+            .text(LEFT, 8, &fitted(title, room), Weight::Bold, INK);
+        let subtitle = fitted(&format!("{subtitle}{stretched}"), room);
         plot.canvas
-            .text(LEFT, 32, &fitted(subtitle, room), Weight::Regular, FAINT);
-        plot.canvas.fill(LEFT, TOP, width, height, NOTHING);
+            .text(LEFT, 26, &subtitle, Weight::Regular, FAINT);
+        plot.cover(NOTHING);
         plot
+    }
+
+    /// Fills the place of the image.
+    pub(super) fn cover(&mut self, colour: Rgb) {
+        self.canvas.fill(LEFT, TOP, self.width, self.height, colour);
+    }
+
+    /// Writes across the middle of the plot.
+    pub(super) fn note(&mut self, text: &str, weight: Weight, colour: Rgb) {
+        let middle = self.top() + self.height / 2;
+        self.canvas.text(LEFT + 14, middle, text, weight, colour);
     }
 
     /// x of the plot's right edge on the canvas, pixels.
@@ -68,52 +115,52 @@ impl Plot {
         self.height
     }
 
-    /// Paints every pixel of the plot that falls on a node for which there is a colour.
+    /// Paints the nodes for which there is a colour. Where several nodes share a pixel,
+    /// their colours are mixed.
     pub(super) fn paint(
         &mut self,
         image: &RangeImage,
         colour: impl Fn(usize, usize) -> Option<Rgb>,
     ) {
-        let columns: Vec<usize> = (0..self.width)
-            .map(|x| ((x as f64 + 0.5) / self.pixels_per_node) as usize)
+        let rows = image.rows();
+        let colours: Vec<Option<Rgb>> = (0..image.columns())
+            .flat_map(|column| (0..rows).map(move |row| (column, row)))
+            .map(|(column, row)| colour(column, row))
             .collect();
-        let mut line = vec![None; image.columns()];
-        let mut painted = None;
+        let columns: Vec<_> = (0..self.width)
+            .map(|x| covered(x, self.scale[0], image.columns()))
+            .collect();
         for y in 0..self.height {
-            let from_top = ((y as f64 + 0.5) / self.pixels_per_node) as usize;
-            let Some(row) = self.rows_shown(image).checked_sub(from_top + 1) else {
-                continue;
-            };
-            if row >= image.rows() {
-                continue;
-            }
-            if painted != Some(row) {
-                for (column, entry) in line.iter_mut().enumerate() {
-                    *entry = colour(column, row);
+            let from_top = covered(y, self.scale[1], rows);
+            for (x, columns) in columns.iter().enumerate() {
+                let (mut sum, mut count) = ([0_u32; 3], 0);
+                for column in columns.clone() {
+                    for row in from_top.clone() {
+                        let node = column * rows + rows - 1 - row;
+                        if let Some(Some(colour)) = colours.get(node) {
+                            for (sum, &part) in sum.iter_mut().zip(colour) {
+                                *sum += u32::from(part);
+                            }
+                            count += 1;
+                        }
+                    }
                 }
-                painted = Some(row);
-            }
-            for (x, &column) in columns.iter().enumerate() {
-                if let Some(Some(colour)) = line.get(column) {
-                    self.canvas.set(LEFT + x, TOP + y, *colour);
+                if count > 0 {
+                    let mean = sum.map(|sum| ((sum + count / 2) / count) as u8);
+                    self.canvas.set(LEFT + x, TOP + y, mean);
                 }
             }
         }
-    }
-
-    /// Rows counted from the plot's upper edge to the image's lower edge.
-    fn rows_shown(&self, image: &RangeImage) -> usize {
-        image.rows()
     }
 
     /// Where a place of the part frame falls on the canvas, pixels.
     pub(super) fn place(&self, image: &RangeImage, x_mm: f64, y_mm: f64) -> [f64; 2] {
         let column = (x_mm - image.x_mm(0)) / image.pitch_mm();
         let row = (y_mm - image.y_mm(0)) / image.pitch_mm();
-        let from_top = self.rows_shown(image) as f64 - (row + 0.5);
+        let from_top = image.rows() as f64 - (row + 0.5);
         [
-            LEFT as f64 + (column + 0.5) * self.pixels_per_node,
-            TOP as f64 + from_top * self.pixels_per_node,
+            LEFT as f64 + (column + 0.5) * self.scale[0],
+            TOP as f64 + from_top * self.scale[1],
         ]
     }
 
@@ -147,6 +194,18 @@ impl Plot {
         self.canvas
             .text(8, TOP - 26, "y (mm)", Weight::Regular, FAINT);
     }
+}
+
+/// The nodes along one axis that a pixel shows: those it covers if it covers several, else
+/// the one at its middle.
+fn covered(pixel: usize, scale: f64, nodes: usize) -> core::ops::Range<usize> {
+    if scale >= 1.0 {
+        let node = ((pixel as f64 + 0.5) / scale) as usize;
+        return node.min(nodes)..(node + 1).min(nodes);
+    }
+    let first = (pixel as f64 / scale).round() as usize;
+    let end = ((pixel + 1) as f64 / scale).round() as usize;
+    first.min(nodes)..end.max(first + 1).min(nodes)
 }
 
 /// A mark on a scale.
@@ -259,10 +318,35 @@ mod tests {
     }
 
     #[test]
+    fn odd_shapes_are_scaled_with_sense() {
+        // A single column is stretched to be seen, a long scan shrunk to fit a page.
+        let [x, y] = scale(1, 500);
+        assert!(x >= 40.0 && (2.0..=4.0).contains(&y), "{x} {y}");
+        let [x, y] = scale(6000, 400);
+        assert!((x - y).abs() < 1e-12 && (1599.0..=1601.0).contains(&(6000.0 * x)));
+        let [x, y] = scale(6000, 50);
+        assert!(6000.0 * x <= 1601.0 && 50.0 * y >= 40.0);
+        assert_eq!(scale(221, 208), [3.0, 3.0]);
+    }
+
+    #[test]
+    fn nodes_that_share_a_pixel_are_mixed_and_none_is_lost() {
+        let image = RangeImage::masked(Lattice { pitch_mm: 0.1 }, 0, 0, 6400, 1600);
+        let mut plot = Plot::new(&image, "t", "s", 10, 0);
+        plot.paint(&image, |c, _| {
+            Some(if c % 2 == 0 { [0; 3] } else { [200; 3] })
+        });
+        let index = ((TOP + 100) * plot.canvas.width() + LEFT + 300) * 3;
+        assert_eq!(&plot.canvas.pixels()[index..index + 3], [100; 3]);
+        let all: usize = (0..1600).map(|x| covered(x, 0.25, 6400).len()).sum();
+        assert_eq!(all, 6400);
+    }
+
+    #[test]
     fn a_node_falls_in_the_middle_of_its_pixels() {
         let mut image = RangeImage::masked(Lattice { pitch_mm: 0.5 }, 10, -4, 84, 42);
         image.set_z_mm(0, 0, Some(1.0));
-        let mut plot = Plot::new(&image, "t", "s", 10);
+        let mut plot = Plot::new(&image, "t", "s", 10, 0);
         plot.paint(&image, |c, r| (c == 0 && r == 0).then_some([1, 2, 3]));
         let [x, y] = plot.place(&image, 5.0, -2.0);
         assert_eq!((x, y), (LEFT as f64 + 5.0, (TOP + 42 * 10) as f64 - 5.0));

@@ -1,19 +1,22 @@
 //! The regions in colours over the shaded part, with borders and numbers.
 
 use colorous::TABLEAU10;
+use pipeline::{BackgroundKind, NodeRole, Outcome};
 use range_image::{RangeImage, RegionMap};
-use reconstruct::{EdgeKind, Model};
 
+use super::borders;
 use super::canvas::{Canvas, Mask, Rgb, TEXT_HEIGHT, Weight, text_width};
 use super::plot::{FAINT, INK, PAPER, Plot, dimmed, shade};
 
 const LEGEND_GAP: usize = 24;
-const LEGEND_ROOM: usize = 290;
+const LEGEND_ROOM: usize = 380;
 const LEGEND_LINE: usize = 22;
-/// Points drawn on each cubic piece of a border.
-const POINTS_PER_PIECE: usize = 24;
-/// Nodes of the range image that no region took.
-const UNCLAIMED: Rgb = [205, 208, 212];
+/// Least height that the legend gets, pixels.
+const LEGEND_HEIGHT: usize = 300;
+/// Nodes of a removed table, back plane or fixture.
+const BACKGROUND: Rgb = [186, 190, 196];
+/// Nodes that no region took: a colour that no region has.
+const CRUMB: Rgb = [255, 0, 170];
 
 /// A line of the legend.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,30 +30,37 @@ pub struct RegionNote {
 /// Regions as colours over the shaded surface; the trim loops and their vertices on top.
 pub(super) fn draw(
     image: &RangeImage,
-    regions: &RegionMap,
-    model: &Model,
+    outcome: &Outcome,
     notes: &[RegionNote],
     name: &str,
 ) -> Canvas {
+    let (regions, model) = (&outcome.regions, &outcome.reconstruction.model);
     let subtitle = format!(
-        "{} regions, {} trimmed faces, {} edges",
+        "regions: {}, trimmed faces: {}, edges: {}",
         regions.regions(),
         model.faces.len(),
         model.edges.len()
     );
-    let mut plot = Plot::new(image, name, &subtitle, LEGEND_ROOM);
+    let mut plot = Plot::new(image, name, &subtitle, LEGEND_ROOM, LEGEND_HEIGHT);
+    let rows = image.rows();
     plot.paint(image, |column, row| {
-        image.z_mm(column, row)?;
+        let role = outcome.roles.get(column * rows + row)?;
         let label = regions.label(column, row);
         let same = |c: usize, r: usize| regions.label(c, r) == label;
-        let light = 0.42 + 0.62 * shade(image, column, row, same);
-        let paint = if label == 0 { UNCLAIMED } else { colour(label) };
-        Some(dimmed(paint, light.min(1.05)))
+        // Colours of the legend must be known again in the picture.
+        let light = 0.62 + 0.44 * shade(image, column, row, same);
+        match role {
+            NodeRole::Masked => None,
+            NodeRole::Part => Some(dimmed(colour(label), light.min(1.05))),
+            NodeRole::Background => Some(dimmed(BACKGROUND, (0.4 + 0.6 * light).min(1.05))),
+            NodeRole::Crumb => Some(CRUMB),
+        }
     });
-    borders(&mut plot, image, model);
+    borders::draw(&mut plot, image, model);
     plot.axes(image);
     numbers(&mut plot, image, regions);
-    legend(&mut plot, notes);
+    let height = plot.height().max(LEGEND_HEIGHT);
+    legend(&mut plot, &listed(notes), &others(outcome), height);
     plot.canvas
 }
 
@@ -69,37 +79,6 @@ fn colour(label: u16) -> Rgb {
         let strength = k.min(4.0 - k).clamp(0.0, 1.0);
         (225.0 - 130.0 * strength).round() as u8
     })
-}
-
-fn borders(plot: &mut Plot, image: &RangeImage, model: &Model) {
-    for (radius, paint) in [(2.4, PAPER), (1.2, INK)] {
-        let mut mask = Mask::like(&plot.canvas);
-        for edge in &model.edges {
-            // A crease is drawn finer than a border at which the part ends.
-            let radius = if edge.kind == EdgeKind::Crease {
-                radius * 0.8
-            } else {
-                radius
-            };
-            let mut last: Option<[f64; 2]> = None;
-            for point in edge.path.sampled(POINTS_PER_PIECE) {
-                let here = plot.place(image, point[0], point[1]);
-                if let Some(last) = last {
-                    mask.stroke(last, here, radius);
-                }
-                last = Some(here);
-            }
-        }
-        plot.canvas.stencil(&mask, paint);
-    }
-    for (radius, paint) in [(4.6, INK), (3.0, PAPER)] {
-        let mut mask = Mask::like(&plot.canvas);
-        for vertex in &model.vertices {
-            let here = plot.place(image, vertex.x_mm, vertex.y_mm);
-            mask.stroke(here, here, radius);
-        }
-        plot.canvas.stencil(&mask, paint);
-    }
 }
 
 /// For each region the node farthest from its border, counted in steps along the grid.
@@ -196,26 +175,79 @@ fn numbers(plot: &mut Plot, image: &RangeImage, regions: &RegionMap) {
     }
 }
 
-fn legend(plot: &mut Plot, notes: &[RegionNote]) {
-    let (left, top) = (plot.right() + LEGEND_GAP, plot.top());
-    let lines = (plot.height() / LEGEND_LINE).max(1);
-    let shown = if notes.len() > lines {
-        lines - 1
-    } else {
-        notes.len()
+/// A line of the legend, ready to be drawn.
+struct Entry {
+    colour: Rgb,
+    text: String,
+}
+
+fn listed(notes: &[RegionNote]) -> Vec<Entry> {
+    let entry = |note: &RegionNote| Entry {
+        colour: colour(note.label),
+        text: format!("{:>3}  {}", note.label, note.text),
     };
-    for (line, note) in notes.iter().take(shown).enumerate() {
-        let y = top + line * LEGEND_LINE;
-        plot.canvas.fill(left, y + 1, 16, 16, colour(note.label));
-        plot.canvas.frame(left, y + 1, 16, 16, FAINT);
-        let text = format!("{:>2}  {}", note.label, note.text);
-        plot.canvas.text(left + 24, y, &text, Weight::Regular, INK);
+    notes.iter().map(entry).collect()
+}
+
+/// What is no region: the background, and crumbs.
+fn others(outcome: &Outcome) -> Vec<Entry> {
+    let mut entries = Vec::new();
+    for kind in [
+        BackgroundKind::Table,
+        BackgroundKind::BackPlane,
+        BackgroundKind::Fixture,
+    ] {
+        let of_kind = outcome.background.regions.iter().filter(|r| r.kind == kind);
+        let nodes: usize = of_kind.map(|region| region.nodes).sum();
+        if nodes > 0 {
+            entries.push(Entry {
+                colour: BACKGROUND,
+                text: format!("{kind}, {nodes} nodes, left out"),
+            });
+        }
     }
-    if shown < notes.len() {
-        let text = format!("and {} more", notes.len() - shown);
-        let y = top + shown * LEGEND_LINE;
+    let crumbs = &outcome.crumbs;
+    if !crumbs.is_empty() {
+        let nodes: usize = crumbs.iter().map(|crumb| crumb.nodes).sum();
+        let plural = if crumbs.len() == 1 { "" } else { "s" };
+        entries.push(Entry {
+            colour: CRUMB,
+            text: format!("{} crumb{plural}, {nodes} nodes", crumbs.len()),
+        });
+    }
+    entries
+}
+
+/// The regions as far as there is room, then what is no region, which is always told.
+fn legend(plot: &mut Plot, regions: &[Entry], others: &[Entry], height: usize) {
+    let (left, top) = (plot.right() + LEGEND_GAP, plot.top());
+    let lines = (height / LEGEND_LINE).saturating_sub(others.len());
+    let shown = if regions.len() > lines {
+        lines.saturating_sub(1)
+    } else {
+        regions.len()
+    };
+    let mut y = top;
+    for entry in regions.iter().take(shown) {
+        draw_entry(plot, left, y, entry);
+        y += LEGEND_LINE;
+    }
+    if shown < regions.len() {
+        let text = format!("and {} smaller ones", regions.len() - shown);
         plot.canvas.text(left, y, &text, Weight::Regular, FAINT);
+        y += LEGEND_LINE;
     }
+    for entry in others {
+        draw_entry(plot, left, y, entry);
+        y += LEGEND_LINE;
+    }
+}
+
+fn draw_entry(plot: &mut Plot, left: usize, y: usize, entry: &Entry) {
+    plot.canvas.fill(left, y + 1, 16, 16, entry.colour);
+    plot.canvas.frame(left, y + 1, 16, 16, FAINT);
+    plot.canvas
+        .text(left + 24, y, &entry.text, Weight::Regular, INK);
 }
 
 #[cfg(test)]

@@ -42,7 +42,7 @@ pub(crate) struct Args {
     /// Write a report as JSON, too
     #[arg(long, value_name = "FILE.json")]
     pub(super) report: Option<PathBuf>,
-    /// Draw range.png and regions.png into this directory, too
+    /// Draw range.png, regions.png, residuals.png and inliers.png into this directory, too
     #[arg(long, value_name = "DIR")]
     pub(super) pictures: Option<PathBuf>,
     /// Seed of every random draw
