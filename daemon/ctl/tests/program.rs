@@ -426,3 +426,84 @@ fn the_demo_tells_at_once_what_it_cannot_do() {
         "choose a share below 1",
     );
 }
+
+/// A pyramid of four sides in the middle of a level table, 60 mm square.
+fn pyramid_on_a_table() -> String {
+    let mut text = String::new();
+    for i in 0..=120 {
+        for j in 0..=120 {
+            let (x, y) = (f64::from(i) * 0.5, f64::from(j) * 0.5);
+            // Turned against the grid, so that no edge runs along it.
+            let (u, v) = (x - 30.0, y - 30.0);
+            let (u, v) = (0.95 * u + 0.3 * v, 0.95 * v - 0.3 * u);
+            let z = (20.0 - 1.2 * u.abs().max(v.abs())).max(0.0);
+            writeln!(text, "{x} {y} {z}").expect("text takes it");
+        }
+    }
+    text
+}
+
+#[test]
+fn a_table_is_left_out_told_and_kept_on_request() {
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("p.xyz"), pyramid_on_a_table()).unwrap();
+    let report = |more: &[&str]| -> Value {
+        let output = relief(
+            directory.path(),
+            &[&["convert", "p.xyz", "--json"], more].concat(),
+        );
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{told}");
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        told["report"].clone()
+    };
+    let removed = report(&[]);
+    assert_eq!(removed["model"]["faces"], 4, "{}", removed["background"]);
+    assert_eq!(removed["settings"]["background"], "remove");
+    let table = &removed["background"]["list"][0];
+    assert_eq!(removed["background"]["count"], 1);
+    assert_eq!(table["kind"], "table");
+    assert!((table["normal"][2].as_f64().unwrap() - 1.0).abs() < 1e-6);
+    assert!(table["offset_mm"].as_f64().unwrap().abs() < 1e-3);
+    assert!(table["why"].as_str().unwrap().contains("stands on it"));
+    assert!(removed["lost_nodes"].as_u64().unwrap() < 200);
+    // Each side is a triangle of slope 1.2 over a quarter of a square.
+    let square = (2.0 * 20.0 / 1.2_f64).powi(2) / (0.95_f64.powi(2) + 0.3_f64.powi(2));
+    let side = square / 4.0 * (1.0 + 1.2_f64.powi(2) * (0.95_f64.powi(2) + 0.09)).sqrt();
+    for region in removed["regions"]["list"].as_array().unwrap() {
+        let area = region["area_mm2"].as_f64().unwrap();
+        assert!((area / side - 1.0).abs() < 0.03, "{area} {side}");
+    }
+    let kept = report(&["--keep-background"]);
+    assert_eq!(kept["model"]["faces"], 5);
+    assert_eq!(kept["background"]["count"], 0);
+    // Without the table's samples the same faces are left.
+    let above = report(&["--roi-z-mm", "0.5,"]);
+    assert_eq!(above["model"]["faces"], 4);
+    assert_eq!(above["settings"]["roi_z_mm"][0], 0.5);
+    assert!(above["settings"]["roi_z_mm"][1].is_null());
+    let small = report(&["--minimum-area-mm2", "400"]);
+    assert_eq!(small["settings"]["minimum_area_mm2"], 400.0);
+    assert_eq!(small["model"]["faces"], 1, "the table is all that is left");
+}
+
+#[test]
+fn a_region_of_interest_that_holds_nothing_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("roof.xyz"), roof()).unwrap();
+    let output = relief(
+        directory.path(),
+        &["convert", "roof.xyz", "--roi-x-mm=90,100"],
+    );
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("x 90 to 100 mm"), "{told}");
+    assert!(told.contains("widen them"), "{told}");
+    let output = relief(
+        directory.path(),
+        &["convert", "roof.xyz", "--roi-z-mm=5,-5"],
+    );
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{told}");
+    assert!(told.contains("the first limit must be below"), "{told}");
+}
