@@ -39,7 +39,7 @@ pub(super) struct Plot {
 fn scale(columns: usize, rows: usize) -> [f64; 2] {
     let (columns, rows) = (columns.max(1) as f64, rows.max(1) as f64);
     let (longer, shorter) = (columns.max(rows), columns.min(rows));
-    let slender = ((longer / shorter - 1.0) / (SLENDER - 1.0)).clamp(0.0, 1.0);
+    let slender = ((longer / shorter - 2.0) / (SLENDER - 2.0)).clamp(0.0, 1.0);
     let side = PLOT_SIDE as f64 + slender * (LONG_PLOT_SIDE - PLOT_SIDE) as f64;
     let fit = side / longer;
     // Whole pixels per node keep nodes of one size, as long as there is a choice.

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use range_image::{RangeImage, Unmonitored};
+use range_image::{RangeImage, RegionMap, Unmonitored};
 use relief_tests::scenes::View;
 use segment::SegmentSettings;
 
@@ -76,6 +76,17 @@ pub(crate) fn ours(method: Method, image: &RangeImage) -> Result<Vec<u16>> {
 
 /// The part's own faces by the default method. What stands around the part is taken off
 /// where a view shows it.
-pub(crate) fn part(image: &RangeImage, _view: View) -> Result<Vec<u16>> {
-    ours(Method::Relief, image)
+pub(crate) fn part(image: &RangeImage, view: View) -> Result<Vec<u16>> {
+    let mut labels = ours(Method::Relief, image)?;
+    if view == View::Cluttered {
+        let regions = RegionMap::new(image, labels);
+        let found = segment::background(image, &regions, &segment::View::default());
+        labels = regions.raw_labels().to_vec();
+        for label in &mut labels {
+            if found.region(*label).is_some() {
+                *label = 0;
+            }
+        }
+    }
+    Ok(labels)
 }
