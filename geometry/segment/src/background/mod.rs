@@ -176,7 +176,7 @@ pub fn background(image: &RangeImage, map: &RegionMap, view: &View) -> Backgroun
         } else {
             BackgroundKind::BackPlane
         };
-        let why = why(kind, &lines, |label| owned(label), rise_mm);
+        let why = why(kind, &lines, owned, rise_mm);
         regions.extend(group.labels.iter().map(|&label| BackgroundRegion {
             label,
             kind,
