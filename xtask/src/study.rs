@@ -9,6 +9,13 @@ use crate::shell;
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Study {
+    /// Score the regridder on a plane pair with a step, among outliers.
+    #[command(disable_help_flag = true)]
+    Regrid {
+        /// Options of the study; `--help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
     /// Score the segmentation on scenes whose true faces are known.
     #[command(disable_help_flag = true)]
     Segmentation {
@@ -20,6 +27,7 @@ pub(crate) enum Study {
 
 pub(crate) fn run(study: &Study) -> Result<()> {
     match study {
+        Study::Regrid { options } => program("study-regrid", options),
         Study::Segmentation { options } => program("study-segmentation", options),
     }
 }

@@ -83,7 +83,8 @@ pub struct SettingsReport {
     pub draws: usize,
     /// Columns on either side in which the neighbours are sought.
     pub reach_columns: usize,
-    /// How z at a node is estimated: `least-median` or `least-squares`.
+    /// How z at a node is estimated: `consensus`, `least-median`, `exhaustive-least-median`
+    /// or `least-squares`.
     pub estimator: String,
     /// Clusters the segmentation begins with.
     pub clusters: usize,
@@ -130,6 +131,12 @@ pub struct RangeImageReport {
     pub z_min_mm: Option<f64>,
     /// Greatest z, `null` for an empty image.
     pub z_max_mm: Option<f64>,
+    /// Median over the nodes of the share of samples that agree with the node's surface.
+    #[serde(default)]
+    pub inlier_share: Option<f64>,
+    /// Median over the nodes of the standard deviation of those samples about it.
+    #[serde(default)]
+    pub noise_mm: Option<f64>,
 }
 
 /// The surface regions.

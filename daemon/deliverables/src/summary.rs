@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use pipeline::{NodeRole, Outcome, Settings};
 use range_image::RangeImage;
 use reconstruct::{Face, Model, Surface};
-use regrid::Estimator;
 
 use crate::export::CadOptions;
 use crate::report::{
@@ -57,11 +56,7 @@ fn settings(settings: &Settings, cad: &CadOptions) -> SettingsReport {
         neighbours: settings.regrid.neighbours,
         draws: settings.regrid.draws,
         reach_columns: settings.regrid.reach_columns,
-        estimator: match settings.regrid.estimator {
-            Estimator::LeastMedian => "least-median",
-            Estimator::LeastSquares => "least-squares",
-        }
-        .to_owned(),
+        estimator: settings.regrid.estimator.as_str().to_owned(),
         clusters: settings.segment.clusters,
         crease_angle_rad: settings.segment.crease_angle_rad,
         step_factor: settings.segment.step_factor,
@@ -89,7 +84,15 @@ fn range_image(image: &RangeImage) -> RangeImageReport {
         nodes: image.valid_nodes(),
         z_min_mm: extent.map(|(low, _)| low),
         z_max_mm: extent.map(|(_, high)| high),
+        inlier_share: median(image.qualities().map(|quality| quality.inlier_share())),
+        noise_mm: median(image.qualities().map(|quality| f64::from(quality.scale_mm))),
     }
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 fn regions(outcome: &Outcome) -> RegionsReport {

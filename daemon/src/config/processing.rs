@@ -63,8 +63,13 @@ pub struct RegridConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
-    /// The plane with the least median of squared residuals: withstands outliers.
+    /// The surface that most of the evidence near the node speaks for: withstands outliers,
+    /// also at step edges.
+    Consensus,
+    /// The plane with the least median of squared residuals, the paper's.
     LeastMedian,
+    /// The same over all planes through three samples, for comparison: slow.
+    ExhaustiveLeastMedian,
     /// The plane with the least sum of squared residuals, for comparison.
     LeastSquares,
 }
@@ -285,7 +290,9 @@ impl RegridConfig {
         set(
             &mut settings.estimator,
             self.estimator.map(|estimator| match estimator {
+                Estimator::Consensus => regrid::Estimator::Consensus,
                 Estimator::LeastMedian => regrid::Estimator::LeastMedian,
+                Estimator::ExhaustiveLeastMedian => regrid::Estimator::ExhaustiveLeastMedian,
                 Estimator::LeastSquares => regrid::Estimator::LeastSquares,
             }),
         );

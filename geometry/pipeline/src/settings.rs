@@ -1,7 +1,7 @@
 //! The settings of every stage, and their agreement with each other.
 
 use reconstruct::ReconstructSettings;
-use regrid::RegridSettings;
+use regrid::{Estimator, RegridSettings};
 use segment::SegmentSettings;
 
 use crate::{BackgroundPolicy, Method};
@@ -42,9 +42,15 @@ impl Settings {
         .with_seed(1)
     }
 
-    /// The same settings on one road throughout.
+    /// The same settings on one road throughout, the regridder's estimator and the size of
+    /// its windows included.
     #[must_use]
     pub fn with_method(mut self, method: Method) -> Self {
+        self.regrid.estimator = match method {
+            Method::Relief => Estimator::default(),
+            Method::ShimLee => Estimator::LeastMedian,
+        };
+        self.regrid.neighbours = self.regrid.estimator.neighbours();
         self.segment.method = method.into();
         self.reconstruct.method = method.into();
         self

@@ -4,10 +4,12 @@ use core::f64::consts::PI;
 
 use range_image::{GridColumn, Lattice, NodeQuality};
 
+use crate::consensus::{Conditions, Consensus, Noise, Surface, WIDE, WIDTH, noise};
 use crate::draws::Draws;
+use crate::exhaustive;
 use crate::neighbours::{Neighbour, Search};
-use crate::plane::{Plane, PlaneFinder};
-use crate::settings::{Estimator, LEAST_WINDOW, RegridSettings};
+use crate::plane::{Fit, Plane, PlaneFinder};
+use crate::settings::{Estimator, LEAST_WINDOW, RegridSettings, SupportSettings};
 use crate::strip::{Strip, typical};
 use crate::support::Surroundings;
 use crate::window::{Spacing, Window};
@@ -18,6 +20,7 @@ pub(crate) struct GridWorker {
     search: Search,
     finder: PlaneFinder,
     surroundings: Surroundings,
+    consensus: Consensus,
     /// What is left of a node's window.
     samples: Vec<Neighbour>,
     lengths: Vec<f64>,
@@ -55,6 +58,12 @@ impl GridWorker {
         let greatest = window.greatest_spacing();
         let near_x_mm = settings.support.radius * greatest.x_mm;
         let near_y_mm = settings.support.radius * greatest.y_mm;
+        let noise = match settings.estimator {
+            Estimator::Consensus => noise(window.strips.iter().copied(), &mut self.lengths),
+            Estimator::LeastMedian | Estimator::ExhaustiveLeastMedian | Estimator::LeastSquares => {
+                None
+            }
+        };
         let mut column = GridColumn {
             i,
             j_first: 0,
@@ -86,7 +95,14 @@ impl GridWorker {
                 next = above.map(|y| first_row(y).max(j + 1));
                 continue;
             }
-            if let Some(value) = self.node(&window, x_mm, y_mm, (i, j), settings) {
+            let node = Node {
+                x_mm,
+                y_mm,
+                i,
+                j,
+                noise,
+            };
+            if let Some(value) = self.node(&window, node, settings) {
                 append(&mut column, j, value);
             }
             next = Some(j + 1);
@@ -98,17 +114,19 @@ impl GridWorker {
     fn node(
         &mut self,
         window: &Window<'_>,
-        x_mm: f64,
-        y_mm: f64,
-        (i, j): (i64, i64),
+        node: Node,
         settings: &RegridSettings,
     ) -> Option<(f64, NodeQuality)> {
-        let nearest = self.search.nearest(window, x_mm, y_mm, settings.neighbours);
+        let (x_mm, y_mm) = (node.x_mm, node.y_mm);
+        // Outliers take no place in a window, so that as much is known of the surface.
+        let clean_share = node.noise.map_or(1.0, |noise| noise.clean_share);
+        let neighbours = (settings.neighbours as f64 / clean_share).round() as usize;
+        let nearest = self.search.nearest(window, x_mm, y_mm, neighbours);
         if nearest.len() < LEAST_WINDOW {
             return None;
         }
         let spacing = local_spacing(window, nearest, &mut self.lengths);
-        let dense = nearest.len() == settings.neighbours;
+        let dense = nearest.len() == neighbours;
         let support = &settings.support;
         // Inliers are some of the samples: where those do not suffice, inliers will not.
         if !self
@@ -127,11 +145,51 @@ impl GridWorker {
         }
         self.samples.clear();
         self.samples.extend_from_slice(nearest);
-        let mut draws = Draws::new(settings.seed, i, j);
+        let mut draws = Draws::new(settings.seed, node.i, node.j);
+        if settings.estimator == Estimator::Consensus {
+            // Samples that support a node may be as far off. Where the columns seem noisier,
+            // as when no three samples in a row are free of outliers, the node itself tells.
+            let allowed_mm = support.inlier_floor * spacing.mean_mm / WIDTH;
+            let noise_mm = node.noise.map_or(allowed_mm, |noise| noise.deviation_mm);
+            let least_mm = LEAST_NOISE * spacing.mean_mm;
+            let conditions = Conditions {
+                noise_mm: noise_mm.min(allowed_mm).max(least_mm),
+                most_noise_mm: allowed_mm.max(4.0 * noise_mm),
+                spacing,
+                neighbours: settings.neighbours,
+                most_planes: PLANES_PER_DRAW * settings.draws,
+            };
+            let surfaces =
+                self.consensus
+                    .surfaces(&self.samples, &conditions, &mut draws, |wide| {
+                        let number = WIDE * neighbours;
+                        wide.extend_from_slice(self.search.wider(window, x_mm, y_mm, number));
+                    });
+            // Between strays the samples that count are thinner than samples are.
+            let support = SupportSettings {
+                radius: support.radius * thinner(&self.samples, surfaces, spacing),
+                ..*support
+            };
+            return surfaces.iter().find_map(|surface| {
+                let fit = Fit {
+                    plane: surface.plane,
+                    tolerance: surface.width_mm,
+                };
+                let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm, dense);
+                let supported =
+                    self.surroundings
+                        .supported(&self.samples, spacing, &support, agrees);
+                let quality = || quality(&self.samples, &fit.plane, |n| surface.holds(n));
+                supported.then(|| (fit.plane.c, quality()))
+            });
+        }
         while self.samples.len() >= LEAST_WINDOW {
-            let fit = self
-                .finder
-                .least_median(&self.samples, settings.draws, &mut draws)?;
+            let fit = if settings.estimator == Estimator::ExhaustiveLeastMedian {
+                exhaustive::least_median(&self.samples, &mut self.lengths)?
+            } else {
+                self.finder
+                    .least_median(&self.samples, settings.draws, &mut draws)?
+            };
             if fit.tolerance > support.inlier_ceiling * spacing.mean_mm {
                 // No surface has a majority; the nearer half may show one.
                 let half = self.samples.len() / 2;
@@ -156,6 +214,43 @@ impl GridWorker {
         None
     }
 }
+
+/// Least noise believed, in spacings: scans without any are computed ones.
+const LEAST_NOISE: f64 = 1e-3;
+/// How far strays may widen the radius in which samples support a node.
+const THINNER_LIMIT: f64 = 1.6;
+/// Distance from the node, in spacings, within which strays are counted.
+const STRAY_RADIUS: f64 = 3.0;
+
+/// How many times farther apart the samples on surfaces are than all samples near the node.
+fn thinner(window: &[Neighbour], surfaces: &[Surface], spacing: Spacing) -> f64 {
+    let radius_mm = STRAY_RADIUS * spacing.mean_mm;
+    let near = window
+        .iter()
+        .take_while(|n| n.distance2 <= radius_mm * radius_mm);
+    let (mut all, mut held) = (0_u32, 0_u32);
+    for n in near {
+        all += 1;
+        held += u32::from(surfaces.iter().any(|surface| surface.holds(n)));
+    }
+    let share = f64::from(all) / f64::from(held.max(1));
+    share.sqrt().min(THINNER_LIMIT)
+}
+
+/// A node to estimate.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    x_mm: f64,
+    y_mm: f64,
+    i: i64,
+    j: i64,
+    /// The noise in the window, where it is known.
+    noise: Option<Noise>,
+}
+
+/// [`Estimator::Consensus`] tries as few planes as will do, and at most this many times the
+/// draws that are set.
+const PLANES_PER_DRAW: usize = 16;
 
 /// Share of the spacing that follows from the area of the window, as a circle around the
 /// node, that is believed: at a straight edge half of that circle is empty, which makes

@@ -1,11 +1,16 @@
 //! Irregular scanner columns to a uniform range image by moving least median of squares
 //! (MLMS), after Shim & Lee 1995, section II.1.
 //!
-//! At each node of the lattice the M nearest samples are taken, nearest in x and y and
-//! within a hard reach in columns. N_s times three of them give a plane
-//! `z = a x + b y + c`; the plane whose median of squared residuals over the M samples is
-//! least gives z at the node (equation 2). Up to half of the samples may be wrong
-//! (outliers, the other side of a step edge) without harm.
+//! At each node the M nearest samples are taken, nearest in x and y and within a hard reach
+//! in columns. The paper's estimator ([`Estimator::LeastMedian`]) draws N_s times three of
+//! them, which give a plane `z = a x + b y + c`; the plane whose median of squared residuals
+//! over the M samples is least gives z at the node (equation 2). Up to half of the samples
+//! may be wrong (outliers, the other side of a step edge) without harm.
+//!
+//! Where outliers and edges meet, more than half are wrong.
+//! [`Estimator::Consensus`] takes the noise from the scan itself, rates planes by the
+//! samples that lie within it, tells the surfaces at an edge apart and decides by the places
+//! of their samples on which of them the node is.
 //!
 //! The paper leaves open where the object ends. Here a node gets a value only with
 //! support: samples that agree with its plane, near the node and around it
@@ -18,13 +23,16 @@
 //! any is drawn, and draws are keyed by the seed and the node.
 
 mod batch;
+mod consensus;
 mod draws;
 mod error;
+mod exhaustive;
 mod grid;
 mod neighbours;
 mod plane;
 mod regridder;
 mod settings;
+mod solve;
 mod strip;
 mod support;
 #[cfg(test)]

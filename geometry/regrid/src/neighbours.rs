@@ -22,6 +22,19 @@ pub(crate) struct Neighbour {
 }
 
 impl Neighbour {
+    /// A sample with this offset from the node.
+    #[cfg(test)]
+    pub(crate) fn at(dx: f64, dy: f64, z: f64) -> Self {
+        Self {
+            distance2: dx * dx + dy * dy,
+            dx,
+            dy,
+            z,
+            strip: 0,
+            index: 0,
+        }
+    }
+
     /// The order in which samples are numbered for the draws: by distance, ties by
     /// position. No trace of the order of arrival is left.
     pub(crate) fn order(&self, other: &Self) -> Ordering {
@@ -125,6 +138,21 @@ impl Search {
             self.found.sort_unstable_by(Neighbour::order);
             self.radius_mm = radius_mm;
         }
+        &self.found
+    }
+
+    /// The same for a window that is wider than that of the nodes to come.
+    pub(crate) fn wider(
+        &mut self,
+        window: &Window<'_>,
+        x_mm: f64,
+        y_mm: f64,
+        number: usize,
+    ) -> &[Neighbour] {
+        let radius_mm = self.radius_mm;
+        self.radius_mm = 2.0 * radius_mm;
+        self.nearest(window, x_mm, y_mm, number);
+        self.radius_mm = radius_mm;
         &self.found
     }
 

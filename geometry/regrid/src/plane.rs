@@ -5,7 +5,7 @@ use crate::neighbours::Neighbour;
 
 /// Triples are taken as collinear when the sine of their angle at the first sample is
 /// below this: such a plane would magnify noise without bound.
-const LEAST_SINE: f64 = 0.02;
+pub(crate) const LEAST_SINE: f64 = 0.02;
 /// Collinear triples are drawn again, up to this many draws for each plane wanted.
 const DRAWS_PER_PLANE: usize = 8;
 
@@ -18,12 +18,18 @@ pub(crate) struct Plane {
 }
 
 impl Plane {
-    fn through(p: &Neighbour, q: &Neighbour, r: &Neighbour) -> Option<Self> {
+    /// `None` when the sine of the samples' angle at the first is `least_sine` or less.
+    pub(crate) fn through(
+        p: &Neighbour,
+        q: &Neighbour,
+        r: &Neighbour,
+        least_sine: f64,
+    ) -> Option<Self> {
         let (qx, qy, qz) = (q.dx - p.dx, q.dy - p.dy, q.z - p.z);
         let (rx, ry, rz) = (r.dx - p.dx, r.dy - p.dy, r.z - p.z);
         let cross = qx * ry - rx * qy;
         let lengths2 = (qx * qx + qy * qy) * (rx * rx + ry * ry);
-        if cross * cross <= LEAST_SINE * LEAST_SINE * lengths2 {
+        if cross * cross <= least_sine * least_sine * lengths2 {
             return None;
         }
         let a = (qz * ry - rz * qy) / cross;
@@ -65,6 +71,14 @@ impl Fit {
 /// Standard deviations within which a residual is an inlier's.
 const INLIER_DEVIATIONS: f64 = 2.5;
 
+/// How far inliers lie from a plane with this median of squared residuals over a window of
+/// this many samples: consistent at the normal distribution, with the usual correction for
+/// small windows.
+pub(crate) fn tolerance(median: f64, number: usize) -> f64 {
+    let small = 1.0 + 5.0 / (number as f64 - 3.0).max(1.0);
+    INLIER_DEVIATIONS * 1.4826 * small * median.sqrt()
+}
+
 /// Finds planes; keeps its buffers from node to node.
 #[derive(Debug, Default)]
 pub(crate) struct PlaneFinder {
@@ -99,7 +113,7 @@ impl PlaneFinder {
                 break;
             }
             let [p, q, r] = draws.triple(number);
-            let Some(plane) = Plane::through(&window[p], &window[q], &window[r]) else {
+            let Some(plane) = Plane::through(&window[p], &window[q], &window[r], LEAST_SINE) else {
                 continue;
             };
             tried += 1;
@@ -117,11 +131,9 @@ impl PlaneFinder {
             best = Some((median, plane));
         }
         let (median, plane) = best?;
-        // Consistent at the normal distribution, with the usual correction for small windows.
-        let deviation = 1.4826 * (1.0 + 5.0 / (number as f64 - 3.0).max(1.0)) * median.sqrt();
         Some(Fit {
             plane,
-            tolerance: INLIER_DEVIATIONS * deviation,
+            tolerance: tolerance(median, number),
         })
     }
 

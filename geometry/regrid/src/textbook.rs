@@ -3,7 +3,7 @@
 use range_image::{Column, Lattice, Sample, Unmonitored};
 
 use crate::draws::Draws;
-use crate::{RegridSettings, regrid};
+use crate::{Estimator, RegridSettings, regrid};
 
 /// z at the node by sorting everything.
 fn z_mm(columns: &[Column], (i, j): (i64, i64), settings: &RegridSettings) -> f64 {
@@ -117,6 +117,7 @@ fn the_regridder_agrees_with_the_textbook() {
             neighbours,
             draws,
             reach_columns,
+            estimator: Estimator::LeastMedian,
             ..RegridSettings::with_pitch(pitch_mm)
         };
         let image = regrid(columns.clone(), &settings, &Unmonitored).unwrap();

@@ -110,6 +110,46 @@ fn a_step_edge_stays_a_step_where_least_squares_smears() {
     }
 }
 
+/// Three samples in ten are wrong, in runs along the columns: by consensus the nodes a pitch
+/// or more from the step lie on their plane, and those away from it know it well.
+#[test]
+fn consensus_holds_next_to_a_step_among_runs_of_outliers() {
+    let height = |x: f64, y: f64| 0.1 * x + if x + 0.4 * y < 20.13 { 0.0 } else { 5.0 };
+    let mut noise = Noise::new(21);
+    let (mut left, mut offset) = (0, 0.0);
+    let columns = scan(30.0, (0.4, 0.4), (0.3, 0.6), |x, y| {
+        if left == 0 && noise.uniform() < 0.07 {
+            left = 3 + (6.0 * noise.uniform()) as u32;
+            offset = 60.0 * noise.uniform() - 30.0;
+        }
+        let error = if left > 0 { offset } else { 0.0 };
+        left = left.saturating_sub(1);
+        Some(height(x, y) + error + NOISE_MM * noise.normal())
+    });
+    let settings = RegridSettings {
+        estimator: Estimator::Consensus,
+        neighbours: Estimator::Consensus.neighbours(),
+        ..RegridSettings::with_pitch(0.4)
+    };
+    let (mut away, mut wrong, mut near) = (Vec::new(), 0, 0);
+    for (x, y, z) in nodes(&image(&columns, &settings)) {
+        let from_step = (x + 0.4 * y - 20.13).abs() / (1.0_f64 + 0.4 * 0.4).sqrt();
+        let error = z - height(x, y);
+        if from_step > 1.5 {
+            away.push(error);
+        } else if from_step > 0.4 {
+            near += 1;
+            wrong += usize::from(error.abs() > 0.5);
+        }
+    }
+    assert!(away.len() > 4500, "{}", away.len());
+    assert!(near > 300 && wrong <= 2, "{wrong} of {near}");
+    let gross = away.iter().filter(|e| e.abs() > 0.5).count();
+    assert!(gross <= 1, "{gross} gross errors");
+    let fine = rms(away.into_iter().filter(|e| e.abs() <= 0.5));
+    assert!(fine < 0.012, "{fine}");
+}
+
 /// The window averages: noise at the nodes is well below that of the samples, and on a
 /// sphere the bias of a plane stays below the noise.
 #[test]

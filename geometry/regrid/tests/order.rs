@@ -9,7 +9,7 @@ use common::{Noise, columns, image, steps};
 use range_image::{
     Column, Lattice, Monitor, NodeQuality, RangeImage, RangeImageBuilder, Sample, Unmonitored,
 };
-use regrid::{RegridError, RegridSettings, Regridder, regrid};
+use regrid::{Estimator, RegridError, RegridSettings, Regridder, regrid};
 
 /// A wavy part with a step, a hole, noise, dropouts and empty columns at both ends.
 fn part(length: i32, seed: u64) -> Vec<Column> {
@@ -71,11 +71,22 @@ fn streamed(columns: &[Column], settings: &RegridSettings) -> RangeImage {
 
 #[test]
 fn streaming_batch_threads_and_direction_agree_bit_for_bit() {
+    agree_bit_for_bit(Estimator::LeastMedian);
+}
+
+#[test]
+fn they_agree_by_consensus_too() {
+    agree_bit_for_bit(Estimator::Consensus);
+}
+
+fn agree_bit_for_bit(estimator: Estimator) {
     for (pitch, reach, length) in [(0.41, 8, 60), (0.2, 5, 40), (1.7, 3, 60), (0.5, 8, 9)] {
         let columns = part(length, 5);
         let settings = |threads| RegridSettings {
             reach_columns: reach,
             threads,
+            estimator,
+            neighbours: estimator.neighbours(),
             ..RegridSettings::with_pitch(pitch)
         };
         let expected = bits(&image(&columns, &settings(1)));
@@ -106,8 +117,16 @@ fn a_mirrored_scan_gives_the_mirrored_image_bit_for_bit() {
         .iter()
         .map(|c| Column::new(-c.x_mm(), c.samples().to_vec()))
         .collect();
-    let settings = RegridSettings::with_pitch(0.43);
-    let (there, back) = (image(&columns, &settings), image(&mirrored, &settings));
+    for estimator in [Estimator::LeastMedian, Estimator::Consensus] {
+        let settings = RegridSettings {
+            estimator,
+            ..RegridSettings::with_pitch(0.43)
+        };
+        mirrored_images_agree(&image(&columns, &settings), &image(&mirrored, &settings));
+    }
+}
+
+fn mirrored_images_agree(there: &RangeImage, back: &RangeImage) {
     assert_eq!(
         (there.columns(), there.rows()),
         (back.columns(), back.rows())

@@ -1,0 +1,103 @@
+//! The noise of a scan, from the scan itself.
+
+use crate::strip::Strip;
+
+/// Share of the second differences, the smallest ones, that the search for the noise begins
+/// with. At 45 % outliers a sixth of them is free of any.
+const FIRST_SHARE: f64 = 0.08;
+/// Standard deviations within which a difference is taken for noise.
+const WIDTH: f64 = 2.5;
+/// Quantile of the differences that are not zero below which lies the resolution of z.
+const RESOLUTION_QUANTILE: f64 = 0.05;
+/// Standard deviation of the rounding to a resolution of 1, of which second differences
+/// show half steps.
+const ROUNDING: f64 = 0.58;
+/// Fewest differences that tell something.
+const LEAST: usize = 24;
+
+/// Share of clean samples below which no estimate is believed.
+const LEAST_CLEAN: f64 = 0.5;
+
+/// What the samples of some columns tell of their noise.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Noise {
+    /// Standard deviation of z, millimetres.
+    pub(crate) deviation_mm: f64,
+    /// About which share of the samples is free of outliers: the cube root of the share of
+    /// differences that are, each made of three samples.
+    pub(crate) clean_share: f64,
+}
+
+/// Standard deviation of z within these columns, millimetres; `None` where there are too
+/// few samples to tell.
+///
+/// A sample's distance from the line through the samples below and above it in its column
+/// is noise, where none of the three is an outlier and the surface is smooth there. The
+/// least of these distances are noise alone, and with a normal distribution they tell the
+/// standard deviation of all that are: of the `k` smallest out of `n` distances that are
+/// noise, the greatest is the `k / n` quantile. `n` follows from the deviation, and so in
+/// turns.
+pub(crate) fn noise<'a>(
+    strips: impl Iterator<Item = &'a Strip>,
+    scratch: &mut Vec<f64>,
+) -> Option<Noise> {
+    scratch.clear();
+    for strip in strips {
+        scratch.extend(strip.samples.windows(3).filter_map(|three| {
+            let [(y0, z0), (y1, z1), (y2, z2)] = [three[0], three[1], three[2]];
+            let upper = (y1 - y0) / (y2 - y0);
+            // Of very uneven distances the noise would come out too small or too large.
+            if !(0.1..=0.9).contains(&upper) {
+                return None;
+            }
+            let lower = 1.0 - upper;
+            let deviation = z1 - (lower * z0 + upper * z2);
+            let gain2 = 1.0 + lower * lower + upper * upper;
+            Some(deviation.abs() / gain2.sqrt())
+        }));
+    }
+    let number = scratch.len();
+    if number < LEAST {
+        return None;
+    }
+    scratch.sort_unstable_by(f64::total_cmp);
+    let zeros = scratch.partition_point(|d| *d < 1e-9);
+    let step = (zeros as f64 + RESOLUTION_QUANTILE * (number - zeros) as f64) as usize;
+    let resolution = ROUNDING * scratch.get(step).copied().unwrap_or(0.0);
+
+    let first = ((FIRST_SHARE * number as f64) as usize).max(LEAST / 4);
+    let smallest = scratch[first];
+    let mut clean = number;
+    let mut deviation = 0.0;
+    // Fewer are noise with every turn, and so the deviation grows, until it is consistent.
+    for _ in 0..40 {
+        let share = (first as f64 / clean as f64).min(0.95);
+        deviation = smallest / half_normal_quantile(share);
+        let within = scratch.partition_point(|d| *d <= WIDTH * deviation);
+        let within = within.max(first + 1);
+        if within >= clean {
+            break;
+        }
+        clean = within;
+    }
+    let clean_share = libm::cbrt(clean as f64 / number as f64);
+    Some(Noise {
+        deviation_mm: deviation.max(resolution),
+        clean_share: clean_share.max(LEAST_CLEAN),
+    })
+}
+
+/// Quantile of the absolute value of a standard normal variable.
+fn half_normal_quantile(share: f64) -> f64 {
+    // Bisection of erf: exact to the last bits on every machine, and called rarely.
+    let (mut low, mut high) = (0.0, 4.0);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if libm::erf(middle * core::f64::consts::FRAC_1_SQRT_2) < share {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}

@@ -1,0 +1,294 @@
+//! The surfaces that the samples of a window lie on.
+
+use crate::draws::Draws;
+use crate::neighbours::Neighbour;
+use crate::plane::{LEAST_SINE, Plane};
+use crate::solve::solve;
+
+/// Standard deviations from a surface within which a sample speaks for it.
+pub(crate) const WIDTH: f64 = 3.0;
+/// Probability of stopping before three samples of the best surface were drawn together.
+const MISS: f64 = 1e-4;
+/// Fewest planes tried for a surface.
+const LEAST_PLANES: usize = 6;
+/// Most surfaces told apart in one window: those of a corner.
+const MOST_SURFACES: usize = 3;
+/// Fewest samples of a surface.
+const LEAST_INLIERS: usize = 6;
+/// Fewest pairs of neighbouring columns that both have two or more of a surface's samples.
+/// Outliers may come in runs along a column, but those of different columns hardly ever lie
+/// beside each other on one plane.
+const LEAST_PAIRS: usize = 2;
+/// Fewest samples of a surface that do not come from the two columns with most of them: two
+/// runs of outliers always have a plane in common.
+const LEAST_OTHERS: usize = 4;
+/// With so many of them the columns need not lie beside each other.
+const MANY_OTHERS: usize = 10;
+/// Steepest slope that a camera sees anything of: beyond 80 degrees hardly any light comes
+/// back. What is steeper joins runs of outliers in different columns.
+const STEEPEST_SEEN: f64 = 6.0;
+/// Steepest slope of one surface against another that is looked for among the samples which
+/// the first leaves over.
+const STEEPEST: f64 = 2.0;
+
+/// A plane and the samples that agree with it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Surface {
+    pub(crate) plane: Plane,
+    /// Residuals within this are its samples', millimetres.
+    pub(crate) width_mm: f64,
+    /// How many samples of the window agree.
+    pub(crate) inliers: usize,
+}
+
+impl Surface {
+    pub(crate) fn holds(&self, n: &Neighbour) -> bool {
+        self.plane.residual(n).abs() <= self.width_mm
+    }
+}
+
+/// Finds surfaces; keeps its buffers from node to node.
+#[derive(Debug, Default)]
+pub(crate) struct Surfaces {
+    /// The samples not yet claimed by a surface, nearest first.
+    left: Vec<Neighbour>,
+    dx: Vec<f64>,
+    dy: Vec<f64>,
+    z: Vec<f64>,
+    weight: Vec<f64>,
+    scratch: Vec<f64>,
+    /// The columns of the window, and how many samples of each agree with a plane.
+    columns: Vec<(usize, usize)>,
+    found: Vec<Surface>,
+}
+
+impl Surfaces {
+    /// The surfaces of a window, that with most evidence first; `most_planes` bounds the
+    /// planes tried for each.
+    pub(crate) fn find(
+        &mut self,
+        window: &[Neighbour],
+        noise_mm: f64,
+        most_planes: usize,
+        draws: &mut Draws,
+    ) -> &[Surface] {
+        self.found.clear();
+        self.left.clear();
+        self.left.extend_from_slice(window);
+        self.columns.clear();
+        self.columns.extend(window.iter().map(|n| (n.strip, 0)));
+        self.columns.sort_unstable();
+        self.columns.dedup();
+        let radius2 = window.last().map_or(0.0, |n| n.distance2);
+        let width_mm = WIDTH * noise_mm;
+        while self.found.len() < MOST_SURFACES && self.left.len() >= LEAST_INLIERS {
+            if let Some(first) = self.found.first().copied()
+                && !self.another_is_likely(&first, radius2.sqrt())
+            {
+                break;
+            }
+            self.load(radius2);
+            let Some(plane) = self.best(width_mm, most_planes, draws) else {
+                break;
+            };
+            let surface = Surface {
+                plane,
+                width_mm,
+                inliers: window
+                    .iter()
+                    .filter(|n| plane.residual(n).abs() <= width_mm)
+                    .count(),
+            };
+            self.found.push(surface);
+            self.left.retain(|n| !surface.holds(n));
+        }
+        &self.found
+    }
+
+    /// Whether as many of the samples left as a surface needs lie together above or below
+    /// the first one. Among scattered outliers they hardly ever do, which spares the search.
+    fn another_is_likely(&mut self, first: &Surface, radius_mm: f64) -> bool {
+        let height_mm = (STEEPEST * radius_mm).max(4.0 * first.width_mm);
+        self.scratch.clear();
+        self.scratch
+            .extend(self.left.iter().map(|n| first.plane.residual(n)));
+        self.scratch.sort_unstable_by(f64::total_cmp);
+        self.scratch
+            .windows(LEAST_INLIERS)
+            .any(|some| some[LEAST_INLIERS - 1] - some[0] <= height_mm)
+    }
+
+    /// Whether a plane's samples among those left are those of a surface: enough of them,
+    /// from columns beside each other.
+    fn spans(&mut self, plane: &Plane, width_mm: f64) -> bool {
+        for column in &mut self.columns {
+            column.1 = 0;
+        }
+        for n in &self.left {
+            if plane.residual(n).abs() <= width_mm {
+                let column = self.columns.binary_search_by_key(&n.strip, |c| c.0);
+                if let Some(column) = column.ok().and_then(|k| self.columns.get_mut(k)) {
+                    column.1 += 1;
+                }
+            }
+        }
+        let (mut number, mut longest, mut second) = (0, 0, 0);
+        for &(_, inliers) in &self.columns {
+            number += inliers;
+            second = second.max(inliers.min(longest));
+            longest = longest.max(inliers);
+        }
+        let pairs = self
+            .columns
+            .windows(2)
+            .filter(|pair| pair.iter().all(|c| c.1 >= 2))
+            .count();
+        let few = self.columns.len() <= LEAST_PAIRS;
+        let others = number - longest - second;
+        number >= LEAST_INLIERS
+            && (few || others >= MANY_OTHERS || pairs >= LEAST_PAIRS && others >= LEAST_OTHERS)
+    }
+
+    fn load(&mut self, radius2: f64) {
+        self.dx.clear();
+        self.dy.clear();
+        self.z.clear();
+        self.weight.clear();
+        self.dx.extend(self.left.iter().map(|n| n.dx));
+        self.dy.extend(self.left.iter().map(|n| n.dy));
+        self.z.extend(self.left.iter().map(|n| n.z));
+        let fall = 0.8 / radius2.max(f64::MIN_POSITIVE);
+        self.weight
+            .extend(self.left.iter().map(|n| 1.0 - fall * n.distance2));
+    }
+
+    /// The plane with most evidence among the samples loaded.
+    fn best(&mut self, width_mm: f64, most_planes: usize, draws: &mut Draws) -> Option<Plane> {
+        let number = self.left.len();
+        let mut best: Option<(f64, Plane)> = None;
+        let mut enough = most_planes;
+        let mut best_drawn = 0.0;
+        let mut tried = 0;
+        while tried < enough {
+            tried += 1;
+            let [p, q, r] = draws.triple(number);
+            let Some(plane) =
+                Plane::through(&self.left[p], &self.left[q], &self.left[r], LEAST_SINE)
+            else {
+                continue;
+            };
+            if plane.a * plane.a + plane.b * plane.b > STEEPEST_SEEN * STEEPEST_SEEN {
+                continue;
+            }
+            let mut score = self.score(&plane, width_mm);
+            if score.0 <= best_drawn {
+                continue;
+            }
+            let drawn = score.0;
+            let mut better = (score.0, plane);
+            // Three samples carry their noise far; the samples that agree with their plane
+            // know better.
+            for _ in 0..2 {
+                let Some(refined) = self.refined(&better.1, width_mm) else {
+                    break;
+                };
+                let rated = self.score(&refined, width_mm);
+                if rated.0 <= better.0 {
+                    break;
+                }
+                better = (rated.0, refined);
+                score = rated;
+            }
+            if best.is_none_or(|(evidence, _)| better.0 > evidence)
+                && self.spans(&better.1, width_mm)
+            {
+                best_drawn = drawn;
+                best = Some(better);
+                enough = planes_needed(score.1 / number as f64, most_planes);
+            }
+        }
+        best.map(|(_, plane)| plane)
+    }
+
+    /// Evidence for a plane, and the number of samples that give it.
+    fn score(&self, plane: &Plane, width_mm: f64) -> (f64, f64) {
+        let narrow = 1.0 / (width_mm * width_mm);
+        let (mut evidence, mut inliers) = (0.0, 0.0);
+        for (((dx, dy), z), weight) in self.dx.iter().zip(&self.dy).zip(&self.z).zip(&self.weight) {
+            let residual = z - (plane.a * dx + plane.b * dy + plane.c);
+            let share = (1.0 - narrow * residual * residual).max(0.0);
+            evidence += weight * share;
+            inliers += if share > 0.0 { 1.0 } else { 0.0 };
+        }
+        (evidence, inliers)
+    }
+
+    /// The weighted least-squares plane of the samples that agree with a plane.
+    fn refined(&self, plane: &Plane, width_mm: f64) -> Option<Plane> {
+        let mut fit = PlaneSums::default();
+        for (((dx, dy), z), weight) in self.dx.iter().zip(&self.dy).zip(&self.z).zip(&self.weight) {
+            let residual = z - (plane.a * dx + plane.b * dy + plane.c);
+            let weight = if residual.abs() < width_mm {
+                *weight
+            } else {
+                0.0
+            };
+            fit.add(*dx, *dy, residual, weight);
+        }
+        fit.plane().map(|change| Plane {
+            a: plane.a + change.a,
+            b: plane.b + change.b,
+            c: plane.c + change.c,
+        })
+    }
+}
+
+/// Planes to try until three samples of a surface were drawn together, but for [`MISS`].
+fn planes_needed(share: f64, most: usize) -> usize {
+    let hit = share * share * share;
+    if hit >= 0.999 {
+        return LEAST_PLANES.min(most);
+    }
+    let planes = libm::log(MISS) / libm::log(1.0 - hit.max(1e-9));
+    (planes.ceil() as usize).max(LEAST_PLANES).min(most)
+}
+
+/// Sums for a least-squares plane.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct PlaneSums {
+    one: f64,
+    x: f64,
+    y: f64,
+    xx: f64,
+    xy: f64,
+    yy: f64,
+    z: f64,
+    xz: f64,
+    yz: f64,
+}
+
+impl PlaneSums {
+    pub(crate) fn add(&mut self, x: f64, y: f64, z: f64, weight: f64) {
+        let (wx, wy) = (weight * x, weight * y);
+        self.one += weight;
+        self.x += wx;
+        self.y += wy;
+        self.xx += wx * x;
+        self.xy += wx * y;
+        self.yy += wy * y;
+        self.z += weight * z;
+        self.xz += wx * z;
+        self.yz += wy * z;
+    }
+
+    /// `None` where the samples are collinear.
+    pub(crate) fn plane(&self) -> Option<Plane> {
+        let matrix = [
+            [self.one, 0.0, 0.0],
+            [self.x, self.xx, 0.0],
+            [self.y, self.xy, self.yy],
+        ];
+        let [c, a, b] = solve(matrix, [self.z, self.xz, self.yz])?;
+        Some(Plane { a, b, c })
+    }
+}
