@@ -96,6 +96,12 @@ impl Sums {
         self.z_squared += column.z_squared;
     }
 
+    fn fit_of(&self, terms: [f64; TERMS]) -> LocalFit {
+        let weight = self.moments[0][0];
+        let centroid = [self.moments[1][0] / weight, self.moments[0][1] / weight];
+        LocalFit { terms, centroid }
+    }
+
     /// The plane, or the quadratic where it is clearly nearer to the nodes; `None` with too
     /// few nodes, or nodes on a line.
     pub(crate) fn fit(&self, belief: Belief) -> Option<LocalFit> {
@@ -112,8 +118,7 @@ impl Sums {
         {
             terms = quadratic;
         }
-        let centroid = [self.moments[1][0] / weight, self.moments[0][1] / weight];
-        Some(LocalFit { terms, centroid })
+        Some(self.fit_of(terms))
     }
 
     /// Cholesky solution of the first N normal equations, and the squared error left.

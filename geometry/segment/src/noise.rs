@@ -4,17 +4,75 @@ use crate::grid::Grid;
 
 /// Noise below this share of the pitch is of no account to any decision.
 const LEAST_SHARE_OF_PITCH: f64 = 1e-3;
+/// Nodes from which on noise is taken to be unlike.
+const FAR: usize = 5;
+/// Noise is never taken to be alike over more nodes than this.
+const GREATEST_AREA: f64 = 25.0;
 
-/// Standard deviation of z about the surface, millimetres.
+/// How z strays about the surface.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Noise {
+    /// Standard deviation, millimetres.
+    pub(crate) deviation_mm: f64,
+    /// So many nodes tell as much as one would whose noise is its own: the sum of the
+    /// noise's autocorrelation over the grid.
+    pub(crate) area_nodes: f64,
+}
+
+/// Slopes raise the noise of z: what strays across the line of sight adds its share.
+const ACROSS: f64 = 0.5;
+
+impl Noise {
+    /// Standard deviation of z where the surface rises by so many millimetres per pitch.
+    pub(crate) fn on_slope_mm(&self, rise_mm: [f64; 2], pitch_mm: f64) -> f64 {
+        let square = (rise_mm[0] * rise_mm[0] + rise_mm[1] * rise_mm[1]) / (pitch_mm * pitch_mm);
+        self.deviation_mm * libm::sqrt(1.0 + ACROSS * square)
+    }
+}
+
+/// Measures the noise.
 ///
 /// From third differences, which no quadratic surface disturbs, along columns and rows. The
 /// median keeps creases and steps out. Regridded noise is alike in neighbouring nodes, which
 /// hides it from differences of neighbours, so those over every second node are taken as
-/// well, and the greater figure counts.
-pub(crate) fn noise_mm(grid: &Grid<'_>) -> f64 {
+/// well, and the greater figure counts. How much neighbours hide tells how far noise is alike.
+pub(crate) fn noise(grid: &Grid<'_>) -> Noise {
     let near = third_differences(grid, 1);
-    let far = third_differences(grid, 2);
-    near.max(far).max(LEAST_SHARE_OF_PITCH * grid.pitch_mm)
+    let middle = third_differences(grid, 2);
+    let far = third_differences(grid, FAR).min(2.0 * near.max(middle));
+    let deviation_mm = near.max(middle).max(LEAST_SHARE_OF_PITCH * grid.pitch_mm);
+    Noise {
+        deviation_mm,
+        area_nodes: area(near, middle.max(far).max(near)),
+    }
+}
+
+/// The autocorrelation's sum, taken for a Gaussian, from the deviation seen by third differences
+/// of neighbours and the full one.
+fn area(near_mm: f64, full_mm: f64) -> f64 {
+    if near_mm <= 0.0 || full_mm <= near_mm {
+        return 1.0;
+    }
+    let seen = (near_mm / full_mm) * (near_mm / full_mm);
+    // Share of the variance that is seen at correlation r between neighbours, r^4 and r^9
+    // between those two and three apart.
+    let share = |r: f64| {
+        let (r4, r9) = (r * r * r * r, r * r * r * r * r * r * r * r * r);
+        1.0 - (15.0 * r - 6.0 * r4 + r9) / 10.0
+    };
+    let (mut low, mut high) = (0.0, 0.99);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if share(middle) > seen {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    let r = 0.5 * (low + high);
+    // Sum of r^(k k) over all whole k, for columns and for rows.
+    let line: f64 = 1.0 + 2.0 * (1..8).map(|k| libm::pow(r, f64::from(k * k))).sum::<f64>();
+    (line * line).min(GREATEST_AREA)
 }
 
 fn third_differences(grid: &Grid<'_>, lag: usize) -> f64 {

@@ -2,6 +2,7 @@
 
 use crate::grid::{Grid, Links};
 use crate::local_fit::{ColumnSums, Sums};
+use crate::noise::Noise;
 
 /// Label of a node that belongs to no region (yet).
 pub(crate) const NONE: u32 = 0;
@@ -18,7 +19,7 @@ pub(crate) struct Scene<'a> {
     pub(crate) grid: Grid<'a>,
     pub(crate) links: Links,
     /// Measured noise of z.
-    pub(crate) noise_mm: f64,
+    pub(crate) noise: Noise,
     /// Jump square to the surface that counts as a step.
     pub(crate) step_mm: f64,
     /// Change of direction that counts as a crease.
@@ -31,7 +32,7 @@ impl Scene<'_> {
     /// pitch off, so by both together 0.4. It goes with the number of nodes and their spread.
     pub(crate) fn turn_noise_rad(&self, reach: usize) -> f64 {
         let scale = FIT_REACH as f64 / reach as f64;
-        0.4 * scale * scale * self.noise_mm / self.grid.pitch_mm
+        0.4 * scale * scale * self.noise.deviation_mm / self.grid.pitch_mm
     }
 
     /// Sums of the labels in the window around a node, in the order they are met, those that

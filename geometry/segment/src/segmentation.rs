@@ -1,26 +1,18 @@
 //! The stages in their order.
 
-use crate::cluster::cluster;
-use crate::components::{Border, depths, label_components, sizes};
-use crate::crease::creased;
-use crate::features::patterns;
+use crate::components::{label_components, sizes};
 use crate::fill::filled;
 use crate::grid::{Grid, Links};
-use crate::merge::merge;
-use crate::noise::noise_mm;
-use crate::normals::{self, Normals};
-use crate::regrow::{redraw_borders, regrow};
-use crate::scene::{FIT_REACH, NONE, Scene};
+use crate::noise::noise;
+use crate::scene::{NONE, Scene};
 use crate::settings::{Method, SegmentSettings, SettingsError};
+use crate::{relief, shim_lee};
 use range_image::{Cancelled, Monitor, RangeImage, RegionMap};
 
 /// Limit of |z|, millimetres: beyond it rounding would show in the results.
 pub const MAX_Z_MM: f64 = 1e9;
 /// A jump below so many deviations of the noise may be noise.
 const STEP_NOISES: f64 = 6.0;
-
-/// Of so many nodes of a region one must lie deep in it, or it is a sliver.
-const LEAST_DEEP: usize = 8;
 
 /// Why an image cannot be segmented.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -56,7 +48,7 @@ pub struct Report {
     pub noise_mm: f64,
     /// Jump that counted as a step, square to the surface, millimetres.
     pub step_mm: f64,
-    /// Connected pieces of clusters before anything was dissolved or merged.
+    /// Connected pieces before anything was dissolved or merged.
     pub components: usize,
     /// Pieces left unlabelled because they have too few nodes.
     pub crumbs: usize,
@@ -100,58 +92,33 @@ pub fn segment_with_report(
     settings.validate()?;
     check(image)?;
     let measured = Grid::new(image);
-    let noise = noise_mm(&measured);
+    let noise = noise(&measured);
     let working = filled(&measured);
     let grid = Grid {
         z_mm: &working,
         ..measured
     };
-    let step_mm = (settings.step_factor * grid.pitch_mm).max(STEP_NOISES * noise);
+    let step_mm = (settings.step_factor * grid.pitch_mm).max(STEP_NOISES * noise.deviation_mm);
     let scene = Scene {
         grid,
         links: Links::new(&grid, step_mm),
-        noise_mm: noise,
+        noise,
         step_mm,
         crease_rad: settings.crease_angle_rad,
     };
     monitor.progress(0.05);
-    let normals = match settings.method {
-        Method::ShimLee => normals::of_grid(&grid, None),
-        Method::Relief => normals::of_grid(&grid, Some(&scene.links)),
+    let (labels, components) = match settings.method {
+        Method::ShimLee => shim_lee::divide(&scene, settings, monitor)?,
+        Method::Relief => relief::divide(&scene, monitor)?,
     };
-    monitor.check()?;
-    monitor.progress(0.2);
-    let (mut labels, components) = clusters(&scene, &normals, settings, monitor)?;
-    monitor.progress(0.45);
     let minimum = settings.fewest_nodes(grid.pitch_mm);
-    let (slim, reaches): (u8, &[usize]) = match settings.method {
-        // Mixed normals may have made clusters along creases, up to four nodes wide.
-        Method::ShimLee => (2, &[FIT_REACH, 4]),
-        Method::Relief => (1, &[FIT_REACH, 4, 3]),
-    };
-    dissolve_slivers(&scene, &mut labels, minimum, slim, Border::Neighbours);
-    regrow(&scene, &mut labels, monitor)?;
-    monitor.progress(0.65);
-    merge(&scene, &mut labels, &[FIT_REACH], monitor)?;
-    monitor.progress(0.8);
-    // What is slim even now is what mixed normals have left along creases and outlines.
-    dissolve_slivers(&scene, &mut labels, minimum, 2, Border::All);
-    regrow(&scene, &mut labels, monitor)?;
-    if settings.method == Method::Relief {
-        redraw_borders(&scene, &mut labels, monitor)?;
-    }
-    // With borders nearer their places, shorter fits can be trusted too. They follow surfaces
-    // that bend away sharply, as towards the outline of something round.
-    merge(&scene, &mut labels, reaches, monitor)?;
-    dissolve_slivers(&scene, &mut labels, minimum, 2, Border::All);
-    regrow(&scene, &mut labels, monitor)?;
     monitor.progress(0.95);
     let (labels, crumbs, crumb_nodes) = finish(&scene, &measured, &labels, minimum);
     monitor.progress(1.0);
     Ok(Segmentation {
         regions: RegionMap::new(image, labels),
         report: Report {
-            noise_mm: noise,
+            noise_mm: noise.deviation_mm,
             step_mm,
             components,
             crumbs,
@@ -176,60 +143,6 @@ fn check(image: &RangeImage) -> Result<(), SegmentError> {
             z_mm: z[node],
         }),
         None => Ok(()),
-    }
-}
-
-/// Labels of the connected pieces of clusters, and their number.
-fn clusters(
-    scene: &Scene<'_>,
-    normals: &Normals,
-    settings: &SegmentSettings,
-    monitor: &dyn Monitor,
-) -> Result<(Vec<u32>, usize), Cancelled> {
-    let grid = &scene.grid;
-    let aside = match settings.method {
-        Method::ShimLee => vec![false; grid.nodes()],
-        Method::Relief => creased(scene, normals),
-    };
-    let nodes: Vec<usize> = (0..grid.nodes())
-        .filter(|&n| !aside[n] && normals.of_node(n).is_some())
-        .collect();
-    let patterns = patterns(scene, normals, &nodes, settings.method);
-    monitor.check()?;
-    let nearest = cluster(&patterns, settings.clusters, settings.seed, monitor)?;
-    let mut of_node = vec![None; grid.nodes()];
-    for (&node, cluster) in nodes.iter().zip(nearest) {
-        of_node[node] = Some(cluster);
-    }
-    let mut labels = vec![NONE; grid.nodes()];
-    let next = label_components(grid, &scene.links, |n| of_node[n], &mut labels, 1);
-    Ok((labels, next as usize - 1))
-}
-
-/// Takes the label from pieces that are small, or hardly anywhere as deep as `depth` nodes from
-/// a border, so that their nodes go to a neighbour.
-fn dissolve_slivers(
-    scene: &Scene<'_>,
-    labels: &mut [u32],
-    minimum_nodes: usize,
-    depth: u8,
-    border: Border,
-) {
-    let depths = depths(scene, labels, depth, border);
-    let sizes = sizes(labels);
-    let mut deep = vec![0_usize; sizes.len()];
-    for (&label, depth_here) in labels.iter().zip(depths) {
-        deep[label as usize] += usize::from(depth_here >= depth);
-    }
-    let kept: Vec<bool> = sizes
-        .iter()
-        .zip(deep)
-        .map(|(&size, deep)| size >= minimum_nodes && deep * LEAST_DEEP >= size)
-        .collect();
-    for label in labels {
-        if !kept[*label as usize] {
-            *label = NONE;
-        }
     }
 }
 

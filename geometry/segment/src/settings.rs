@@ -2,15 +2,12 @@
 
 use core::fmt;
 
-/// Which road from clusters to regions is taken.
+/// Which road is taken from nodes to regions; see the [crate].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
-    /// Shim & Lee 1995, section II.2, with a plain 5 x 5 window for the normals. Borders
-    /// stay where the clusters meet.
+    /// Shim & Lee 1995, section II.2: clusters of normals and positions, merged. The baseline.
     ShimLee,
-    /// The same road, but normals do not reach across steps, nodes beside a crease are kept
-    /// out of the clustering, and they join the side whose surface explains them. Borders
-    /// then lie on the crease itself.
+    /// Surfaces that grow from the flattest places and compete for nodes.
     #[default]
     Relief,
 }
@@ -29,8 +26,9 @@ impl fmt::Display for Method {
 pub struct SegmentSettings {
     /// Which road is taken.
     pub method: Method,
-    /// Number of clusters B before merging, 1 to [`MAX_CLUSTERS`](Self::MAX_CLUSTERS). The
-    /// paper uses 20. More cost time only, since what is split needlessly is merged again.
+    /// Number of clusters B before merging, 1 to [`MAX_CLUSTERS`](Self::MAX_CLUSTERS), of
+    /// [`Method::ShimLee`] alone. The paper uses 20. More cost time only, since what is split
+    /// needlessly is merged again.
     pub clusters: usize,
     /// Two regions are kept apart where their surfaces meet at a greater change of direction
     /// than this, radians, above 0 and at most pi/2. 0 is a smooth passage.
@@ -44,7 +42,7 @@ pub struct SegmentSettings {
     /// Regions that cover less than this, seen from the camera, stay unlabelled, square
     /// millimetres; 0 for no such limit.
     pub minimum_area_mm2: f64,
-    /// Seed of the clustering's random starts.
+    /// Seed of the clustering's random starts; [`Method::Relief`] draws nothing.
     pub seed: u64,
 }
 
@@ -53,7 +51,7 @@ impl Default for SegmentSettings {
         Self {
             method: Method::default(),
             clusters: 20,
-            crease_angle_rad: 0.2,
+            crease_angle_rad: 0.1,
             step_factor: 1.0,
             minimum_nodes: 50,
             minimum_area_mm2: 0.0,

@@ -1,6 +1,5 @@
 //! Nodes without a region join the one whose surface, carried on, explains them best.
 
-use crate::components::{Border, depths};
 use crate::local_fit::{Belief, LocalFit, Sums};
 use crate::scene::{NONE, Scene};
 use range_image::{Cancelled, Monitor};
@@ -10,10 +9,6 @@ use range_image::{Cancelled, Monitor};
 const REACH: usize = 8;
 /// So many links away from labelled nodes, surfaces are carried on before they are fitted anew.
 const LAYERS: u8 = 4;
-/// Width of the band on either side of a border that is decided anew, nodes.
-const BAND: u8 = 3;
-/// A region keeps its nodes when fewer than this lie deeper than the band.
-const LEAST_CORE: usize = 25;
 /// A surface explains a node that lies off it by less than this share of a step.
 const EXPLAINED: f64 = 0.5;
 /// Least z of a normal by which a miss is judged, lest a fit that has tipped over explain all.
@@ -23,27 +18,6 @@ const RIVALS: usize = 4;
 
 /// The regions that may take a node, best first; [`NONE`] fills up.
 type Ranking = [u32; RIVALS];
-
-/// Takes all nodes near borders that are no steps from their regions and has them decided
-/// again by the surfaces behind the borders.
-pub(crate) fn redraw_borders(
-    scene: &Scene<'_>,
-    labels: &mut [u32],
-    monitor: &dyn Monitor,
-) -> Result<(), Cancelled> {
-    let depths = depths(scene, labels, BAND, Border::Neighbours);
-    let most = labels.iter().copied().max().unwrap_or(NONE) as usize;
-    let mut cores = vec![0_usize; most + 1];
-    for (&label, &depth) in labels.iter().zip(&depths) {
-        cores[label as usize] += usize::from(depth >= BAND);
-    }
-    for (label, depth) in labels.iter_mut().zip(depths) {
-        if depth < BAND && cores[*label as usize] >= LEAST_CORE {
-            *label = NONE;
-        }
-    }
-    regrow(scene, labels, monitor)
-}
 
 /// Labels every node that links join to a labelled one.
 ///

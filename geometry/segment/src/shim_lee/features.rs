@@ -1,21 +1,14 @@
 //! Six features of a node, scaled to like variance.
 
-use crate::cluster::Pattern;
+use super::cluster::Pattern;
 use crate::normals::Normals;
 use crate::scene::Scene;
-use crate::settings::Method;
 
 /// The patterns of these nodes, all of which have a normal.
 ///
 /// A feature that hardly varies must not be blown up until its noise looks like structure:
-/// positions count in no less than pitches, normals in no less than half a crease. Where
-/// directions vary widely, `Relief` lets them count in no more than one and a half creases.
-pub(crate) fn patterns(
-    scene: &Scene<'_>,
-    normals: &Normals,
-    nodes: &[usize],
-    method: Method,
-) -> Vec<Pattern> {
+/// positions count in no less than pitches, normals in no less than half a crease.
+pub(crate) fn patterns(scene: &Scene<'_>, normals: &Normals, nodes: &[usize]) -> Vec<Pattern> {
     let grid = &scene.grid;
     let mut patterns: Vec<Pattern> = nodes
         .iter()
@@ -31,11 +24,7 @@ pub(crate) fn patterns(
         let scale = if k < 3 {
             deviation.max(grid.pitch_mm)
         } else {
-            let least = 0.5 * scene.crease_rad;
-            match method {
-                Method::ShimLee => deviation.max(least),
-                Method::Relief => deviation.clamp(least, 3.0 * least),
-            }
+            deviation.max(0.5 * scene.crease_rad)
         };
         for pattern in &mut patterns {
             pattern[k] = (pattern[k] - mean) / scale;

@@ -1,0 +1,63 @@
+//! The default road: surfaces of variable order are grown from the flattest places, compete
+//! for the nodes at their borders, and become one region where they join smoothly.
+
+mod border;
+mod compete;
+mod grow;
+mod least_squares;
+mod models;
+mod piece;
+mod revise;
+mod surface;
+mod windows;
+
+use crate::merge::{Border, merge};
+use crate::scene::Scene;
+use models::{Models, Planes};
+use range_image::{Cancelled, Monitor};
+
+/// Smaller regions, and curved ones, join a neighbour when nothing speaks against it; a plane
+/// that is larger only when it is certain.
+const SMALL: usize = 400;
+
+/// Labels of the regions, and the number of pieces before merging.
+pub(crate) fn divide(
+    scene: &Scene<'_>,
+    monitor: &dyn Monitor,
+) -> Result<(Vec<u32>, usize), Cancelled> {
+    let mut pieces = grow::pieces(scene, monitor)?;
+    monitor.progress(0.4);
+    compete::spread(scene, &mut pieces, grow::MISS_NOISES);
+    revise::dissolve(scene, &mut pieces);
+    revise::leftovers(scene, &mut pieces);
+    compete::settle(scene, &mut pieces, monitor)?;
+    monitor.progress(0.6);
+    let count = pieces.surfaces.len() - 1;
+    let mut labels = pieces.labels.clone();
+    let models = Models::new(scene, &pieces);
+    // First where it is certain, so that borders grow longer and tell more.
+    for certain in [true, false] {
+        let strength = |labels: &[u32], border: &Border, sizes: [usize; 2]| {
+            match models.planes(scene, labels, border, sizes) {
+                Some(Planes::Apart) => return None,
+                Some(Planes::Together) => return Some(0.0),
+                None => {}
+            }
+            let is_small = sizes[0].min(sizes[1]) <= SMALL;
+            if certain || !is_small && models.beside_plane(scene, labels, border, sizes) {
+                return border::strength(scene, labels, border, 1.0);
+            }
+            let near = border::strength(scene, labels, border, 0.0);
+            if !is_small {
+                return near;
+            }
+            match (near, models.strength(scene, &border.pairs)) {
+                (Some(near), Some(models)) => Some(near.min(models)),
+                (near, models) => near.or(models),
+            }
+        };
+        merge(scene, &mut labels, strength, monitor)?;
+    }
+    revise::clear_slivers(scene, &mut labels);
+    Ok((labels, count))
+}

@@ -1,0 +1,119 @@
+//! Border nodes go to the piece whose surface explains them best.
+
+use super::grow::MISS_NOISES;
+use super::piece::Pieces;
+use crate::scene::{NONE, Scene};
+use range_image::{Cancelled, Monitor};
+
+/// Rounds of deciding borders and fitting surfaces anew.
+const ROUNDS: usize = 3;
+/// Sweeps over the borders in a round.
+const SWEEPS: usize = 4;
+/// A node that lies further off than this many noises is equally far off all surfaces.
+const CAP_NOISES: f64 = 4.0;
+/// What a neighbour in another piece costs, in squared noises.
+const APART: f64 = 0.6;
+
+/// Draws the borders where neither side would gain by a change, and gives the nodes left to the
+/// nearest surface.
+pub(crate) fn settle(
+    scene: &Scene<'_>,
+    pieces: &mut Pieces,
+    monitor: &dyn Monitor,
+) -> Result<(), Cancelled> {
+    for _ in 0..ROUNDS {
+        monitor.check()?;
+        for sweep in 0..2 * SWEEPS {
+            sweep_borders(scene, pieces, sweep % 2);
+        }
+        pieces.refit(scene);
+        spread(scene, pieces, 1.5 * MISS_NOISES);
+    }
+    spread(scene, pieces, f64::INFINITY);
+    Ok(())
+}
+
+/// Lets unlabelled nodes join, layer by layer, the piece beside them that they miss least, if
+/// by less than so many noises.
+pub(crate) fn spread(scene: &Scene<'_>, pieces: &mut Pieces, most: f64) {
+    let open = |pieces: &Pieces, n: usize| pieces.labels[n] == NONE && scene.grid.is_valid(n);
+    let mut front: Vec<usize> = (0..pieces.labels.len())
+        .filter(|&n| open(pieces, n) && scene.links.linked(n).any(|m| pieces.labels[m] != NONE))
+        .collect();
+    while !front.is_empty() {
+        let joins: Vec<(usize, u32)> = front
+            .iter()
+            .filter_map(|&node| {
+                let miss = |label: u32| pieces.miss(scene, label, node);
+                let beside = scene.links.linked(node).map(|n| pieces.labels[n]);
+                let best = beside
+                    .filter(|&label| label != NONE)
+                    .min_by(|&a, &b| miss(a).total_cmp(&miss(b)).then(a.cmp(&b)))?;
+                (miss(best) <= most).then_some((node, best))
+            })
+            .collect();
+        for &(node, label) in &joins {
+            pieces.labels[node] = label;
+        }
+        let mut next: Vec<usize> = joins
+            .iter()
+            .flat_map(|&(node, _)| scene.links.linked(node))
+            .filter(|&n| open(pieces, n))
+            .collect();
+        next.sort_unstable();
+        next.dedup();
+        front = next;
+    }
+}
+
+/// Decides every second border node anew, as on the fields of one colour of a chessboard.
+fn sweep_borders(scene: &Scene<'_>, pieces: &mut Pieces, colour: usize) {
+    let grid = &scene.grid;
+    let mut rivals: Vec<u32> = Vec::new();
+    for node in 0..pieces.labels.len() {
+        let own = pieces.labels[node];
+        let (column, row) = grid.column_row(node);
+        if own == NONE || (column + row) % 2 != colour {
+            continue;
+        }
+        if scene
+            .links
+            .linked(node)
+            .all(|n| pieces.labels[n] == own || pieces.labels[n] == NONE)
+        {
+            continue;
+        }
+        rivals.clear();
+        rivals.push(own);
+        let (columns, rows) = grid.window(node, 1);
+        let mut beside = [NONE; 8];
+        let mut count = 0;
+        for c in columns {
+            for r in rows.clone() {
+                let k = c * grid.rows + r;
+                let label = pieces.labels[k];
+                if label == NONE || k == node {
+                    continue;
+                }
+                beside[count] = label;
+                count += 1;
+            }
+        }
+        for n in scene.links.linked(node) {
+            let label = pieces.labels[n];
+            if label != NONE && !rivals.contains(&label) {
+                rivals.push(label);
+            }
+        }
+        let cost = |label: u32| {
+            let miss = pieces.miss(scene, label, node).min(CAP_NOISES);
+            let apart = beside[..count].iter().filter(|&&l| l != label).count();
+            miss * miss + pieces.doubt(label) + APART * apart as f64
+        };
+        let best = rivals
+            .iter()
+            .copied()
+            .min_by(|&a, &b| cost(a).total_cmp(&cost(b)));
+        pieces.labels[node] = best.unwrap_or(own);
+    }
+}

@@ -1,0 +1,324 @@
+//! Growing pieces from seeds (Besl & Jain 1988, *Segmentation through variable-order surface
+//! fitting*).
+
+use super::piece::Pieces;
+use super::surface::Surface;
+use super::windows::{WindowPlane, best_windows, planes};
+use crate::grid::Grid;
+use crate::scene::{NONE, Scene};
+use range_image::{Cancelled, Monitor};
+
+/// Half the sides of the windows that seeds are taken from, the widest first, so that large
+/// faces are found before parts of them can be taken for something else; and how many noises
+/// the window's plane may leave. Coarse depths make wide terraces on faces that are seen
+/// squarely, which narrow windows would take for faces.
+const SEEDS: [(usize, f64); 6] = [
+    (12, CLEAN),
+    (6, CLEAN),
+    (12, ROUGH),
+    (6, ROUGH),
+    (3, CLEAN),
+    (2, CLEAN),
+];
+const CLEAN: f64 = 1.3;
+const ROUGH: f64 = 4.0;
+/// A rough window is flat when a quadric leaves no less than this share of what its plane does.
+const FLAT: f64 = 0.8;
+/// Half the side of the windows that give a node's direction.
+const REACH: usize = 3;
+/// A node lies on a surface when it misses it by less than this many noises.
+pub(super) const MISS_NOISES: f64 = 3.0;
+/// A window whose plane leaves more than this many noises tells no direction.
+const CLEAR_NOISES: f64 = 2.0;
+/// A node's direction may differ from its surface's by this many standard errors,
+const TURN_ERRORS: f64 = 4.0;
+/// and by this share of a crease.
+const TURN_SHARE: f64 = 0.5;
+/// Growth that has not settled after so many rounds wanders.
+const ROUNDS: usize = 30;
+/// Smaller pieces are none.
+const LEAST_NODES: usize = 12;
+
+/// Grows pieces until no seed is left. What no piece explains stays unlabelled.
+pub(crate) fn pieces(scene: &Scene<'_>, monitor: &dyn Monitor) -> Result<Pieces, Cancelled> {
+    let grid = &scene.grid;
+    let directions = planes(grid, REACH);
+    let mut grower = Grower {
+        scene,
+        windows: best_windows(grid, &directions, REACH, scene.noise.deviation_mm),
+        directions,
+        pieces: Pieces {
+            labels: vec![NONE; grid.nodes()],
+            surfaces: vec![None],
+        },
+        seen: vec![0; grid.nodes()],
+        stamp: 0,
+    };
+    // Nodes by the last kind of seed that came to nothing there.
+    let mut vain = vec![0; grid.nodes()];
+    for (k, (reach, noises)) in SEEDS.into_iter().enumerate() {
+        monitor.check()?;
+        for (roughness, seed) in seeds(scene, reach, noises) {
+            if vain[seed] <= k && grower.is_open(seed, reach) {
+                monitor.check()?;
+                if !grower.grow(seed, reach, roughness) {
+                    // Seeds close by would fare no better.
+                    let (columns, rows) = grid.window(seed, reach / 3);
+                    for column in columns {
+                        let first = column * grid.rows;
+                        vain[first + rows.start..first + rows.end].fill(k + 1);
+                    }
+                }
+            }
+        }
+        monitor.progress(0.05 + 0.35 * (k + 1) as f64 / SEEDS.len() as f64);
+    }
+    Ok(grower.pieces)
+}
+
+/// The middles of windows whose planes leave less than so many noises, the flattest first, with
+/// their roughness.
+fn seeds(scene: &Scene<'_>, reach: usize, noises: f64) -> Vec<(f64, usize)> {
+    let planes = planes(&scene.grid, reach);
+    // Flatness is in squared noises, those of the window's slope.
+    let mut seeds: Vec<(f32, usize)> = planes
+        .iter()
+        .enumerate()
+        .filter_map(|(node, plane)| {
+            let rise_mm = plane.rise_mm.map(f64::from);
+            let noise_mm = scene.noise.on_slope_mm(rise_mm, scene.grid.pitch_mm);
+            let left = plane.variance_mm2 / (noise_mm * noise_mm) as f32;
+            (left < (noises * noises) as f32).then_some((left, node))
+        })
+        .collect();
+    seeds.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let roughness = |left: f32| {
+        let left = libm::sqrt(f64::from(left));
+        if left < CLEAN { 1.0 } else { left }
+    };
+    seeds
+        .into_iter()
+        .map(|(left, node)| (roughness(left), node))
+        .collect()
+}
+
+struct Grower<'a> {
+    scene: &'a Scene<'a>,
+    /// Planes of all windows of [`REACH`].
+    directions: Vec<WindowPlane>,
+    /// The window that each node is judged by.
+    windows: Vec<u32>,
+    pieces: Pieces,
+    /// Nodes marked in the round that bears the stamp.
+    seen: Vec<u32>,
+    stamp: u32,
+}
+
+impl Grower<'_> {
+    /// Whether a seed's middle, corners and sides are not taken by any piece yet.
+    fn is_open(&self, seed: usize, reach: usize) -> bool {
+        let grid = &self.scene.grid;
+        let reach = reach as isize;
+        [-reach, 0, reach].into_iter().all(|c| {
+            [-reach, 0, reach].into_iter().all(|r| {
+                grid.offset(seed, c, r)
+                    .is_none_or(|n| self.pieces.labels[n] == NONE)
+            })
+        })
+    }
+
+    /// Grows a piece from a seed; whether any came of it.
+    fn grow(&mut self, seed: usize, reach: usize, roughness: f64) -> bool {
+        let Some((surface, nodes)) = self.settled(seed, reach, roughness) else {
+            return false;
+        };
+        let nodes = self.solid(&nodes);
+        if nodes.len() < LEAST_NODES {
+            return false;
+        }
+        let label = self.pieces.surfaces.len() as u32;
+        for &node in &nodes {
+            self.pieces.labels[node as usize] = label;
+        }
+        let surface = Surface::fit(self.scene, &nodes, roughness).unwrap_or(surface);
+        self.pieces.surfaces.push(Some(surface));
+        true
+    }
+
+    /// Lets the nodes of a seed's window grow along the surface that fits them, until it takes
+    /// no more.
+    fn settled(
+        &mut self,
+        seed: usize,
+        reach: usize,
+        roughness: f64,
+    ) -> Option<(Surface, Vec<u32>)> {
+        let mut nodes = self.window_nodes(seed, reach);
+        if roughness > 1.0 && !Surface::is_flat(self.scene, &nodes, FLAT) {
+            return None;
+        }
+        let mut surface = Surface::fit(self.scene, &nodes, roughness)?;
+        for _ in 0..ROUNDS {
+            // Surfaces are carried on in proportion to what they rest on.
+            let layers = if surface.is_quartic() {
+                2
+            } else {
+                2 + libm::sqrt(nodes.len() as f64) as usize / 3
+            };
+            let grown = self.flood(&nodes, &surface, layers);
+            if grown.len() < LEAST_NODES {
+                return None;
+            }
+            let settled = grown.len().abs_diff(nodes.len()) * 200 <= nodes.len();
+            nodes = grown;
+            surface = Surface::fit(self.scene, &nodes, roughness)?;
+            if settled {
+                break;
+            }
+        }
+        Some((surface, nodes))
+    }
+
+    /// Open nodes in a seed's window.
+    fn window_nodes(&self, seed: usize, reach: usize) -> Vec<u32> {
+        let grid = &self.scene.grid;
+        let (columns, rows) = grid.window(seed, reach);
+        columns
+            .flat_map(|c| rows.clone().map(move |r| c * grid.rows + r))
+            .filter(|&n| grid.is_valid(n) && self.pieces.labels[n] == NONE)
+            .map(|n| n as u32)
+            .collect()
+    }
+
+    /// Those of the nodes that lie on the surface, and those within so many links of them.
+    fn flood(&mut self, nodes: &[u32], surface: &Surface, layers: usize) -> Vec<u32> {
+        self.stamp += 1;
+        let mut found: Vec<u32> = Vec::with_capacity(2 * nodes.len());
+        for &node in nodes {
+            if self.lies_on(node as usize, surface) {
+                self.seen[node as usize] = self.stamp;
+                found.push(node);
+            }
+        }
+        let mut from = 0;
+        for _ in 0..layers {
+            let to = found.len();
+            for k in from..to {
+                for next in self.scene.links.linked(found[k] as usize) {
+                    if self.seen[next] != self.stamp
+                        && self.pieces.labels[next] == NONE
+                        && self.lies_on(next, surface)
+                    {
+                        self.seen[next] = self.stamp;
+                        found.push(next as u32);
+                    }
+                }
+            }
+            from = to;
+        }
+        found
+    }
+
+    /// Whether a node's z and direction are the surface's but for noise.
+    fn lies_on(&self, node: usize, surface: &Surface) -> bool {
+        let grid = &self.scene.grid;
+        let noise = &self.scene.noise;
+        let miss = surface.miss(self.scene, node);
+        if miss.is_nan() || miss > MISS_NOISES {
+            return false;
+        }
+        let window = self.windows[node] as usize;
+        let plane = &self.directions[window];
+        let (c, r) = grid.column_row(window);
+        let rise_mm = surface.rise_mm(c as f64, r as f64);
+        let noise_mm = surface.roughness * noise.on_slope_mm(rise_mm, grid.pitch_mm);
+        let clear = CLEAR_NOISES * noise_mm;
+        if f64::from(plane.variance_mm2) > clear * clear {
+            return miss <= 0.5 * MISS_NOISES;
+        }
+        let turn = turn(grid, plane, rise_mm);
+        // The standard error of a full window's slope: its sum of u u is a third of
+        // n reach (reach + 1).
+        let reach = REACH as f64;
+        let side = 2.0 * reach + 1.0;
+        let error = noise_mm / grid.pitch_mm
+            * libm::sqrt(3.0 * noise.area_nodes / (side * side * reach * (reach + 1.0)));
+        turn.angle <= (TURN_SHARE * self.scene.crease_rad).max(TURN_ERRORS * error * turn.facing)
+    }
+
+    /// Nodes without what hangs on by fewer than three nodes side by side, the largest
+    /// connected part of it.
+    fn solid(&mut self, nodes: &[u32]) -> Vec<u32> {
+        let grid = &self.scene.grid;
+        self.stamp += 1;
+        let member = self.stamp;
+        for &node in nodes {
+            self.seen[node as usize] = member;
+        }
+        let around = |node: usize| {
+            let (columns, rows) = grid.window(node, 1);
+            columns.flat_map(move |c| rows.clone().map(move |r| c * grid.rows + r))
+        };
+        let cores: Vec<usize> = nodes
+            .iter()
+            .map(|&n| n as usize)
+            .filter(|&n| {
+                let foreign = around(n).filter(|&k| grid.is_valid(k) && self.seen[k] < member);
+                foreign.count() <= 2
+            })
+            .collect();
+        self.stamp += 1;
+        let kept = self.stamp;
+        for core in cores {
+            for node in around(core) {
+                if self.seen[node] == member {
+                    self.seen[node] = kept;
+                }
+            }
+        }
+        self.stamp += 1;
+        let mut largest = Vec::new();
+        for &start in nodes {
+            if self.seen[start as usize] != kept {
+                continue;
+            }
+            let mut part = vec![start];
+            self.seen[start as usize] = self.stamp;
+            let mut next = 0;
+            while let Some(&node) = part.get(next) {
+                next += 1;
+                for n in self.scene.links.linked(node as usize) {
+                    if self.seen[n] == kept {
+                        self.seen[n] = self.stamp;
+                        part.push(n as u32);
+                    }
+                }
+            }
+            if part.len() > largest.len() {
+                largest = part;
+            }
+        }
+        largest
+    }
+}
+
+/// An angle between normals, and how squarely they face the camera: slopes' errors shrink by
+/// this in angles.
+struct Turn {
+    angle: f64,
+    facing: f64,
+}
+
+fn turn(grid: &Grid<'_>, plane: &WindowPlane, rise_mm: [f64; 2]) -> Turn {
+    let [p, q] = rise_mm.map(|r| r / grid.pitch_mm);
+    let [a, b] = plane.rise_mm.map(|r| f64::from(r) / grid.pitch_mm);
+    // Cross product of (-p, -q, 1) and (-a, -b, 1), and the squares of their lengths.
+    let cross = [b - q, p - a, p * b - q * a];
+    let squares = (1.0 + p * p + q * q) * (1.0 + a * a + b * b);
+    let sine = libm::sqrt(cross.iter().map(|c| c * c).sum::<f64>() / squares);
+    let cosine = (p * a + q * b + 1.0) / libm::sqrt(squares);
+    Turn {
+        angle: libm::atan2(sine, cosine),
+        facing: 1.0 / libm::sqrt(squares),
+    }
+}
