@@ -23,12 +23,15 @@
 //! within clusters; neighbours whose common border is neither crease nor step become one.
 //!
 //! # Limits
-//! With the default settings and noise of an eighth of the pitch: creases from 10 degrees and
-//! steps from 1 mm part regions of 100 nodes, faces from three nodes wide are kept. Creases
-//! below half of that are smooth passages. A rounding of less than about ten pitches in radius
-//! counts as a crease, since regridding rounds creases as much. Where depths are coarse, faces
-//! that the camera sees squarely are rough, and small faces on them at less than some 15
-//! degrees may be lost.
+//! With the default settings, noise of an eighth of the pitch and regions of at least 100
+//! nodes: creases from 10 degrees and steps from 1 mm part planes, and faces from about four
+//! nodes wide are kept; narrower ones may come out in parts. Creases below half of that are
+//! smooth passages. Roundings of a few nodes in radius count as creases, since regridding rounds
+//! creases as much. Where curved faces meet, a border that noise leaves undecided is taken for
+//! smooth, so that one face may run into another; free forms with many folds come out in
+//! more regions than a person would draw. Where depths are coarse, faces that the camera sees
+//! squarely are rough, and a terrace of them may be left as a region of its own. Parts of a
+//! face that others cut off from each other are regions of their own.
 
 mod background;
 mod components;
