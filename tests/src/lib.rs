@@ -10,6 +10,7 @@
 
 pub mod direct;
 pub mod iges;
+pub mod outline;
 pub mod rig;
 pub mod scenes;
 pub mod score;

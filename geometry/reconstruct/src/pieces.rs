@@ -5,6 +5,8 @@
 //! together there; the tracing of borders follows the same rule, so that every piece has
 //! exactly one outer loop and no loop touches itself.
 
+use std::collections::BTreeMap;
+
 use range_image::RegionMap;
 
 /// Which two of the four nodes around a corner hold together across it.
@@ -200,7 +202,7 @@ impl PieceMap {
         }
     }
 
-    /// Fills small holes that one piece surrounds.
+    /// Fills small holes with the piece that surrounds the most of them.
     fn fill(&mut self, min_hole_nodes: usize) {
         let (columns, rows) = (self.columns as i64, self.rows as i64);
         let mut seen = vec![false; self.labels.len()];
@@ -208,7 +210,8 @@ impl PieceMap {
             if self.labels[start] != 0 || seen[start] {
                 continue;
             }
-            let (mut hole, mut around, mut open) = (vec![start], None, false);
+            let (mut hole, mut open) = (vec![start], false);
+            let mut around: BTreeMap<u32, usize> = BTreeMap::new();
             seen[start] = true;
             let mut next = 0;
             while next < hole.len() {
@@ -227,19 +230,16 @@ impl PieceMap {
                     let k = (c * rows + r) as usize;
                     let label = self.labels[k];
                     if label != 0 {
-                        let region = self.regions[label as usize - 1];
-                        match around {
-                            None => around = Some((region, label)),
-                            Some((known, _)) if known != region => open = true,
-                            Some(_) => {}
-                        }
+                        *around.entry(label).or_default() += 1;
                     } else if !seen[k] {
                         seen[k] = true;
                         hole.push(k);
                     }
                 }
             }
-            if let (Some((_, label)), false) = (around, open)
+            // Of equal ones the first.
+            let most = around.into_iter().rev().max_by_key(|a| a.1);
+            if let (Some((label, _)), false) = (most, open)
                 && hole.len() < min_hole_nodes
             {
                 self.filled_holes += 1;

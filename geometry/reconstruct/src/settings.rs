@@ -41,7 +41,7 @@ pub struct ReconstructSettings {
     pub border_bound_pitches: f64,
     /// Connected pieces of a region with fewer nodes give no face.
     pub min_piece_nodes: usize,
-    /// Holes with fewer nodes inside one region are filled.
+    /// Holes with fewer nodes are filled with the region that surrounds the most of them.
     pub min_hole_nodes: usize,
 }
 

@@ -9,7 +9,8 @@ use super::cracks::{Chain, CrackMap, Use};
 use super::crossing::{Strand, conflicts};
 use super::path;
 use super::segments::{Price, Samples, Segment, sharpest};
-use crate::polygon::{distance_to_segment, minus, norm, signed_area};
+use super::smooth::smooth;
+use crate::polygon::{distance_to_segment, dot, minus, norm, signed_area};
 
 /// How borders are drawn.
 #[derive(Debug, Clone, Copy)]
@@ -50,6 +51,13 @@ pub(crate) struct PlanarMap {
 const SMOOTH: usize = 0;
 const TRACED: usize = 3;
 
+/// The last level at which curved stretches are splines.
+const SMOOTHED: usize = 1;
+
+/// Price of a span of a spline, square pitches, and where the samples lie on the border.
+const SPAN_PRICE: f64 = 6.0;
+const PLACED_SPAN_PRICE: f64 = 0.3;
+
 /// Factor of the price of pieces at each level before [`TRACED`].
 const PRICES: [f64; TRACED] = [1.0, 0.2, 0.05];
 
@@ -73,8 +81,14 @@ const JUNCTION_REACH: f64 = 1.0;
 /// tip of a sharp corner is missed by the samples, and so by the lattice.
 const TIP_REACH: f64 = 5.0;
 
-/// Least ratio of the eigenvalues of the normal equations for that.
+/// Least ratio of the eigenvalues of the curves' normals for that.
 const WELL_CROSSED: f64 = 0.02;
+
+/// Weight of a junction's corner of the lattice.
+const HOLD: f64 = 0.5;
+
+/// Rounds in which curves are followed to a junction.
+const JUNCTION_ROUNDS: usize = 4;
 
 /// A piece at the end of a border of at most this many steps, next to one at least
 /// [`BEVEL_RATIO`] times as long, cuts off the tip that the samples have missed.
@@ -173,6 +187,16 @@ impl Border<'_> {
             cubic: factor * CUBIC_PRICE,
         };
         self.segments = self.samples.divide(price);
+        if self.chain.ends.is_some() && !settings.literal && self.level <= SMOOTHED {
+            let segments = core::mem::take(&mut self.segments);
+            let span = share
+                * if self.samples.placed {
+                    PLACED_SPAN_PRICE
+                } else {
+                    SPAN_PRICE
+                };
+            self.segments = smooth(&self.samples, segments, settings.corner_cosine, span);
+        }
         if self.chain.ends.is_some() && !settings.literal {
             drop_bevels(&mut self.segments);
         }
@@ -253,81 +277,137 @@ fn drop_bevels(segments: &mut Vec<Segment>) {
     }
 }
 
+/// Normal equations of the point nearest to lines.
+#[derive(Clone, Copy, Default)]
+struct Meeting {
+    matrix: [[f64; 2]; 2],
+    rhs: [f64; 2],
+}
+
+impl Meeting {
+    fn add(&mut self, weight: f64, normal: [f64; 2], point: [f64; 2]) {
+        let offset = dot(normal, point);
+        for i in 0..2 {
+            for j in 0..2 {
+                self.matrix[i][j] += weight * normal[i] * normal[j];
+            }
+            self.rhs[i] += weight * normal[i] * offset;
+        }
+    }
+
+    fn place(&self) -> Option<[f64; 2]> {
+        let (m, rhs, det) = (self.matrix, self.rhs, self.determinant());
+        (det > 0.0).then(|| {
+            [
+                (m[1][1] * rhs[0] - m[0][1] * rhs[1]) / det,
+                (m[0][0] * rhs[1] - m[1][0] * rhs[0]) / det,
+            ]
+        })
+    }
+
+    fn determinant(&self) -> f64 {
+        self.matrix[0][0] * self.matrix[1][1] - self.matrix[0][1] * self.matrix[1][0]
+    }
+
+    /// True when the lines cross at an angle that tells the place.
+    fn is_well_crossed(&self) -> bool {
+        let trace = self.matrix[0][0] + self.matrix[1][1];
+        // For a ratio far below 1 this is the ratio of the eigenvalues.
+        self.determinant() > WELL_CROSSED * trace * trace
+    }
+}
+
+/// An end of a border at a junction.
+struct Arrival<'a> {
+    border: &'a Border<'a>,
+    segment: &'a Segment,
+    sample: usize,
+}
+
+impl Arrival<'_> {
+    /// A longer curve is better known, and one that a shift at its end would turn off many
+    /// nodes; outlines come before creases, which lose no nodes to nothing.
+    fn weight(&self) -> f64 {
+        let chain = self.border.chain;
+        let outline = chain.left == 0 || chain.right == 0;
+        let kind = if self.border.samples.placed {
+            PLACED_WEIGHT
+        } else if outline {
+            OUTLINE_WEIGHT
+        } else {
+            1.0
+        };
+        kind * (self.segment.last - self.segment.first) as f64
+    }
+}
+
 /// Junctions at the point nearest to the curves that meet there, or on their corner of
 /// the lattice where a traced border ends.
 fn place_junctions(cracks: &CrackMap, borders: &[Border<'_>]) -> Vec<[f64; 2]> {
-    // Normal equations of squared distances from the lines, held by the corner itself. A
-    // longer line is better known, and one that a shift at its end would turn off many
-    // nodes; outlines come before creases, which lose no nodes to nothing.
-    let hold = 0.5;
-    let mut sums: Vec<_> = cracks
-        .junctions
-        .iter()
-        .map(|c| {
-            (
-                [[hold, 0.0], [0.0, hold]],
-                [hold * c[0], hold * c[1]],
-                false,
-            )
-        })
-        .collect();
+    let mut arrivals: Vec<Vec<Arrival<'_>>> = Vec::new();
+    arrivals.resize_with(cracks.junctions.len(), Vec::new);
+    let mut traced = vec![false; cracks.junctions.len()];
     for border in borders {
         let Some((start, end)) = border.chain.ends else {
             continue;
         };
         if border.level == TRACED {
-            sums[start].2 = true;
-            sums[end].2 = true;
+            (traced[start], traced[end]) = (true, true);
         }
         let (Some(first), Some(last)) = (border.segments.first(), border.segments.last()) else {
             continue;
         };
         for (junction, segment, sample) in [(start, first, first.first), (end, last, last.last)] {
-            let length = (segment.last - segment.first) as f64;
-            let outline = border.chain.left == 0 || border.chain.right == 0;
-            let weight = length
-                * if border.samples.placed {
-                    PLACED_WEIGHT
-                } else if outline {
-                    OUTLINE_WEIGHT
-                } else {
-                    1.0
-                };
-            let (point, along) = border.samples.at(segment, sample);
-            let normal = [-along[1], along[0]];
-            let offset = normal[0] * point[0] + normal[1] * point[1];
-            let (matrix, rhs, _) = &mut sums[junction];
-            for i in 0..2 {
-                for j in 0..2 {
-                    matrix[i][j] += weight * normal[i] * normal[j];
-                }
-                rhs[i] += weight * normal[i] * offset;
-            }
+            arrivals[junction].push(Arrival {
+                border,
+                segment,
+                sample,
+            });
         }
     }
-    sums.iter()
-        .zip(&cracks.junctions)
-        .map(|((m, rhs, fixed), &corner)| {
-            let det = m[0][0] * m[1][1] - m[0][1] * m[1][0];
-            if *fixed || det <= 0.0 {
-                return corner;
-            }
-            let place = [
-                (m[1][1] * rhs[0] - m[0][1] * rhs[1]) / det,
-                (m[0][0] * rhs[1] - m[1][0] * rhs[0]) / det,
-            ];
-            let (by, far) = (minus(place, corner), norm(minus(place, corner)));
-            let trace = m[0][0] + m[1][1];
-            // For a ratio far below 1 this is the ratio of the eigenvalues.
-            let reach = if det > WELL_CROSSED * trace * trace {
-                TIP_REACH
+    let placed = |(k, &corner): (usize, &[f64; 2])| {
+        if traced[k] {
+            corner
+        } else {
+            junction(corner, &arrivals[k])
+        }
+    };
+    cracks.junctions.iter().enumerate().map(placed).collect()
+}
+
+fn junction(corner: [f64; 2], arrivals: &[Arrival<'_>]) -> [f64; 2] {
+    let mut place = corner;
+    for round in 0..JUNCTION_ROUNDS {
+        // The corner itself holds the place where nothing else does.
+        let mut weighted = Meeting {
+            matrix: [[HOLD, 0.0], [0.0, HOLD]],
+            rhs: corner.map(|c| HOLD * c),
+        };
+        let mut crossing = Meeting::default();
+        for arrival in arrivals {
+            let samples = &arrival.border.samples;
+            let (point, along) = if round == 0 {
+                samples.at(arrival.segment, arrival.sample)
             } else {
-                JUNCTION_REACH
+                samples.nearest(arrival.segment, arrival.sample, place)
             };
-            let share = if far > reach { reach / far } else { 1.0 };
-            [corner[0] + share * by[0], corner[1] + share * by[1]]
-        })
-        .collect()
+            let normal = [-along[1], along[0]];
+            weighted.add(arrival.weight(), normal, point);
+            crossing.add(1.0, normal, point);
+        }
+        let Some(next) = weighted.place() else {
+            break;
+        };
+        let by = minus(next, corner);
+        let reach = if crossing.is_well_crossed() {
+            TIP_REACH
+        } else {
+            JUNCTION_REACH
+        };
+        let share = (reach / norm(by).max(1e-9)).min(1.0);
+        place = [0, 1].map(|d| corner[d] + share * by[d]);
+    }
+    place
 }
 
 /// Ends of a border's stretches, in order: one more than there are stretches.

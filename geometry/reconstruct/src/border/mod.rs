@@ -7,4 +7,5 @@ pub(crate) mod map;
 pub(crate) mod path;
 pub(crate) mod segments;
 pub(crate) mod separate;
+pub(crate) mod smooth;
 pub(crate) mod sums;

@@ -6,7 +6,7 @@ use super::segments::{Form, Samples, Segment};
 use crate::polygon::{cross, distance_to_segment, dot, minus, norm};
 
 /// How far a corner may lie from the sample at which its pieces meet, pitches.
-const CORNER_REACH: f64 = 1.5;
+const CORNER_REACH: f64 = 4.0;
 
 /// Reach of the arc that rounds a joint of two lines too blunt for a vertex, pitches.
 const BLEND_REACH: f64 = 2.0;
@@ -16,9 +16,6 @@ const ROUNDED_SHARE: f64 = 0.3;
 
 /// Shorter pieces are dropped, pitches.
 const NEGLIGIBLE: f64 = 1e-6;
-
-/// Newton steps to the point of a curve nearest to a vertex.
-const NEAREST_STEPS: usize = 3;
 
 /// A place where two pieces meet, or a border ends.
 #[derive(Debug, Clone, Copy)]
@@ -182,11 +179,7 @@ impl Pen<'_> {
         }
         // A vertex may lie beyond the last sample or before it: the curve goes on to the
         // place nearest to it.
-        for _ in 0..NEAREST_STEPS {
-            let (place, slope) = segment.on_form(at);
-            let speed2 = dot(slope, slope).max(NEGLIGIBLE);
-            at += dot(minus(joint.place, place), slope) / speed2;
-        }
+        at = segment.foot(joint.place, at);
         Some(End {
             place: joint.place,
             slope: segment.on_form(at).1,

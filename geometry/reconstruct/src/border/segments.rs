@@ -36,6 +36,9 @@ const WRONG_SHARE: usize = 40;
 /// cheaper. Costs grow with length, so the search ends there.
 const HOPELESS: f64 = 6.0;
 
+/// Newton steps to the point of a curve nearest to a place.
+const NEAREST_STEPS: usize = 3;
+
 /// The least-squares curve of a piece.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Form {
@@ -218,7 +221,8 @@ impl Samples {
         cuts.windows(2).rev().map(arc).collect()
     }
 
-    fn form(&self, first: usize, last: usize, curved: bool) -> Form {
+    /// The line or cubic of least squares along samples.
+    pub(crate) fn form(&self, first: usize, last: usize, curved: bool) -> Form {
         let mut sums = Sums::start(self, first);
         for k in first + 1..=last {
             sums.push(self, k);
@@ -297,9 +301,37 @@ impl Samples {
             }
         }
     }
+
+    /// Place and unit tangent of a piece's curve where it is nearest to a place, coming
+    /// from one of its samples; the curve goes on beyond its ends.
+    pub(crate) fn nearest(
+        &self,
+        segment: &Segment,
+        sample: usize,
+        place: [f64; 2],
+    ) -> ([f64; 2], [f64; 2]) {
+        let from = match segment.form {
+            Form::Line { point, along } => dot(minus(self.points[sample], point), along),
+            Form::Cubic { .. } => self.length[sample] - self.length[segment.origin],
+        };
+        let (found, slope) = segment.on_form(segment.foot(place, from));
+        let speed = norm(slope).max(1e-9);
+        (found, [slope[0] / speed, slope[1] / speed])
+    }
 }
 
 impl Segment {
+    /// Arc length from the origin at which the form is nearest to a place, by Newton's
+    /// method from a length nearby.
+    pub(crate) fn foot(&self, place: [f64; 2], from: f64) -> f64 {
+        let mut at = from;
+        for _ in 0..NEAREST_STEPS {
+            let (on_curve, slope) = self.on_form(at);
+            at += dot(minus(place, on_curve), slope) / dot(slope, slope).max(1e-6);
+        }
+        at
+    }
+
     /// Place and derivative of the form at an arc length from its origin.
     pub(crate) fn on_form(&self, t: f64) -> ([f64; 2], [f64; 2]) {
         match self.form {
