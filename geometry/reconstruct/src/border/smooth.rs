@@ -24,9 +24,7 @@ const CORNER_SAMPLES: usize = 1;
 /// Samples for each span of a spline, at least.
 const SPAN_SAMPLES: usize = 6;
 
-/// Price of a corner against that of a span: of one where pieces of the division happen
-/// to disagree, and of one where the samples themselves turn.
-const JOINT_PRICE: f64 = 2.0;
+/// Price of a corner against that of a span.
 const CORNER_PRICE: f64 = 1.0;
 
 /// Samples to either side over which a turn is seen, and how far beside the sharpest turn
@@ -119,6 +117,15 @@ pub(crate) fn smooth(
         }
     }
     let mut k = 0;
+    while k < stretches.len() {
+        let around = [k > 0, k + 1 < stretches.len()].map(neighbour);
+        if let Some(parts) = parted(samples, &stretches[k], around, corner_cosine, price) {
+            stretches.splice(k..=k, parts);
+        } else {
+            k += 1;
+        }
+    }
+    k = 0;
     while k + 1 < stretches.len() {
         let (a, b) = (&stretches[k], &stretches[k + 1]);
         if (a.curved || b.curved)
@@ -133,15 +140,6 @@ pub(crate) fn smooth(
             stretches[k] = merged;
             stretches.remove(k + 1);
             k = k.saturating_sub(1);
-        } else {
-            k += 1;
-        }
-    }
-    k = 0;
-    while k < stretches.len() {
-        let around = [k > 0, k + 1 < stretches.len()].map(neighbour);
-        if let Some(parts) = parted(samples, &stretches[k], around, corner_cosine, price) {
-            stretches.splice(k..=k, parts);
         } else {
             k += 1;
         }
@@ -234,7 +232,7 @@ fn merged(
     let both = Stretch {
         segments: a.segments.iter().chain(&b.segments).copied().collect(),
         curved: true,
-        cost: a.cost + b.cost + JOINT_PRICE * price,
+        cost: a.cost + b.cost + CORNER_PRICE * price,
     };
     splined(samples, &both, around, price).filter(|s| s.cost <= both.cost)
 }
