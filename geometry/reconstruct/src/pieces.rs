@@ -95,6 +95,9 @@ impl PieceMap {
         pieces.reject(limits.min_nodes);
         pieces.fill(limits.min_hole_nodes);
         pieces.number();
+        // A hole filled with one piece may cut off a corner of another.
+        pieces.reject(limits.min_nodes);
+        pieces.number();
         pieces
     }
 
