@@ -11,6 +11,9 @@ const CORNER_REACH: f64 = 4.0;
 /// Reach of the arc that rounds a joint of two lines too blunt for a vertex, pitches.
 const BLEND_REACH: f64 = 2.0;
 
+/// Length over which a curve leaves its course to reach a vertex beside it, pitches.
+const BEND_REACH: f64 = 12.0;
+
 /// Share of the shorter side of a polyline's corner that its rounding takes.
 const ROUNDED_SHARE: f64 = 0.3;
 
@@ -202,6 +205,23 @@ impl Pen<'_> {
         BLEND_REACH.min(third(before)).min(third(after))
     }
 
+    /// Draws curved segment `k`. It is bent only next to a vertex that lies beside it.
+    fn curve(&self, k: usize, from: &End, to: &End, path: &mut Builder) {
+        let mut inner = Vec::new();
+        if to.at - from.at > 2.0 * BEND_REACH {
+            let (starts, ends) = (k == self.first, k + 1 == self.last);
+            inner.extend((starts && !self.wraps).then_some(from.at + BEND_REACH));
+            inner.extend((ends && !self.wraps).then_some(to.at - BEND_REACH));
+        }
+        let (mut place, mut slope, mut at) = (from.place, from.slope, from.at);
+        for next in inner {
+            let (beyond, onward) = self.segments[k].on_form(next);
+            path.hermite(place, slope, beyond, onward, next - at);
+            (place, slope, at) = (beyond, onward, next);
+        }
+        path.hermite(place, slope, to.place, to.slope, to.at - at);
+    }
+
     fn stretch(&self) -> Option<PiecewiseCubic<2>> {
         let mut path = Builder::default();
         for k in self.first..self.last {
@@ -210,7 +230,7 @@ impl Pen<'_> {
             if self.is_line(k) {
                 path.line(from.place, to.place);
             } else if to.at - from.at > NEGLIGIBLE {
-                path.hermite(from.place, from.slope, to.place, to.slope, to.at - from.at);
+                self.curve(k, &from, &to, &mut path);
             } else {
                 // A vertex lies beyond the far end of the segment next to it.
                 return None;
