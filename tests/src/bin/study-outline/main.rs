@@ -2,7 +2,7 @@
 //! loops lie from the true ones, in pitches.
 //!
 //! ```sh
-//! cargo run --release -p relief-tests --bin outline-study -- --object cylinder --seeds 40
+//! cargo xtask study outline --object cylinder --seeds 40
 //! ```
 
 use std::process::ExitCode;
@@ -16,7 +16,7 @@ use sim_scanner::preset::Overrides;
 
 /// Measure the outlines of simulated scans over many seeds
 #[derive(Debug, Parser)]
-#[command(name = "outline-study", version)]
+#[command(name = "study-outline", version)]
 struct Options {
     /// What stands on the table: house or cylinder
     #[arg(long, default_value = "cylinder")]
@@ -39,7 +39,7 @@ fn main() -> ExitCode {
     match run(&Options::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("outline-study: {error:#}");
+            eprintln!("study-outline: {error:#}");
             ExitCode::FAILURE
         }
     }
