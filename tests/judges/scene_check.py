@@ -58,9 +58,6 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("file")
     parser.add_argument("truth")
-    parser.add_argument(
-        "--outline-pitches", type=float, default=OUTLINE_PITCHES, help="greatest error of outlines"
-    )
     arguments = parser.parse_args()
     with open(arguments.truth, encoding="utf-8") as file:
         truth = json.load(file)
@@ -87,8 +84,6 @@ def main():
         if abs(share - 1) > AREA_TOLERANCE:
             problems.append(f"{name}: area is {share:.4f} of the truth")
         if max(outward, inward) > OUTLINE_PITCHES:
-            print(f"  {name}: misses the target of {OUTLINE_PITCHES} pitch for outlines")
-        if max(outward, inward) > arguments.outline_pitches:
             problems.append(f"{name}: outline off by {max(outward, inward):.2f} pitches")
         if len(face["loops"]) != 1:
             problems.append(f"{name}: {len(face['loops']) - 1} holes in a face without any")

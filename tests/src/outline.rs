@@ -81,7 +81,7 @@ pub fn measure(config: &SimConfig) -> Result<Outlines> {
 }
 
 /// The columns of the scan that the scanner proposes, and the pitch of their grid.
-pub fn scan(source: &Source, scanner: &Scanner) -> Result<(Vec<Column>, f64)> {
+fn scan(source: &Source, scanner: &Scanner) -> Result<(Vec<Column>, f64)> {
     let plan = source.proposed();
     let accepted = source
         .accept(&plan)
@@ -107,7 +107,7 @@ pub fn scan(source: &Source, scanner: &Scanner) -> Result<(Vec<Column>, f64)> {
     Ok((columns.collect(), pitch_mm))
 }
 
-pub fn compare(
+fn compare(
     model: &Model,
     truths: &[truth::VisibleFace],
     pitch_mm: f64,
@@ -141,7 +141,7 @@ pub fn compare(
 }
 
 /// The outer loop of a face as a closed polygon.
-pub fn outer(model: &Model, face: &Face) -> Vec<[f64; 2]> {
+fn outer(model: &Model, face: &Face) -> Vec<[f64; 2]> {
     let mut polygon = Vec::new();
     for coedge in &face.outer.coedges {
         let path = &model.edges[coedge.edge.0].path;

@@ -37,9 +37,6 @@ struct Case {
     name: String,
     arguments: Vec<String>,
     faces: Option<u32>,
-    /// Greatest error of outlines. The target is 1 pitch; where silhouette and disc of the
-    /// cylinder cross at a sharp angle, an error of either comes out larger.
-    outline_pitches: &'static str,
 }
 
 /// Scans every object through the pseudo-terminal and the service, and has each IGES file
@@ -94,7 +91,6 @@ fn cases(seeds: u32) -> Vec<Case> {
                         .chain([seed.to_string()])
                         .collect(),
                     faces: Some(if object == "house" { 4 } else { 2 }),
-                    outline_pitches: if object == "house" { "1.0" } else { "1.5" },
                 });
             }
         }
@@ -105,7 +101,6 @@ fn cases(seeds: u32) -> Vec<Case> {
             name: "bun000".into(),
             arguments: vec!["--replay".into(), bunny.display().to_string()],
             faces: None,
-            outline_pitches: "1.0",
         });
     } else {
         println!("skipped: no recorded scans beside the repository");
@@ -133,11 +128,7 @@ impl Judges {
         if case.faces.is_some() {
             let truth = folder.join("truth.json").display().to_string();
             let check = "tests/judges/scene_check.py";
-            let bound = case.outline_pitches;
-            shell::run(
-                &self.python,
-                &[check, &file, &truth, "--outline-pitches", bound],
-            )?;
+            shell::run(&self.python, &[check, &file, &truth])?;
         } else {
             let check = "tests/judges/occ_check.py";
             shell::quiet(&self.python, &[check, "--no-points", &file])?;

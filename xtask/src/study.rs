@@ -16,6 +16,13 @@ pub(crate) enum Study {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
+    /// Measure how far the outlines of simulated scans lie from the true ones.
+    #[command(disable_help_flag = true)]
+    Outline {
+        /// Options of the study; `--help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
     /// Score the segmentation on scenes whose true faces are known.
     #[command(disable_help_flag = true)]
     Segmentation {
@@ -27,6 +34,7 @@ pub(crate) enum Study {
 
 pub(crate) fn run(study: &Study) -> Result<()> {
     match study {
+        Study::Outline { options } => program("study-outline", options),
         Study::Regrid { options } => program("study-regrid", options),
         Study::Segmentation { options } => program("study-segmentation", options),
     }

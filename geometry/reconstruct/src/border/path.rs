@@ -519,6 +519,33 @@ mod tests {
     }
 
     #[test]
+    fn a_curve_bends_to_a_vertex_beside_it_only_near_it() {
+        let points: Vec<[f64; 2]> = (0..=100)
+            .map(|k| {
+                let x = f64::from(k);
+                [x, 0.004 * x * x]
+            })
+            .collect();
+        let samples = Samples::new(points.clone());
+        let whole = Segment {
+            first: 0,
+            last: 100,
+            origin: 0,
+            form: samples.form(0, 100, true),
+        };
+        let ends = ([-0.2, 1.0], points[100]);
+        let paths = draw(&samples, &[whole], Some(ends), 0.94).unwrap();
+        assert_eq!(paths.len(), 1);
+        let drawn = paths[0].sampled(600);
+        assert!(norm(minus(drawn[0], ends.0)) < 1e-9);
+        assert!(norm(minus(drawn[drawn.len() - 1], ends.1)) < 1e-9);
+        for p in drawn.iter().filter(|p| p[0] > BEND_REACH + 1.0) {
+            let off = p[1] - 0.004 * p[0] * p[0];
+            assert!(off.abs() < 0.3, "{p:?}: {off}");
+        }
+    }
+
+    #[test]
     fn thirds_follow_a_staircase_within_the_bound() {
         let points: Vec<[f64; 2]> = (0..200)
             .map(|k| [f64::from(k), (0.3 * f64::from(k)).floor()])

@@ -27,6 +27,9 @@ const SPAN_SAMPLES: usize = 6;
 /// Price of a corner against that of a span.
 const CORNER_PRICE: f64 = 1.0;
 
+/// Neighbouring stretches that are tried as one, at most.
+const MERGED: usize = 3;
+
 /// Samples to either side over which a turn is seen, and how far beside the sharpest turn
 /// a corner is looked for.
 const TURN_SAMPLES: usize = 12;
@@ -127,19 +130,15 @@ pub(crate) fn smooth(
     }
     k = 0;
     while k + 1 < stretches.len() {
-        let (a, b) = (&stretches[k], &stretches[k + 1]);
-        if (a.curved || b.curved)
-            && let Some(merged) = merged(
-                samples,
-                a,
-                b,
-                [k > 0, k + 2 < stretches.len()].map(neighbour),
-                price,
-            )
-        {
-            stretches[k] = merged;
-            stretches.remove(k + 1);
-            k = k.saturating_sub(1);
+        // Two false corners may each need the other.
+        let joined = (2..=MERGED).find_map(|count| {
+            let group = stretches.get(k..k + count)?;
+            let around = [k > 0, k + count < stretches.len()].map(neighbour);
+            Some((merged(samples, group, around, price)?, count))
+        });
+        if let Some((merged, count)) = joined {
+            stretches.splice(k..k + count, [merged]);
+            k = k.saturating_sub(MERGED - 1);
         } else {
             k += 1;
         }
@@ -221,20 +220,23 @@ fn turn_cosine(points: &[[f64; 2]], sample: usize) -> f64 {
     )
 }
 
-/// Two stretches as one, if no corner parts them.
+/// Neighbouring stretches as one, if no corner parts them.
 fn merged(
     samples: &Samples,
-    a: &Stretch,
-    b: &Stretch,
+    group: &[Stretch],
     around: [Neighbour; 2],
     price: f64,
 ) -> Option<Stretch> {
-    let both = Stretch {
-        segments: a.segments.iter().chain(&b.segments).copied().collect(),
+    if group.iter().all(|s| !s.curved) {
+        return None;
+    }
+    let corners = CORNER_PRICE * price * (group.len() - 1) as f64;
+    let apart = Stretch {
+        segments: group.iter().flat_map(|s| &s.segments).copied().collect(),
         curved: true,
-        cost: a.cost + b.cost + CORNER_PRICE * price,
+        cost: group.iter().map(|s| s.cost).sum::<f64>() + corners,
     };
-    splined(samples, &both, around, price).filter(|s| s.cost <= both.cost)
+    splined(samples, &apart, around, price).filter(|s| s.cost <= apart.cost)
 }
 
 /// Squared distances of the samples from a stretch, and the price of its pieces.
@@ -451,4 +453,121 @@ struct Pull<'a> {
     /// Weight along the curve against that across.
     along: f64,
     point: [f64; 2],
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::border::segments::Price;
+
+    const PRICE: Price = Price {
+        line: 7.0,
+        cubic: 16.0,
+    };
+    const SPAN_PRICE: f64 = 6.0;
+    const CORNER_COSINE: f64 = 0.94;
+
+    /// Places along a curve, each moved to the nearest middle of a lattice's crack.
+    fn digital(curve: impl Fn(f64) -> [f64; 2], count: usize) -> Vec<[f64; 2]> {
+        let mut points: Vec<[f64; 2]> = Vec::new();
+        for k in 0..=20 * count {
+            let [x, y] = curve(k as f64 / (20 * count) as f64);
+            // Middles of cracks have one whole and one half coordinate.
+            let upright = [x.floor() + 0.5, y.round()];
+            let flat = [x.round(), y.floor() + 0.5];
+            let off = |p: [f64; 2]| norm(minus(p, [x, y]));
+            let nearest = if off(upright) < off(flat) {
+                upright
+            } else {
+                flat
+            };
+            if points.last() != Some(&nearest) {
+                points.push(nearest);
+            }
+        }
+        points
+    }
+
+    fn arc(turn: f64) -> [f64; 2] {
+        let (sin, cos) = libm::sincos(turn);
+        [0.3 + 60.0 * cos, 0.1 + 60.0 * sin]
+    }
+
+    fn corners(samples: &Samples, segments: &[Segment]) -> Vec<usize> {
+        let turns = |pair: &&[Segment]| {
+            let (a, b) = (&pair[0], &pair[1]);
+            dot(samples.at(a, a.last).1, samples.at(b, b.first).1) <= CORNER_COSINE
+        };
+        let joints = segments.windows(2).filter(turns);
+        joints.map(|pair| pair[1].first).collect()
+    }
+
+    fn assert_whole(samples: &Samples, segments: &[Segment]) {
+        assert_eq!(segments[0].first, 0);
+        assert_eq!(segments[segments.len() - 1].last, samples.points.len() - 1);
+        for pair in segments.windows(2) {
+            assert_eq!(pair[0].last, pair[1].first);
+        }
+    }
+
+    #[test]
+    fn an_arc_is_followed_well_below_a_pitch() {
+        let samples = Samples::new(digital(|t| arc(2.5 * t), 200));
+        let segments = smooth(&samples, samples.divide(PRICE), CORNER_COSINE, SPAN_PRICE);
+        assert_whole(&samples, &segments);
+        assert!(corners(&samples, &segments).is_empty());
+        for segment in &segments {
+            for k in segment.first..=segment.last {
+                let off = norm(minus(samples.at(segment, k).0, [0.3, 0.1])) - 60.0;
+                assert!(off.abs() < 0.35, "sample {k}: {off}");
+            }
+        }
+    }
+
+    #[test]
+    fn false_corners_near_both_ends_vanish_together() {
+        let samples = Samples::new(digital(|t| arc(2.5 * t), 200));
+        let last = samples.points.len() - 1;
+        let piece = |first: usize, last: usize, curved: bool| Segment {
+            first,
+            last,
+            origin: first,
+            form: samples.form(first, last, curved),
+        };
+        let cut = vec![
+            piece(0, 24, false),
+            piece(24, last - 24, true),
+            piece(last - 24, last, false),
+        ];
+        let segments = smooth(&samples, cut, CORNER_COSINE, SPAN_PRICE);
+        assert_whole(&samples, &segments);
+        assert!(corners(&samples, &segments).is_empty());
+        let curved = |s: &Segment| matches!(s.form, Form::Cubic { .. });
+        assert!(segments.iter().all(curved));
+    }
+
+    #[test]
+    fn a_corner_between_arc_and_line_stays_where_it_is() {
+        let tip = arc(1.5);
+        let curve = |t: f64| match 2.0 * t - 1.0 {
+            before if before < 0.0 => arc(1.5 * (1.0 + before)),
+            after => [tip[0] - 20.0 * after, tip[1] - 80.0 * after],
+        };
+        let samples = Samples::new(digital(curve, 200));
+        let segments = smooth(&samples, samples.divide(PRICE), CORNER_COSINE, SPAN_PRICE);
+        assert_whole(&samples, &segments);
+        let corners = corners(&samples, &segments);
+        assert_eq!(corners.len(), 1, "{corners:?}");
+        let off = norm(minus(samples.points[corners[0]], tip));
+        assert!(off < 4.0, "{off}");
+    }
+
+    #[test]
+    fn lines_stay_lines() {
+        let curve = |t: f64| [90.0 * t, 0.4 + 33.0 * t];
+        let samples = Samples::new(digital(curve, 100));
+        let before = samples.divide(PRICE);
+        let after = smooth(&samples, before.clone(), CORNER_COSINE, SPAN_PRICE);
+        assert_eq!(before, after);
+    }
 }

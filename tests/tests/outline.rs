@@ -1,0 +1,32 @@
+//! The outlines of simulated scans lie within a pitch of the true ones.
+
+use relief_tests::outline::measure;
+use sim_scanner::config::{Object, SimConfig};
+
+/// Greatest distance of an outline from the truth, either way.
+const BOUND_PITCHES: f64 = 1.0;
+
+fn assert_within_a_pitch(object: Object, seed: u64) {
+    let config = SimConfig {
+        object,
+        seed,
+        ..SimConfig::default()
+    };
+    let outlines = measure(&config).unwrap();
+    let worst = outlines.worst_pitches();
+    assert!(worst <= BOUND_PITCHES, "seed {seed}: {outlines:?}");
+}
+
+#[test]
+fn outlines_of_the_house() {
+    assert_within_a_pitch(Object::House, 1);
+}
+
+// With seed 26 samples suggest corners that are none; with seed 135 a junction lies
+// beside the curve that ends there.
+#[test]
+fn outlines_of_the_cylinder() {
+    for seed in [1, 26, 135] {
+        assert_within_a_pitch(Object::Cylinder, seed);
+    }
+}
