@@ -6,9 +6,9 @@ use range_image::Unmonitored;
 use scenes::{Pose, Scene, Spoil, Surface, convex, cylinder, house};
 use segment::{Method, SegmentSettings, segment_with_report};
 
-/// Three seeds: dropouts from none to 15 %, outlines from clean to ragged.
+/// Ten seeds: dropouts from none to 20 %, outlines from clean to ragged.
 fn check(name: &str, surface: Surface<'_>, faces: usize) {
-    for seed in [0, 3, 8] {
+    for seed in 0..10 {
         let spoil = Spoil {
             noise_mm: if seed % 2 == 0 { 0.05 } else { 0.03 },
             dropouts: 0.05 * (seed % 5) as f64,
@@ -16,7 +16,7 @@ fn check(name: &str, surface: Surface<'_>, faces: usize) {
         };
         let scene = Scene::new(surface, spoil, seed);
         judge(name, &scene, faces, seed, Method::Relief);
-        if seed == 8 {
+        if seed > 6 {
             judge(name, &scene, faces, seed, Method::ShimLee);
         }
     }
@@ -87,7 +87,7 @@ fn ridge(tilt_degrees: f64, degrees: f64) -> impl Fn(f64, f64) -> Option<(f64, u
 fn shallow_creases_stay_and_shallower_ones_are_smooth() {
     check("ridge 20", &ridge(0.0, 20.0), 2);
     check("ridge 15", &ridge(30.0, 15.0), 2);
-    for seed in 0..2 {
+    for seed in 0..5 {
         let spoil = Spoil {
             noise_mm: 0.05,
             dropouts: 0.02,
@@ -99,7 +99,7 @@ fn shallow_creases_stay_and_shallower_ones_are_smooth() {
         let verdict = scene.judge(&done.regions);
         assert!(verdict.regions == 2 && verdict.right > 0.99, "{verdict:?}");
     }
-    for seed in 0..2 {
+    for seed in 0..5 {
         let spoil = Spoil {
             noise_mm: 0.05,
             dropouts: 0.02,
