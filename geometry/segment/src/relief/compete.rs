@@ -9,8 +9,11 @@ use range_image::{Cancelled, Monitor};
 const ROUNDS: usize = 3;
 /// Sweeps over the borders in a round.
 const SWEEPS: usize = 4;
-/// A node that lies further off than this many noises is equally far off all surfaces.
+/// A node that lies further off than this many noises is no node of the surface's own, and how
+/// much further tells little,
 const CAP_NOISES: f64 = 4.0;
+/// so much for every power of e.
+const TAIL: f64 = 2.0;
 /// What a neighbour in another piece costs, in squared noises.
 const APART: f64 = 0.6;
 
@@ -30,6 +33,9 @@ pub(crate) fn settle(
         spread(scene, pieces, 1.5 * MISS_NOISES);
     }
     spread(scene, pieces, f64::INFINITY);
+    for colour in [0, 1] {
+        sweep_borders(scene, pieces, colour);
+    }
     Ok(())
 }
 
@@ -76,13 +82,6 @@ fn sweep_borders(scene: &Scene<'_>, pieces: &mut Pieces, colour: usize) {
         if own == NONE || (column + row) % 2 != colour {
             continue;
         }
-        if scene
-            .links
-            .linked(node)
-            .all(|n| pieces.labels[n] == own || pieces.labels[n] == NONE)
-        {
-            continue;
-        }
         rivals.clear();
         rivals.push(own);
         let (columns, rows) = grid.window(node, 1);
@@ -97,23 +96,34 @@ fn sweep_borders(scene: &Scene<'_>, pieces: &mut Pieces, colour: usize) {
                 }
                 beside[count] = label;
                 count += 1;
+                // Also cornerwise, since a step may leave a node no other link to its own.
+                if !rivals.contains(&label) {
+                    rivals.push(label);
+                }
             }
         }
-        for n in scene.links.linked(node) {
-            let label = pieces.labels[n];
-            if label != NONE && !rivals.contains(&label) {
-                rivals.push(label);
-            }
+        if rivals.len() == 1 {
+            continue;
         }
         let cost = |label: u32| {
-            let miss = pieces.miss(scene, label, node).min(CAP_NOISES);
             let apart = beside[..count].iter().filter(|&&l| l != label).count();
-            miss * miss + pieces.doubt(label) + APART * apart as f64
+            cost_of_miss(pieces.miss(scene, label, node))
+                + pieces.doubt(label)
+                + APART * apart as f64
         };
         let best = rivals
             .iter()
             .copied()
             .min_by(|&a, &b| cost(a).total_cmp(&cost(b)));
         pieces.labels[node] = best.unwrap_or(own);
+    }
+}
+
+/// In squared noises.
+fn cost_of_miss(miss: f64) -> f64 {
+    if miss <= CAP_NOISES {
+        miss * miss
+    } else {
+        CAP_NOISES * CAP_NOISES + TAIL * libm::log(miss / CAP_NOISES)
     }
 }
