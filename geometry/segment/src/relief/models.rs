@@ -11,6 +11,9 @@ const SAMPLE: usize = 4000;
 /// A surface that is to explain both pieces may leave more than two planes by so many squared
 /// noises for each node's worth of noise.
 const EXCESS: f64 = 100.0;
+/// Planes that turn and part by less than this share of a crease and a step are one, whatever
+/// a few nodes of another face in either say.
+const ALIKE: f64 = 0.4;
 /// Share of a border that must run between two planes that are apart.
 const LEAST_SHARE: f64 = 0.3;
 /// Share of its region that a plane must make up to be the region's surface.
@@ -204,6 +207,9 @@ fn planes(
         .collect();
     let gap_mm = meetings.iter().map(|m| m.gap_mm).sum::<f64>() / meetings.len().max(1) as f64;
     let turn_rad = meetings.first()?.turn_rad;
+    if turn_rad < ALIKE * scene.crease_rad && gap_mm < ALIKE * scene.step_mm {
+        return Some(Planes::Together);
+    }
     // One gently curved surface may have come out as two planes.
     let roughness = one.roughness.max(other.roughness);
     let (a, b) = (&samples[a as usize], &samples[b as usize]);
