@@ -8,4 +8,5 @@ pub(crate) mod path;
 pub(crate) mod segments;
 pub(crate) mod separate;
 pub(crate) mod smooth;
+pub(crate) mod spline;
 pub(crate) mod sums;

@@ -6,9 +6,8 @@
 //! them, and so lies well below a pitch from the border, and reaches farther beyond its
 //! ends, where a junction has to be found.
 
-use nurbs::{BandedMatrix, Basis, KnotVector};
-
 use super::segments::{Form, Samples, Segment};
+use super::spline::Spline;
 use crate::polygon::{dot, minus, norm};
 
 /// Fewer samples are left as they are.
@@ -27,8 +26,16 @@ const SPAN_SAMPLES: usize = 6;
 /// Price of a corner against that of a span.
 const CORNER_PRICE: f64 = 1.0;
 
-/// Neighbouring stretches that are tried as one, at most.
+/// Neighbouring stretches that are tried as one, or as two that meet elsewhere, at most.
 const MERGED: usize = 3;
+
+/// A corner passed over has to be cheaper by this share of the price of a span once found,
+/// lest rounding errors keep the search for better ones going.
+const FOUND_GAIN: f64 = 1e-3;
+
+/// The same for a corner that moves, or stands for several: the few samples at the ends that
+/// count for a line and not for a spline are no reason to.
+const MOVED_GAIN: f64 = 0.5;
 
 /// Samples to either side over which a turn is seen, and how far beside the sharpest turn
 /// a corner is looked for.
@@ -40,17 +47,6 @@ const LINE_PRICE: f64 = 0.5;
 
 /// Numbers of spans tried in vain before the search for a better one ends.
 const PATIENCE: usize = 3;
-
-/// Rounds in which distances are measured across the curve.
-const ROUNDS: usize = 3;
-
-/// Weight of distances along the curve against those across it: the arc lengths of the
-/// samples are rough.
-const ALONG: f64 = 0.02;
-
-/// Weight of the squared third derivative, which stiffens the ends; it widens a circle
-/// with a radius of five pitches by a hundredth.
-const STIFFNESS: f64 = 200.0;
 
 /// A spline may leave the samples by this root mean square, pitches: a straight or evenly
 /// curved digital border does.
@@ -113,37 +109,58 @@ pub(crate) fn smooth(
     for (k, stretch) in stretches.iter_mut().enumerate() {
         let around = [k > 0, k + 1 < count].map(neighbour);
         stretch.cost = cost_of(samples, stretch, price);
-        if stretch.curved
+        // A short arc may as well have been taken for two lines.
+        if (stretch.curved || stretch.segments.len() > 1)
             && let Some(splined) = splined(samples, stretch, around, price)
+            && (stretch.curved || splined.cost < stretch.cost)
         {
             *stretch = splined;
         }
     }
-    let mut k = 0;
-    while k < stretches.len() {
-        let around = [k > 0, k + 1 < stretches.len()].map(neighbour);
-        if let Some(parts) = parted(samples, &stretches[k], around, corner_cosine, price) {
-            stretches.splice(k..=k, parts);
-        } else {
-            k += 1;
-        }
-    }
-    k = 0;
-    while k + 1 < stretches.len() {
+    let part = |stretches: &mut Vec<Stretch>, most: usize| {
+        regroup(stretches, 1..=most, |group, around| {
+            let parts = parted(samples, group, around, corner_cosine, price)?;
+            Some(parts.into())
+        })
+    };
+    part(&mut stretches, 1);
+    loop {
         // Two false corners may each need the other.
-        let joined = (2..=MERGED).find_map(|count| {
-            let group = stretches.get(k..k + count)?;
-            let around = [k > 0, k + count < stretches.len()].map(neighbour);
-            Some((merged(samples, group, around, price)?, count))
+        regroup(&mut stretches, 2..=MERGED, |group, around| {
+            Some(vec![merged(samples, group, around, price)?])
         });
-        if let Some((merged, count)) = joined {
-            stretches.splice(k..k + count, [merged]);
-            k = k.saturating_sub(MERGED - 1);
-        } else {
-            k += 1;
+        // A spline that did away with false corners may have passed over a true one, or
+        // left it to a false one beside it.
+        if !part(&mut stretches, MERGED) {
+            break;
         }
     }
     stretches.into_iter().flat_map(|s| s.segments).collect()
+}
+
+/// Replaces groups of neighbouring stretches, as many as one of `sizes`, by what `better`
+/// makes of them, until it makes nothing of any. True when there was one.
+fn regroup(
+    stretches: &mut Vec<Stretch>,
+    sizes: core::ops::RangeInclusive<usize>,
+    better: impl Fn(&[Stretch], [Neighbour; 2]) -> Option<Vec<Stretch>>,
+) -> bool {
+    let (mut k, mut changed) = (0, false);
+    while k < stretches.len() {
+        let found = sizes.clone().find_map(|size| {
+            let group = stretches.get(k..k + size)?;
+            let around = [k > 0, k + size < stretches.len()].map(neighbour);
+            Some((better(group, around)?, size))
+        });
+        if let Some((made, size)) = found {
+            stretches.splice(k..k + size, made);
+            k = k.saturating_sub(sizes.end() - 1);
+            changed = true;
+        } else {
+            k += 1;
+        }
+    }
+    changed
 }
 
 fn neighbour(corner: bool) -> Neighbour {
@@ -154,18 +171,17 @@ fn neighbour(corner: bool) -> Neighbour {
     }
 }
 
-/// A curved stretch as two, if a corner parts it that the pieces have passed over.
+/// Neighbouring stretches as two that meet at the sharpest turn, if they follow the samples
+/// better: a corner that the pieces have passed over, or placed beside where it is.
 fn parted(
     samples: &Samples,
-    stretch: &Stretch,
+    group: &[Stretch],
     around: [Neighbour; 2],
     corner_cosine: f64,
     price: f64,
 ) -> Option<[Stretch; 2]> {
-    if !stretch.curved {
-        return None;
-    }
-    let (first, last) = stretch.range()?;
+    let apart = apart(group, price)?;
+    let (first, last) = apart.range()?;
     let sharpest = (first + LEAST_SAMPLES..=last.checked_sub(LEAST_SAMPLES)?)
         .map(|k| (turn_cosine(&samples.points, k), k))
         .min_by(|a, b| a.0.total_cmp(&b.0))
@@ -176,12 +192,17 @@ fn parted(
             segments: vec![Segment {
                 first,
                 last,
-                ..*stretch.segments.first()?
+                ..*apart.segments.first()?
             }],
             curved: true,
-            cost: 0.0,
+            cost: apart.cost,
         };
         splined(samples, &whole, around, price)
+    };
+    let gain = if group.len() == 1 {
+        FOUND_GAIN
+    } else {
+        MOVED_GAIN
     };
     let places = [sharpest - CORNER_SHIFT, sharpest, sharpest + CORNER_SHIFT];
     places
@@ -194,7 +215,7 @@ fn parted(
             let (a, b) = (parts[0].segments.last()?, parts[1].segments.first()?);
             let turns = dot(samples.at(a, a.last).1, samples.at(b, b.first).1) <= corner_cosine;
             let cost = parts[0].cost + parts[1].cost + CORNER_PRICE * price;
-            (turns && cost < stretch.cost).then_some((cost, parts))
+            (turns && cost + gain * price < apart.cost).then_some((cost, parts))
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, parts)| parts)
@@ -227,16 +248,19 @@ fn merged(
     around: [Neighbour; 2],
     price: f64,
 ) -> Option<Stretch> {
-    if group.iter().all(|s| !s.curved) {
-        return None;
-    }
-    let corners = CORNER_PRICE * price * (group.len() - 1) as f64;
-    let apart = Stretch {
+    let apart = apart(group, price)?;
+    splined(samples, &apart, around, price).filter(|s| s.cost <= apart.cost)
+}
+
+/// Neighbouring stretches taken together, at the price of the corners between them too;
+/// `None` when none is curved.
+fn apart(group: &[Stretch], price: f64) -> Option<Stretch> {
+    let corners = CORNER_PRICE * price * group.len().checked_sub(1)? as f64;
+    group.iter().any(|s| s.curved).then(|| Stretch {
         segments: group.iter().flat_map(|s| &s.segments).copied().collect(),
         curved: true,
         cost: group.iter().map(|s| s.cost).sum::<f64>() + corners,
-    };
-    splined(samples, &apart, around, price).filter(|s| s.cost <= apart.cost)
+    })
 }
 
 /// Squared distances of the samples from a stretch, and the price of its pieces.
@@ -315,150 +339,12 @@ fn splined(
     })
 }
 
-/// A cubic spline over the arc length of samples.
-struct Spline {
-    knots: KnotVector,
-    control: Vec<[f64; 2]>,
-    /// Samples at the breaks.
-    breaks: Vec<usize>,
-    /// Sum of squared distances across the curve.
-    error: f64,
-}
-
-impl Spline {
-    fn fit(samples: &Samples, from: usize, to: usize, spans: usize) -> Option<Self> {
-        let breaks: Vec<usize> = (0..=spans)
-            .map(|k| from + (to - from) * k / spans)
-            .collect();
-        let at = |sample: usize| samples.length[sample] - samples.length[from];
-        let mut knots = vec![0.0; 3];
-        knots.extend(breaks.iter().map(|&b| at(b)));
-        knots.extend([at(to); 3]);
-        let knots = KnotVector::new(3, knots).ok()?;
-        let bases: Vec<Basis> = (from..=to).map(|k| knots.basis(at(k))).collect();
-        let slopes: Vec<Basis> = (from..=to)
-            .map(|k| knots.basis_derivative(at(k), 1))
-            .collect();
-        let mut spline = Self {
-            control: Vec::new(),
-            breaks,
-            error: 0.0,
-            knots,
-        };
-        let points = &samples.points[from..=to];
-        spline.control = spline.solve(points.iter().zip(&bases).map(|(&p, basis)| Pull {
-            basis,
-            normal: [0.0, 1.0],
-            along: 1.0,
-            point: p,
-        }))?;
-        for _ in 0..ROUNDS {
-            let normals: Vec<[f64; 2]> = slopes.iter().map(|s| spline.normal(s)).collect();
-            let pulls = points.iter().zip(&bases).zip(&normals);
-            spline.control = spline.solve(pulls.map(|((&point, basis), &normal)| Pull {
-                basis,
-                normal,
-                along: ALONG,
-                point,
-            }))?;
-        }
-        spline.error = points
-            .iter()
-            .zip(bases.iter().zip(&slopes))
-            .map(|(&p, (basis, slope))| {
-                let off = dot(spline.normal(slope), minus(p, spline.combine(basis)));
-                off * off
-            })
-            .sum();
-        spline.error.is_finite().then_some(spline)
-    }
-
-    fn combine(&self, basis: &Basis) -> [f64; 2] {
-        [0, 1].map(|d| {
-            let terms = basis.values.iter().zip(&self.control[basis.first..]);
-            terms.map(|(b, c)| b * c[d]).sum()
-        })
-    }
-
-    fn normal(&self, slope: &Basis) -> [f64; 2] {
-        let along = self.combine(slope);
-        let speed = norm(along).max(1e-9);
-        [-along[1] / speed, along[0] / speed]
-    }
-
-    /// Control points with the least sum of squared pulls.
-    fn solve<'a>(&self, pulls: impl Iterator<Item = Pull<'a>>) -> Option<Vec<[f64; 2]>> {
-        let count = self.knots.control_count();
-        let mut matrix = BandedMatrix::zero(2 * count, 7);
-        let mut rhs = vec![0.0; 2 * count];
-        let mut add = |basis: &Basis, direction: [f64; 2], weight: f64, target: f64| {
-            let row: [f64; 8] = core::array::from_fn(|k| direction[k % 2] * basis.values[k / 2]);
-            let first = 2 * basis.first;
-            for i in 0..8 {
-                for j in 0..=i {
-                    matrix.add(first + i, first + j, weight * row[i] * row[j]);
-                }
-                rhs[first + i] += weight * row[i] * target;
-            }
-        };
-        for pull in pulls {
-            let along = [pull.normal[1], -pull.normal[0]];
-            add(pull.basis, pull.normal, 1.0, dot(pull.normal, pull.point));
-            add(pull.basis, along, pull.along, dot(along, pull.point));
-        }
-        let breaks = self.knots.breaks();
-        for pair in breaks.windows(2) {
-            let jerk = self.knots.basis_derivative((pair[0] + pair[1]) / 2.0, 3);
-            for direction in [[1.0, 0.0], [0.0, 1.0]] {
-                add(&jerk, direction, STIFFNESS * (pair[1] - pair[0]), 0.0);
-            }
-        }
-        matrix.cholesky().ok()?.solve(&mut rhs);
-        Some(rhs.chunks_exact(2).map(|c| [c[0], c[1]]).collect())
-    }
-
-    /// A segment for each span; the outer ones reach to samples `first` and `last`.
-    fn segments(&self, samples: &Samples, first: usize, last: usize) -> Vec<Segment> {
-        let spans = self.breaks.len() - 1;
-        (0..spans)
-            .map(|k| {
-                let (begin, end) = (self.breaks[k], self.breaks[k + 1]);
-                let at = samples.length[begin] - samples.length[self.breaks[0]];
-                let terms: [[f64; 2]; 4] = core::array::from_fn(|order| {
-                    self.combine(&self.knots.basis_derivative(at, order))
-                });
-                let [x, y] = [0, 1].map(|d| {
-                    [
-                        terms[0][d],
-                        terms[1][d],
-                        terms[2][d] / 2.0,
-                        terms[3][d] / 6.0,
-                    ]
-                });
-                Segment {
-                    first: if k == 0 { first } else { begin },
-                    last: if k + 1 == spans { last } else { end },
-                    origin: begin,
-                    form: Form::Cubic { x, y },
-                }
-            })
-            .collect()
-    }
-}
-
-/// What a sample asks of a spline.
-struct Pull<'a> {
-    basis: &'a Basis,
-    normal: [f64; 2],
-    /// Weight along the curve against that across.
-    along: f64,
-    point: [f64; 2],
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::border::path::draw;
     use crate::border::segments::Price;
+    use crate::polygon::distance_to_segment;
 
     const PRICE: Price = Price {
         line: 7.0,
@@ -560,6 +446,62 @@ mod tests {
         assert_eq!(corners.len(), 1, "{corners:?}");
         let off = norm(minus(samples.points[corners[0]], tip));
         assert!(off < 4.0, "{off}");
+    }
+
+    /// Two arcs of radius 60 that meet in the middle, at `TIP`, turning by an angle; the
+    /// second is bent as the first is (1) or the other way (-1).
+    fn meeting_arcs(turn: f64, heading: f64, bent: f64) -> impl Fn(f64) -> [f64; 2] {
+        let from_tip = |heading: f64, bent: f64, length: f64| {
+            let (sin, cos) = libm::sincos(heading);
+            let (rise, run) = libm::sincos(length / 60.0);
+            let (ahead, aside) = (60.0 * rise, bent * 60.0 * (1.0 - run));
+            [
+                TIP[0] + ahead * cos - aside * sin,
+                TIP[1] + ahead * sin + aside * cos,
+            ]
+        };
+        move |t: f64| match 140.0 * (t - 0.5) {
+            before if before < 0.0 => from_tip(heading, 1.0, before),
+            after => from_tip(heading + turn, bent, after),
+        }
+    }
+
+    const TIP: [f64; 2] = [0.3, 0.1];
+
+    /// Greatest distance of one polyline from another within 20 pitches of the tip.
+    fn farthest_at_tip(these: &[[f64; 2]], those: &[[f64; 2]]) -> f64 {
+        let within = |reach: f64| move |p: &[f64; 2]| norm(minus(*p, TIP)) < reach;
+        let those: Vec<_> = those.iter().copied().filter(within(25.0)).collect();
+        let off = these.iter().copied().filter(within(20.0)).map(|p| {
+            let sides = those.windows(2);
+            let off = sides.map(|s| distance_to_segment(p, s[0], s[1]));
+            off.fold(f64::INFINITY, f64::min)
+        });
+        off.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn corners_between_two_arcs_are_drawn_within_a_pitch() {
+        let turns = [40.0_f64, 65.0, 90.0, 115.0].map(f64::to_radians);
+        let cases = turns.into_iter().flat_map(|turn| {
+            let headings = (0..16).map(|k| 0.1 + core::f64::consts::TAU * f64::from(k) / 16.0);
+            headings.flat_map(move |heading| [1.0, -1.0].map(|bent| (turn, heading, bent)))
+        });
+        for case in cases {
+            let curve = meeting_arcs(case.0, case.1, case.2);
+            let samples = Samples::new(digital(&curve, 200));
+            let segments = smooth(&samples, samples.divide(PRICE), CORNER_COSINE, SPAN_PRICE);
+            assert_whole(&samples, &segments);
+            let ends = Some((curve(0.0), curve(1.0)));
+            let drawn = draw(&samples, &segments, ends, CORNER_COSINE).unwrap();
+            let drawn: Vec<_> = drawn.iter().flat_map(|path| path.sampled(100)).collect();
+            let truth: Vec<_> = (0..=400).map(|k| curve(f64::from(k) / 400.0)).collect();
+            let (out, back) = (
+                farthest_at_tip(&drawn, &truth),
+                farthest_at_tip(&truth, &drawn),
+            );
+            assert!(out < 1.0 && back < 1.0, "{case:?}: {out}, {back}");
+        }
     }
 
     #[test]
