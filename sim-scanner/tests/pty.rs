@@ -83,8 +83,8 @@ impl Host {
             .expect("homes");
     }
 
-    /// The proposed scan to its end; gives the number of samples.
-    fn scan(&mut self) -> usize {
+    /// Asks for the proposed scan, with leave to send this many columns.
+    fn start_scan(&mut self, credits: u16) {
         self.send(&GetLimits {});
         let plan = self.until(|m| match m {
             DeviceMessage::Limits(limits) => Some(limits.proposed),
@@ -92,9 +92,14 @@ impl Host {
         });
         self.send(&Scan {
             scan_id: 1,
-            credits: 16,
+            credits,
             plan,
         });
+    }
+
+    /// The proposed scan to its end; gives the number of samples.
+    fn scan(&mut self) -> usize {
+        self.start_scan(16);
         let mut samples = 0;
         loop {
             match self.next() {
@@ -168,16 +173,7 @@ fn a_host_that_does_not_read_blocks_neither_itself_nor_the_device() {
     let mut control = server.control();
     let mut host = Host::open(server.port());
     host.get_ready(&control);
-    host.send(&GetLimits {});
-    let plan = host.until(|m| match m {
-        DeviceMessage::Limits(limits) => Some(limits.proposed),
-        _ => None,
-    });
-    host.send(&Scan {
-        scan_id: 1,
-        credits: 64,
-        plan,
-    });
+    host.start_scan(64);
     control
         .wait_for(LIMIT, |event| matches!(event, Event::ColumnSent(_)))
         .expect("columns come");
@@ -197,16 +193,7 @@ fn a_test_can_stall_step_and_wait_for_what_happens() {
     let mut host = Host::open(server.port());
     host.get_ready(&control);
     control.step_columns(Some(4));
-    host.send(&GetLimits {});
-    let plan = host.until(|m| match m {
-        DeviceMessage::Limits(limits) => Some(limits.proposed),
-        _ => None,
-    });
-    host.send(&Scan {
-        scan_id: 1,
-        credits: 64,
-        plan,
-    });
+    host.start_scan(64);
     control
         .wait_for(LIMIT, |event| *event == Event::ColumnSent(3))
         .expect("four columns");

@@ -8,6 +8,7 @@
 //! The program `study-segmentation` judges the segmentation: [`scenes`] draws objects from
 //! seeds, scans them and knows the face over each node; [`score`] compares labels with it.
 
+pub mod columns;
 pub mod direct;
 pub mod iges;
 pub mod outline;

@@ -3,13 +3,15 @@
 
 use anyhow::{Context, Result, anyhow, bail};
 use pipeline::Settings;
-use range_image::{Column, Sample, Unmonitored};
+use range_image::{Column, Unmonitored};
 use reconstruct::model::{Face, Model};
 use scan_files::recommended_pitch_mm;
 use sim_scanner::config::SimConfig;
 use sim_scanner::scanner::Scanner;
 use sim_scanner::source::Source;
 use sim_scanner::truth;
+
+use crate::columns::received;
 
 /// Points on outlines are at most this far apart, millimetres.
 const SPACING_MM: f64 = 0.05;
@@ -86,19 +88,8 @@ fn scan(source: &Source, scanner: &Scanner) -> Result<(Vec<Column>, f64)> {
     let accepted = source
         .accept(&plan)
         .map_err(|(reason, _)| anyhow!("the proposed scan is refused: {reason:?}"))?;
-    let columns = (0..accepted.columns).map(|index| {
-        let column = source.column(&plan, accepted, 0, index);
-        let samples = column.samples.iter().filter(|sample| !sample.no_return);
-        let samples = samples.map(|sample| {
-            let point = scanner.reported_point_mm(&column, sample);
-            Sample {
-                y_mm: point.y,
-                z_mm: point.z,
-                intensity: sample.intensity,
-            }
-        });
-        Column::new(scanner.x_mm(column.table_counts), samples.collect())
-    });
+    let columns = (0..accepted.columns)
+        .map(|index| received(scanner, &source.column(&plan, accepted, 0, index)));
     let counts = f64::from(plan.pitch_counts.unsigned_abs());
     let pitch_mm = recommended_pitch_mm(
         counts * scanner.mechanics.count_mm(),

@@ -4,7 +4,8 @@
 //! the part taken away. `RELIEF_SEEDS=10` takes ten seeds in place of two.
 
 use pipeline::{BackgroundKind, BackgroundPolicy, Outcome, Settings, process_columns};
-use range_image::{Column, RangeImage, Sample, Unmonitored};
+use range_image::{RangeImage, Unmonitored};
+use relief_tests::columns::received;
 use sim_scanner::preset::{self, Overrides, Preset};
 use sim_scanner::scene::Scene;
 
@@ -27,19 +28,8 @@ fn scanned(scene: Scene, seed: u64, policy: BackgroundPolicy) -> (RangeImage, Ou
     let (scanner, sweep) = Preset::Paper
         .set_up(scene, &overrides, seed)
         .expect("a built-in scene fits");
-    let columns = (0..sweep.columns).map(|index| {
-        let column = scanner.column(&sweep, 0, index);
-        let samples = column.samples.iter().filter(|sample| !sample.no_return);
-        let samples = samples.map(|sample| {
-            let point = scanner.reported_point_mm(&column, sample);
-            Sample {
-                y_mm: point.y,
-                z_mm: point.z,
-                intensity: sample.intensity,
-            }
-        });
-        Column::new(scanner.x_mm(column.table_counts), samples.collect())
-    });
+    let columns =
+        (0..sweep.columns).map(|index| received(&scanner, &scanner.column(&sweep, 0, index)));
     let mut settings = Settings::new(0.5).with_seed(seed);
     settings.background = policy;
     process_columns(columns, &settings, &Unmonitored).expect("there is a part")

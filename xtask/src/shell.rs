@@ -1,7 +1,7 @@
 //! Running other programs, loudly.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 
 use anyhow::{Context, Result, bail};
 
@@ -37,36 +37,31 @@ pub(crate) fn run_with(
 
 /// The same for a program whose output is of interest only when it fails.
 pub(crate) fn quiet(program: &str, arguments: &[&str]) -> Result<()> {
-    let output = Command::new(program)
-        .args(arguments)
-        .current_dir(root())
-        .output()
-        .with_context(|| format!("cannot start {program}"))?;
-    if !output.status.success() {
-        let said = String::from_utf8_lossy(&output.stdout);
-        bail!(
-            "{program} {} ended with {}: {said}",
-            arguments.join(" "),
-            output.status
-        );
-    }
+    captured(program, arguments, |output| &output.stdout)?;
     Ok(())
 }
 
 /// Runs a program in the workspace's root and returns what it prints.
 pub(crate) fn output(program: &str, arguments: &[&str]) -> Result<String> {
+    let output = captured(program, arguments, |output| &output.stderr)?;
+    Ok(String::from_utf8(output.stdout)?)
+}
+
+/// Runs a program in the workspace's root; `told` is the part of its output that tells why
+/// it failed.
+fn captured(program: &str, arguments: &[&str], told: fn(&Output) -> &[u8]) -> Result<Output> {
     let output = Command::new(program)
         .args(arguments)
         .current_dir(root())
         .output()
         .with_context(|| format!("cannot start {program}"))?;
     if !output.status.success() {
-        let cause = String::from_utf8_lossy(&output.stderr);
+        let cause = String::from_utf8_lossy(told(&output));
         bail!(
             "{program} {} ended with {}: {cause}",
             arguments.join(" "),
             output.status
         );
     }
-    Ok(String::from_utf8(output.stdout)?)
+    Ok(output)
 }

@@ -27,12 +27,18 @@ async fn running(rig: &Rig, events: &mut Events, scan: &str, rerun: &Rerun) -> J
     job
 }
 
+/// A scan with its result, and a job that keeps the service from any other.
+async fn busy() -> (Rig, Scan, Events, Job) {
+    let rig = Rig::new().await;
+    let (scan, _) = rig.scan_to_result("a").await;
+    let mut events = rig.client.events().await;
+    let job = running(&rig, &mut events, &scan.id, &endless()).await;
+    (rig, scan, events, job)
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_second_scan_is_taken_while_the_first_is_processed() {
-    let rig = Rig::new().await;
-    let (first, _) = rig.scan_to_result("first").await;
-    let mut events = rig.client.events().await;
-    let busy = running(&rig, &mut events, &first.id, &endless()).await;
+    let (rig, _, mut events, busy) = busy().await;
 
     let second = rig.start_scan("second").await;
     let second = ended(&mut events, &second.id).await;
@@ -50,10 +56,7 @@ async fn a_second_scan_is_taken_while_the_first_is_processed() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn jobs_are_cancelled_while_they_wait_and_while_they_run() {
-    let rig = Rig::new().await;
-    let (scan, _) = rig.scan_to_result("a").await;
-    let mut events = rig.client.events().await;
-    let busy = running(&rig, &mut events, &scan.id, &endless()).await;
+    let (rig, scan, mut events, busy) = busy().await;
     let waiting: Job = rig
         .client
         .post(&path::scan_rerun(&scan.id), &Rerun::default())
@@ -121,10 +124,7 @@ async fn a_rerun_has_other_settings_and_a_folder_of_its_own() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_job_cut_short_by_a_stop_is_finished_after_the_restart() {
-    let rig = Rig::new().await;
-    let (scan, _) = rig.scan_to_result("a").await;
-    let mut events = rig.client.events().await;
-    let busy = running(&rig, &mut events, &scan.id, &endless()).await;
+    let (rig, scan, mut events, busy) = busy().await;
     let job: Job = rig
         .client
         .post(&path::scan_rerun(&scan.id), &Rerun::default())

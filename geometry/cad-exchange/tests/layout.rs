@@ -124,6 +124,22 @@ fn parameters(lines: &[&str], first: usize, count: usize) -> Vec<String> {
         .collect()
 }
 
+/// Index of the first directory line of the entity that a pointer names.
+fn entry(pointer: &str) -> usize {
+    pointer.parse::<usize>().unwrap() - 1
+}
+
+/// The parameters of the entity that a pointer names.
+fn parameters_of(directory: &[&str], data: &[&str], pointer: &str) -> Vec<String> {
+    let field = |line: usize, k: usize| {
+        directory[entry(pointer) + line][8 * k..8 * k + 8]
+            .trim()
+            .parse::<usize>()
+            .unwrap()
+    };
+    parameters(data, field(0, 1), field(1, 3))
+}
+
 #[test]
 fn columns_counts_and_pointers() {
     for entities in [Entities::Parametric114, Entities::Rational128] {
@@ -245,16 +261,9 @@ fn parameter_and_space_curves_come_in_equal_numbers() {
     let (text, _) = written(&sample::model(), &options(Entities::Parametric114));
     let directory = section(&text, 'D');
     let data = section(&text, 'P');
-    let entity = |pointer: &str| -> (String, Vec<String>) {
-        let at = pointer.parse::<usize>().unwrap() - 1;
-        let field = |line: usize, k: usize| {
-            directory[at + line][8 * k..8 * k + 8]
-                .trim()
-                .parse::<usize>()
-                .unwrap()
-        };
-        let status = directory[at][64..72].to_owned();
-        (status, parameters(&data, field(0, 1), field(1, 3)))
+    let entity = |pointer: &str| {
+        let status = directory[entry(pointer)][64..72].to_owned();
+        (status, parameters_of(&directory, &data, pointer))
     };
     let mut borders = 0;
     for line in directory
@@ -293,16 +302,7 @@ fn curves_of_a_loop_meet_in_the_text() {
     };
     let (text, _) = written(&model, &options(Entities::Parametric114));
     let (directory, data) = (section(&text, 'D'), section(&text, 'P'));
-    let record = |pointer: &str| {
-        let at = pointer.parse::<usize>().unwrap() - 1;
-        let field = |line: usize, k: usize| {
-            directory[at + line][8 * k..8 * k + 8]
-                .trim()
-                .parse::<usize>()
-                .unwrap()
-        };
-        parameters(&data, field(0, 1), field(1, 3))
-    };
+    let record = |pointer: &str| parameters_of(&directory, &data, pointer);
     let mut checked = 0;
     for line in directory
         .iter()

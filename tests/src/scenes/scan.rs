@@ -3,13 +3,14 @@
 use anyhow::{Context, Result};
 use glam::DVec3;
 use pipeline::Settings;
-use range_image::{Column, Lattice, RangeImage, Sample, Unmonitored};
+use range_image::{Column, Lattice, RangeImage, Unmonitored};
 use scan_files::recommended_pitch_mm;
 use sim_scanner::preset::Preset;
 use sim_scanner::scanner::{HeadKind, Scanner, Sweep};
 use sim_scanner::scene::{Body, ConvexSolid, Material, Scene, Surface};
 
 use super::Drawn;
+use crate::columns::received;
 
 /// A way to scan a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -149,22 +150,9 @@ fn cluttered(mut scene: Scene) -> Scene {
     scene
 }
 
-/// Every column of a sweep as the host sees it: samples without a return are not there.
 fn columns(scanner: &Scanner, sweep: &Sweep) -> Vec<Column> {
     (0..sweep.columns)
-        .map(|index| {
-            let column = scanner.column(sweep, 0, index);
-            let samples = column.samples.iter().filter(|s| !s.no_return);
-            let samples = samples.map(|sample| {
-                let point = scanner.reported_point_mm(&column, sample);
-                Sample {
-                    y_mm: point.y,
-                    z_mm: point.z,
-                    intensity: sample.intensity,
-                }
-            });
-            Column::new(scanner.x_mm(column.table_counts), samples.collect())
-        })
+        .map(|index| received(scanner, &scanner.column(sweep, 0, index)))
         .collect()
 }
 

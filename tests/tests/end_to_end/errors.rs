@@ -17,6 +17,11 @@ async fn refused(rig: &Rig) -> Result<Problem> {
         .0)
 }
 
+fn hint_tells(problem: &Problem, words: &str) -> bool {
+    let hint = problem.hint.as_ref();
+    hint.is_some_and(|hint| hint.contains(words))
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn no_such_port() -> Result<()> {
     let port = Path::new("/dev/relief-tests-no-such-port");
@@ -31,11 +36,7 @@ async fn no_such_port() -> Result<()> {
         "there is no port /dev/relief-tests-no-such-port: is the scanner plugged in and \
          switched on? `relief doctor` lists the ports there are"
     );
-    assert!(
-        problem
-            .hint
-            .is_some_and(|hint| hint.contains("scanner.port"))
-    );
+    assert!(hint_tells(&problem, "scanner.port"));
     rig.end().await
 }
 
@@ -53,11 +54,7 @@ async fn port_busy() -> Result<()> {
         holder.is_some_and(|name| name.ends_with(&process)),
         "{problem}"
     );
-    assert!(
-        problem
-            .hint
-            .is_some_and(|hint| hint.contains("end the other program"))
-    );
+    assert!(hint_tells(&problem, "end the other program"));
     // The owner never noticed.
     owner.scan_to_result(&super::named("again")).await?;
     second.end().await?;
@@ -79,11 +76,7 @@ async fn wrong_device_on_the_port() -> Result<()> {
         receiver.port().display()
     );
     assert!(problem.detail.starts_with(&start), "{problem}");
-    assert!(
-        problem
-            .hint
-            .is_some_and(|hint| hint.contains("scanner.port"))
-    );
+    assert!(hint_tells(&problem, "scanner.port"));
     rig.end().await
 }
 

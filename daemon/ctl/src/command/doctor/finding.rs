@@ -41,12 +41,9 @@ impl Finding {
         found: impl Into<String>,
         remedy: impl Into<String>,
     ) -> Self {
-        let remedy = Some(remedy.into());
         Self {
-            check,
             grade: Grade::Doubtful,
-            found: found.into(),
-            remedy,
+            ..Self::bad(check, found, remedy)
         }
     }
 
@@ -55,12 +52,11 @@ impl Finding {
         found: impl Into<String>,
         remedy: impl Into<String>,
     ) -> Self {
-        let remedy = Some(remedy.into());
         Self {
             check,
             grade: Grade::Bad,
             found: found.into(),
-            remedy,
+            remedy: Some(remedy.into()),
         }
     }
 }
