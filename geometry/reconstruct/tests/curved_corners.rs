@@ -45,7 +45,7 @@ fn farthest(turn_at_tip: f64, heading: f64, jitter: f64) -> f64 {
 
 #[test]
 fn tips_of_a_lens_are_drawn_within_a_pitch() {
-    for turn_degrees in [40.0_f64, 65.0, 90.0, 115.0] {
+    for turn_degrees in [65.0_f64, 115.0] {
         for k in 0..8 {
             let heading = 0.05 + core::f64::consts::PI * f64::from(k) / 8.0;
             let off = farthest(turn_degrees.to_radians(), heading, 0.0);

@@ -33,8 +33,10 @@ const MERGED: usize = 3;
 /// lest rounding errors keep the search for better ones going.
 const FOUND_GAIN: f64 = 1e-3;
 
-/// The same for a corner that moves, or stands for several: the few samples at the ends that
-/// count for a line and not for a spline are no reason to.
+/// The same for a corner that moves, or stands for several. The samples at the ends that
+/// count for a line and not for a spline are no reason to: with a thousandth, 12 of 40
+/// simulated cylinders have an outline off by more than a pitch, with 0.3 to 1 none. With 1
+/// a blunt corner is rounded in one of 128 cases.
 const MOVED_GAIN: f64 = 0.5;
 
 /// Samples to either side over which a turn is seen, and how far beside the sharpest turn
