@@ -7,7 +7,7 @@
 //! ends, where a junction has to be found.
 
 use super::segments::{Form, Samples, Segment};
-use super::spline::Spline;
+use super::spline::Splines;
 use crate::polygon::{dot, minus, norm};
 
 /// Fewer samples are left as they are.
@@ -19,9 +19,6 @@ const JUNCTION_SAMPLES: usize = 3;
 
 /// The same next to a corner, which the traced border cuts off.
 const CORNER_SAMPLES: usize = 1;
-
-/// Samples for each span of a spline, at least.
-const SPAN_SAMPLES: usize = 6;
 
 /// Price of a corner against that of a span.
 const CORNER_PRICE: f64 = 1.0;
@@ -46,9 +43,6 @@ const CORNER_SHIFT: usize = 3;
 
 /// Price of a straight stretch against that of a span.
 const LINE_PRICE: f64 = 0.5;
-
-/// Numbers of spans tried in vain before the search for a better one ends.
-const PATIENCE: usize = 3;
 
 /// A spline may leave the samples by this root mean square, pitches: a straight or evenly
 /// curved digital border does.
@@ -107,33 +101,34 @@ pub(crate) fn smooth(
             }),
         }
     }
+    let mut splines = Splines::new(samples, price);
     let count = stretches.len();
     for (k, stretch) in stretches.iter_mut().enumerate() {
         let around = [k > 0, k + 1 < count].map(neighbour);
         stretch.cost = cost_of(samples, stretch, price);
         // A short arc may as well have been taken for two lines.
         if (stretch.curved || stretch.segments.len() > 1)
-            && let Some(splined) = splined(samples, stretch, around, price)
+            && let Some(splined) = splined(&mut splines, stretch, around)
             && (stretch.curved || splined.cost < stretch.cost)
         {
             *stretch = splined;
         }
     }
-    let part = |stretches: &mut Vec<Stretch>, most: usize| {
+    let part = |splines: &mut Splines, stretches: &mut Vec<Stretch>, most: usize| {
         regroup(stretches, 1..=most, |group, around| {
-            let parts = parted(samples, group, around, corner_cosine, price)?;
+            let parts = parted(splines, group, around, corner_cosine)?;
             Some(parts.into())
         })
     };
-    part(&mut stretches, 1);
+    part(&mut splines, &mut stretches, 1);
     loop {
         // Two false corners may each need the other.
         regroup(&mut stretches, 2..=MERGED, |group, around| {
-            Some(vec![merged(samples, group, around, price)?])
+            Some(vec![merged(&mut splines, group, around)?])
         });
         // A spline that did away with false corners may have passed over a true one, or
         // left it to a false one beside it.
-        if !part(&mut stretches, MERGED) {
+        if !part(&mut splines, &mut stretches, MERGED) {
             break;
         }
     }
@@ -145,7 +140,7 @@ pub(crate) fn smooth(
 fn regroup(
     stretches: &mut Vec<Stretch>,
     sizes: core::ops::RangeInclusive<usize>,
-    better: impl Fn(&[Stretch], [Neighbour; 2]) -> Option<Vec<Stretch>>,
+    mut better: impl FnMut(&[Stretch], [Neighbour; 2]) -> Option<Vec<Stretch>>,
 ) -> bool {
     let (mut k, mut changed) = (0, false);
     while k < stretches.len() {
@@ -176,12 +171,12 @@ fn neighbour(corner: bool) -> Neighbour {
 /// Neighbouring stretches as two that meet at the sharpest turn, if they follow the samples
 /// better: a corner that the pieces have passed over, or placed beside where it is.
 fn parted(
-    samples: &Samples,
+    splines: &mut Splines,
     group: &[Stretch],
     around: [Neighbour; 2],
     corner_cosine: f64,
-    price: f64,
 ) -> Option<[Stretch; 2]> {
+    let (samples, price) = (splines.samples, splines.price);
     let apart = apart(group, price)?;
     let (first, last) = apart.range()?;
     let sharpest = (first + LEAST_SAMPLES..=last.checked_sub(LEAST_SAMPLES)?)
@@ -189,7 +184,7 @@ fn parted(
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .filter(|(cosine, _)| *cosine < corner_cosine.sqrt())?
         .1;
-    let part = |first: usize, last: usize, around: [Neighbour; 2]| {
+    let mut part = |first: usize, last: usize, around: [Neighbour; 2]| {
         let whole = Stretch {
             segments: vec![Segment {
                 first,
@@ -199,7 +194,7 @@ fn parted(
             curved: true,
             cost: apart.cost,
         };
-        splined(samples, &whole, around, price)
+        splined(splines, &whole, around)
     };
     let gain = if group.len() == 1 {
         FOUND_GAIN
@@ -244,14 +239,9 @@ fn turn_cosine(points: &[[f64; 2]], sample: usize) -> f64 {
 }
 
 /// Neighbouring stretches as one, if no corner parts them.
-fn merged(
-    samples: &Samples,
-    group: &[Stretch],
-    around: [Neighbour; 2],
-    price: f64,
-) -> Option<Stretch> {
-    let apart = apart(group, price)?;
-    splined(samples, &apart, around, price).filter(|s| s.cost <= apart.cost)
+fn merged(splines: &mut Splines, group: &[Stretch], around: [Neighbour; 2]) -> Option<Stretch> {
+    let apart = apart(group, splines.price)?;
+    splined(splines, &apart, around).filter(|s| s.cost <= apart.cost)
 }
 
 /// Neighbouring stretches taken together, at the price of the corners between them too;
@@ -288,12 +278,8 @@ fn squared_distances(samples: &Samples, segment: &Segment, from: usize, to: usiz
 }
 
 /// The spline of least cost along a stretch; `None` when it does not follow the samples.
-fn splined(
-    samples: &Samples,
-    stretch: &Stretch,
-    around: [Neighbour; 2],
-    price: f64,
-) -> Option<Stretch> {
+fn splined(splines: &mut Splines, stretch: &Stretch, around: [Neighbour; 2]) -> Option<Stretch> {
+    let (samples, price) = (splines.samples, splines.price);
     let (first, last) = stretch.range()?;
     if last - first < LEAST_SAMPLES {
         return None;
@@ -303,21 +289,8 @@ fn splined(
         Neighbour::Corner => CORNER_SAMPLES,
     });
     let (from, to) = (first + clear[0], last - clear[1]);
-    let mut best: Option<(f64, Spline)> = None;
-    let (mut spans, mut vain) = (1, 0);
-    while spans * SPAN_SAMPLES <= to - from && vain < PATIENCE {
-        if let Some(spline) = Spline::fit(samples, from, to, spans) {
-            let cost = spline.error + price * spans as f64;
-            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
-                best = Some((cost, spline));
-                vain = 0;
-            } else {
-                vain += 1;
-            }
-        }
-        spans += 1 + spans / 6;
-    }
-    let (cost, spline) = best?;
+    let spline = splines.cheapest(from, to)?;
+    let cost = spline.cost(price);
     let line = Segment {
         first,
         last,

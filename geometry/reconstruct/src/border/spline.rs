@@ -1,5 +1,7 @@
 //! Cubic splines along the samples of a border.
 
+use std::collections::BTreeMap;
+
 use nurbs::{BandedMatrix, Basis, KnotVector};
 
 use super::segments::{Form, Samples, Segment};
@@ -20,6 +22,61 @@ const STIFFNESS: f64 = 200.0;
 /// comes near a stop bends as sharply as a corner there, or folds back.
 const LEAST_SPEED: f64 = 0.5;
 
+/// Samples for each span of a spline, at least.
+const SPAN_SAMPLES: usize = 6;
+
+/// Numbers of spans tried in vain before the search for a better one ends.
+const PATIENCE: usize = 3;
+
+/// The splines of least cost along the samples of a border. Each is looked for once: the
+/// search for corners comes back to the same samples many times.
+pub(crate) struct Splines<'a> {
+    pub(crate) samples: &'a Samples,
+    /// Price of a span, square pitches.
+    pub(crate) price: f64,
+    known: BTreeMap<(usize, usize), Option<Spline>>,
+}
+
+impl<'a> Splines<'a> {
+    pub(crate) fn new(samples: &'a Samples, price: f64) -> Self {
+        Self {
+            samples,
+            price,
+            known: BTreeMap::new(),
+        }
+    }
+
+    /// The spline along samples `from..=to` whose error and spans cost the least.
+    pub(crate) fn cheapest(&mut self, from: usize, to: usize) -> Option<&Spline> {
+        let known = self.known.entry((from, to));
+        known
+            .or_insert_with(|| cheapest(self.samples, from, to, self.price))
+            .as_ref()
+    }
+}
+
+fn cheapest(samples: &Samples, from: usize, to: usize, price: f64) -> Option<Spline> {
+    let mut best: Option<(f64, Spline)> = None;
+    let (mut spans, mut vain) = (1, 0);
+    while spans * SPAN_SAMPLES <= to - from && vain < PATIENCE {
+        let spent = price * spans as f64;
+        if best.as_ref().is_some_and(|(least, _)| spent >= *least) {
+            break;
+        }
+        if let Some(spline) = Spline::fit(samples, from, to, spans) {
+            let cost = spline.cost(price);
+            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, spline));
+                vain = 0;
+            } else {
+                vain += 1;
+            }
+        }
+        spans += 1 + spans / 6;
+    }
+    best.map(|(_, spline)| spline)
+}
+
 /// A cubic spline over the arc length of samples.
 pub(crate) struct Spline {
     knots: KnotVector,
@@ -33,7 +90,7 @@ pub(crate) struct Spline {
 impl Spline {
     /// The spline of least squares along samples `from..=to`; `None` when that does not
     /// run along them.
-    pub(crate) fn fit(samples: &Samples, from: usize, to: usize, spans: usize) -> Option<Self> {
+    fn fit(samples: &Samples, from: usize, to: usize, spans: usize) -> Option<Self> {
         let breaks: Vec<usize> = (0..=spans)
             .map(|k| from + (to - from) * k / spans)
             .collect();
@@ -84,6 +141,11 @@ impl Spline {
         spline.error.is_finite().then_some(spline)
     }
 
+    /// Squared distances from the samples and the price of the spans.
+    pub(crate) fn cost(&self, price: f64) -> f64 {
+        self.error + price * (self.breaks.len() - 1) as f64
+    }
+
     fn combine(&self, basis: &Basis) -> [f64; 2] {
         [0, 1].map(|d| {
             let terms = basis.values.iter().zip(&self.control[basis.first..]);
@@ -105,11 +167,10 @@ impl Spline {
         let mut add = |basis: &Basis, direction: [f64; 2], weight: f64, target: f64| {
             let row: [f64; 8] = core::array::from_fn(|k| direction[k % 2] * basis.values[k / 2]);
             let first = 2 * basis.first;
-            for i in 0..8 {
-                for j in 0..=i {
-                    matrix.add(first + i, first + j, weight * row[i] * row[j]);
-                }
-                rhs[first + i] += weight * row[i] * target;
+            let elements: [(usize, f64); 8] = core::array::from_fn(|k| (first + k, row[k]));
+            for (i, value) in row.iter().enumerate() {
+                matrix.add_to_row(first + i, weight * value, &elements[..=i]);
+                rhs[first + i] += weight * value * target;
             }
         };
         for pull in pulls {
