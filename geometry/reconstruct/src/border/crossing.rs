@@ -15,8 +15,9 @@ const CHORDS: usize = 24;
 /// Strands that share no vertex keep at least this distance.
 const CLEARANCE: f64 = 0.02;
 
-/// Cosine of the least angle between two strands that leave a vertex.
-const FOLD_COSINE: f64 = 0.999_9;
+/// Cosine of the least angle (3 degrees) between two strands that leave a vertex: closer ones
+/// cross again before they part, within less than readers can tell.
+const FOLD_COSINE: f64 = 0.998_6;
 
 /// A path as a fine polyline. Lengths are in pitches.
 #[derive(Debug, Clone)]
@@ -180,7 +181,12 @@ mod tests {
             found(strand(1, &[[4.0, 0.0], [2.5, 0.01]])),
             "folds back at a vertex"
         );
-        assert!(!found(strand(1, &[[4.0, 0.0], [2.5, 1.0]])));
+        let leaving = |degrees: f64| {
+            let (sine, cosine) = libm::sincos(degrees.to_radians());
+            strand(1, &[[4.0, 0.0], [4.0 - 1.5 * cosine, 1.5 * sine]])
+        };
+        assert!(found(leaving(2.0)), "hardly parts from it");
+        assert!(!found(leaving(4.0)));
     }
 
     #[test]
