@@ -19,6 +19,10 @@ const CLEARANCE: f64 = 0.02;
 /// cross again before they part, within less than readers can tell.
 const FOLD_COSINE: f64 = 0.998_6;
 
+/// Cosine of the angle (60 degrees) that two chords of one strand keep at least: strands are
+/// smooth, and only a piece drawn backwards turns them more.
+const BACK_COSINE: f64 = 0.5;
+
 /// A path as a fine polyline. Lengths are in pitches.
 #[derive(Debug, Clone)]
 pub(crate) struct Strand {
@@ -140,11 +144,13 @@ fn in_conflict(strands: &[Strand], a: (usize, usize), b: (usize, usize), clearan
     let (first, second) = (&strands[a.0], &strands[b.0]);
     let (p, q) = (first.points[a.1], first.points[a.1 + 1]);
     let (r, s) = (second.points[b.1], second.points[b.1 + 1]);
+    let within = a.0 == b.0 && a.1.abs_diff(b.1) == 1;
+    let least = if within { BACK_COSINE } else { FOLD_COSINE };
     for (shared, away) in [(p, q), (q, p)] {
         for (other, beyond) in [(r, s), (s, r)] {
             if shared == other {
                 let (u, v) = (minus(away, shared), minus(beyond, shared));
-                return dot(u, v) > FOLD_COSINE * norm(u) * norm(v);
+                return dot(u, v) > least * norm(u) * norm(v);
             }
         }
     }
@@ -187,6 +193,15 @@ mod tests {
         };
         assert!(found(leaving(2.0)), "hardly parts from it");
         assert!(!found(leaving(4.0)));
+    }
+
+    #[test]
+    fn a_strand_that_turns_back_is_found_and_one_that_turns_away_is_not() {
+        let turning = |to: [f64; 2]| strand(2, &[[0.0, 0.0], [1.0, 0.0], to]);
+        let found = |strand: Strand| !conflicts(&[strand]).is_empty();
+        assert!(found(turning([0.1, 0.2])));
+        assert!(!found(turning([1.0, 1.0])));
+        assert!(!found(turning([0.9, 0.5])));
     }
 
     #[test]
