@@ -226,3 +226,58 @@ fn planes(
         (turn_rad >= scene.crease_rad || gap_mm >= scene.step_mm).then_some(Planes::Apart)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::{Grid, Links};
+    use crate::noise::noise;
+    use range_image::{Lattice, RangeImage};
+
+    const SIDE: usize = 60;
+    const PITCH_MM: f64 = 0.42;
+
+    /// What is found of a plane's two halves, of which the right one turns by so many radians
+    /// and lies so much higher.
+    fn halves(turn_rad: f64, rise_mm: f64) -> Option<Planes> {
+        let mut image = RangeImage::masked(Lattice { pitch_mm: PITCH_MM }, 0, 0, SIDE, SIDE);
+        for column in 0..SIDE {
+            for row in 0..SIDE {
+                let stray = ((column * 7 + row * 13 + column * row) % 11) as f64 - 5.0;
+                let right = column.saturating_sub(SIDE / 2) as f64 * PITCH_MM;
+                let rise_mm = if column < SIDE / 2 { 0.0 } else { rise_mm };
+                let z_mm = 0.05 * row as f64 + libm::tan(turn_rad) * right + rise_mm;
+                image.set_z_mm(column, row, Some(z_mm + 0.001 * stray));
+            }
+        }
+        let grid = Grid::new(&image);
+        let scene = Scene {
+            grid,
+            links: Links::new(&grid, PITCH_MM),
+            noise: noise(&grid),
+            step_mm: PITCH_MM,
+            crease_rad: 0.1,
+        };
+        let mut pieces = Pieces {
+            labels: (0..SIDE * SIDE)
+                .map(|node| if node < SIDE * SIDE / 2 { 1 } else { 2 })
+                .collect(),
+            surfaces: vec![None, None, None],
+        };
+        let samples = pieces.members();
+        for label in [1, 2] {
+            pieces.surfaces[label] = Surface::fit(&scene, &samples[label], 1.0);
+        }
+        let border = &borders(&scene, &pieces.labels)[0];
+        planes(&scene, &pieces, &samples, border)
+    }
+
+    #[test]
+    fn planes_are_told_apart_by_creases_and_not_by_little() {
+        assert_eq!(halves(0.0, 0.0), Some(Planes::Together));
+        assert_eq!(halves(0.02, 0.05), Some(Planes::Together));
+        assert_eq!(halves(0.15, 0.0), Some(Planes::Apart));
+        assert_eq!(halves(0.08, 0.0), None, "its border has to tell");
+        assert_eq!(halves(0.0, 0.3), None, "its border has to tell");
+    }
+}
