@@ -2,11 +2,20 @@
 
 use crate::strip::Strip;
 
-/// Share of the second differences, the smallest ones, that the search for the noise begins
-/// with. At 45 % outliers a sixth of them is free of any.
-const FIRST_SHARE: f64 = 0.08;
+/// Shares of the second differences, the smallest ones, that the search for the noise begins
+/// with. At 45 % outliers a sixth of them is free of any. Of coarse depths as many may be
+/// next to nothing, though all are noise; then the search begins anew with more.
+const FIRST_SHARES: [f64; 6] = [0.08, 0.12, 0.18, 0.27, 0.4, 0.6];
 /// Standard deviations within which a difference is taken for noise.
 const WIDTH: f64 = 2.5;
+/// Share of a normal distribution within that width, and its variance in there.
+const WITHIN: f64 = 0.987_58;
+const VARIANCE_WITHIN: f64 = 0.9113;
+/// Where this share of the differences taken for noise lies close together elsewhere, they
+/// are one step of the resolution among others. Outliers scatter far more.
+const OTHER_STEP: f64 = 0.15;
+/// Fewest differences that make such a step.
+const LEAST_STEP: usize = 4;
 /// Quantile of the differences that are not zero below which lies the resolution of z.
 const RESOLUTION_QUANTILE: f64 = 0.05;
 /// Standard deviation of the rounding to a resolution of 1, of which second differences
@@ -36,7 +45,7 @@ pub(crate) struct Noise {
 /// least of these distances are noise alone, and with a normal distribution they tell the
 /// standard deviation of all that are: of the `k` smallest out of `n` distances that are
 /// noise, the greatest is the `k / n` quantile. `n` follows from the deviation, and so in
-/// turns.
+/// turns. The variance of all that are noise then gives the deviation its final value.
 pub(crate) fn noise<'a>(
     strips: impl Iterator<Item = &'a Strip>,
     scratch: &mut Vec<f64>,
@@ -61,30 +70,72 @@ pub(crate) fn noise<'a>(
         return None;
     }
     scratch.sort_unstable_by(f64::total_cmp);
-    let zeros = scratch.partition_point(|d| *d < 1e-9);
-    let step = (zeros as f64 + RESOLUTION_QUANTILE * (number - zeros) as f64) as usize;
-    let resolution = ROUNDING * scratch.get(step).copied().unwrap_or(0.0);
 
-    let first = ((FIRST_SHARE * number as f64) as usize).max(LEAST / 4);
-    let smallest = scratch[first];
-    let mut clean = number;
+    let mut zero_mm = 1e-9;
+    let mut deviation_mm = 0.0;
+    for share in FIRST_SHARES {
+        let first = ((share * number as f64) as usize).max(LEAST / 4);
+        deviation_mm = variance_within(scratch, quantile_within(scratch, first));
+        if !is_step(scratch, deviation_mm) {
+            break;
+        }
+        zero_mm = (WIDTH * deviation_mm).max(zero_mm);
+    }
+    let zeros = scratch.partition_point(|d| *d <= zero_mm);
+    let step = (zeros as f64 + RESOLUTION_QUANTILE * (number - zeros) as f64) as usize;
+    let resolution_mm = ROUNDING * scratch.get(step).copied().unwrap_or(0.0);
+    let deviation_mm = deviation_mm.max(resolution_mm);
+    let clean = scratch.partition_point(|d| *d <= WIDTH * deviation_mm) as f64 / WITHIN;
+    let clean_share = libm::cbrt(clean / number as f64).min(1.0);
+    Some(Noise {
+        deviation_mm,
+        clean_share: clean_share.max(LEAST_CLEAN),
+    })
+}
+
+/// The deviation of which the `first` smallest distances, in ascending order, tell.
+fn quantile_within(distances: &[f64], first: usize) -> f64 {
+    let smallest = distances.get(first).copied().unwrap_or(0.0);
+    let mut clean = distances.len();
     let mut deviation = 0.0;
     // Fewer are noise with every turn, and so the deviation grows, until it is consistent.
     for _ in 0..40 {
         let share = (first as f64 / clean as f64).min(0.95);
         deviation = smallest / half_normal_quantile(share);
-        let within = scratch.partition_point(|d| *d <= WIDTH * deviation);
+        let within = distances.partition_point(|d| *d <= WIDTH * deviation);
         let within = within.max(first + 1);
         if within >= clean {
             break;
         }
         clean = within;
     }
-    let clean_share = libm::cbrt(clean as f64 / number as f64);
-    Some(Noise {
-        deviation_mm: deviation.max(resolution),
-        clean_share: clean_share.max(LEAST_CLEAN),
-    })
+    deviation
+}
+
+/// The deviation whose normal distribution, cut off at [`WIDTH`], has the variance of the
+/// distances up to there; sought from the one given.
+fn variance_within(distances: &[f64], mut deviation: f64) -> f64 {
+    for _ in 0..10 {
+        let within = distances.partition_point(|d| *d <= WIDTH * deviation);
+        let squares: f64 = distances[..within].iter().map(|d| d * d).sum();
+        let next = (squares / within.max(1) as f64 / VARIANCE_WITHIN).sqrt();
+        if (next - deviation).abs() <= 1e-3 * deviation {
+            return next;
+        }
+        deviation = next;
+    }
+    deviation
+}
+
+/// Whether what seems noise is one step of the resolution: others lie as close together.
+fn is_step(distances: &[f64], deviation: f64) -> bool {
+    let (end, length) = (WIDTH * deviation, 2.0 * WIDTH * deviation);
+    let within = distances.partition_point(|d| *d <= end);
+    let beyond = distances.get(within..).unwrap_or_default();
+    let number = ((OTHER_STEP * within as f64) as usize).max(LEAST_STEP);
+    beyond
+        .windows(number)
+        .any(|some| some[number - 1] - some[0] <= length)
 }
 
 /// Quantile of the absolute value of a standard normal variable.
