@@ -13,10 +13,10 @@ pub enum Estimator {
     /// between the samples of both tells on which of them the node is. z is that of the
     /// least-squares plane of the samples that agree with its surface. Holds where most of
     /// the window is wrong, as next to a step edge.
+    #[default]
     Consensus,
     /// Least median of squared residuals (MLMS), the paper's: stands up to almost half of
     /// the window being wrong, and keeps step edges but where outliers are many.
-    #[default]
     LeastMedian,
     /// The same over all triples of the window's samples instead of some, each plane shifted
     /// to where its median is least: the objective's true minimum, to compare with. Slow:
