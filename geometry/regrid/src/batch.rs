@@ -27,6 +27,7 @@ pub fn regrid(
 ) -> Result<RangeImage, RegridError> {
     settings.validate()?;
     let strips = ascending(columns, settings)?;
+    check_extent(&strips, settings)?;
     let lattice = Lattice {
         pitch_mm: settings.pitch_mm,
     };
@@ -123,6 +124,35 @@ fn check_size(grid: &[GridColumn], settings: &RegridSettings) -> Result<(), Regr
     };
     let columns = (last.i - first.i).unsigned_abs() + 1;
     let rows = (high_j - low_j).unsigned_abs();
+    check_nodes(columns, rows, settings)
+}
+
+/// Share of the samples on each side that may be strays, which give no nodes.
+const STRAYS: f64 = 0.02;
+
+/// Refuses a grid that will be too large before any of it is computed: one that is too large
+/// even without what the outermost samples add.
+fn check_extent(strips: &[Strip], settings: &RegridSettings) -> Result<(), RegridError> {
+    let mut heights: Vec<f64> = Vec::new();
+    let mut places: Vec<f64> = Vec::new();
+    for strip in strips {
+        heights.extend(strip.samples.iter().map(|s| s.0));
+        places.resize(heights.len(), strip.x_mm);
+    }
+    let nodes = |coordinates: &mut [f64]| {
+        coordinates.sort_unstable_by(f64::total_cmp);
+        let strays = (STRAYS * coordinates.len() as f64) as usize;
+        let middle = coordinates.get(strays..coordinates.len() - strays)?;
+        let extent_mm = middle.last()? - middle.first()?;
+        Some((extent_mm / settings.pitch_mm) as u64)
+    };
+    match (nodes(&mut places), nodes(&mut heights)) {
+        (Some(columns), Some(rows)) => check_nodes(columns, rows, settings),
+        _ => Ok(()),
+    }
+}
+
+fn check_nodes(columns: u64, rows: u64, settings: &RegridSettings) -> Result<(), RegridError> {
     if columns.saturating_mul(rows) > NODE_LIMIT {
         return Err(RegridError::TooManyNodes {
             columns,

@@ -264,7 +264,7 @@ pub(crate) const LEAST_WINDOW: usize = 6;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SettingsError {
     /// A number out of range.
-    #[error("{name} = {value}: must be from {low} to {high}")]
+    #[error("{name} = {value:?}: must be from {low} to {high}")]
     Number {
         /// Name of the setting.
         name: &'static str,
@@ -288,7 +288,7 @@ pub enum SettingsError {
         high: usize,
     },
     /// Limits of the region of interest that enclose nothing.
-    #[error("{axis} = [{low}, {high}]: the first limit must be below the second")]
+    #[error("{axis} = [{low:?}, {high:?}]: the first limit must be below the second")]
     Limits {
         /// Name of the setting.
         axis: &'static str,

@@ -152,3 +152,76 @@ fn half_normal_quantile(share: f64) -> f64 {
     }
     0.5 * (low + high)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Columns of a tilted plane with normal noise, outliers, and depths in whole steps
+    /// along a beam that leans, so that no two distances are quite the same.
+    fn strips(noise_mm: f64, step_mm: f64, outliers: f64) -> Vec<Strip> {
+        let mut state = 5_u64;
+        let mut uniform = move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let column = |k: u32| {
+            let samples = (0..200).map(|row| {
+                let y_mm = 0.4 * f64::from(row) + 0.05 * uniform();
+                let normal: f64 = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+                let mut range_mm = 300.0 + 0.3 * y_mm + noise_mm * normal;
+                if uniform() < outliers {
+                    range_mm += 60.0 * (uniform() - 0.5);
+                }
+                if step_mm > 0.0 {
+                    range_mm = step_mm * (range_mm / step_mm).round();
+                }
+                (y_mm, range_mm * libm::cos(1e-3 * y_mm))
+            });
+            Strip {
+                x_mm: f64::from(k),
+                samples: samples.collect(),
+            }
+        };
+        (0..17).map(column).collect()
+    }
+
+    #[test]
+    fn the_noise_is_found_among_outliers() {
+        for outliers in [0.0, 0.1, 0.3, 0.45] {
+            let strips = strips(0.05, 0.0, outliers);
+            let found = noise(strips.iter(), &mut Vec::new()).unwrap();
+            let ratio = found.deviation_mm / 0.05;
+            assert!((0.9..1.15).contains(&ratio), "{outliers}: {found:?}");
+            let clean = found.clean_share / (1.0 - outliers);
+            assert!((0.93..1.07).contains(&clean), "{outliers}: {found:?}");
+        }
+    }
+
+    /// Of depths in steps of twice the noise a sixth of the differences is next to nothing.
+    #[test]
+    fn coarse_depths_are_not_taken_for_exact_ones() {
+        for step_mm in [0.05, 0.1, 0.15] {
+            let variance = 0.05 * 0.05 + step_mm * step_mm / 12.0;
+            for outliers in [0.0, 0.1, 0.3] {
+                let strips = strips(0.05, step_mm, outliers);
+                let found = noise(strips.iter(), &mut Vec::new()).unwrap();
+                let ratio = found.deviation_mm / variance.sqrt();
+                let case = format!("{step_mm} {outliers}: {found:?}");
+                assert!((0.8..1.3).contains(&ratio), "{case}");
+                let clean = found.clean_share / (1.0 - outliers);
+                assert!((0.85..1.15).contains(&clean), "{case}");
+            }
+        }
+    }
+
+    #[test]
+    fn few_samples_tell_nothing() {
+        let mut strips = strips(0.05, 0.0, 0.0);
+        strips.truncate(1);
+        strips[0].samples.truncate(LEAST + 1);
+        assert!(noise(strips.iter(), &mut Vec::new()).is_none());
+    }
+}

@@ -15,6 +15,8 @@ const LEAST_PLANES: usize = 6;
 const MOST_SURFACES: usize = 3;
 /// Fewest samples of a surface.
 const LEAST_INLIERS: usize = 6;
+/// Fewest samples that must agree with a plane through three of them for it to be refined.
+const LEAST_DRAWN: f64 = 5.0;
 /// Fewest pairs of neighbouring columns that both have two or more of a surface's samples.
 /// Outliers may come in runs along a column, but those of different columns hardly ever lie
 /// beside each other on one plane.
@@ -181,7 +183,7 @@ impl Surfaces {
                 continue;
             }
             let mut score = self.score(&plane, width_mm);
-            if score.0 <= best_drawn {
+            if score.0 <= best_drawn || score.1 < LEAST_DRAWN {
                 continue;
             }
             let drawn = score.0;
