@@ -284,18 +284,18 @@ fn set<T>(place: &mut T, value: Option<T>) {
 
 impl RegridConfig {
     fn apply(&self, settings: &mut regrid::RegridSettings) {
-        set(&mut settings.neighbours, self.neighbours);
-        set(&mut settings.draws, self.draws);
-        set(&mut settings.reach_columns, self.reach_columns);
-        set(
-            &mut settings.estimator,
-            self.estimator.map(|estimator| match estimator {
+        if let Some(estimator) = self.estimator {
+            settings.estimator = match estimator {
                 Estimator::Consensus => regrid::Estimator::Consensus,
                 Estimator::LeastMedian => regrid::Estimator::LeastMedian,
                 Estimator::ExhaustiveLeastMedian => regrid::Estimator::ExhaustiveLeastMedian,
                 Estimator::LeastSquares => regrid::Estimator::LeastSquares,
-            }),
-        );
+            };
+            settings.neighbours = settings.estimator.neighbours();
+        }
+        set(&mut settings.neighbours, self.neighbours);
+        set(&mut settings.draws, self.draws);
+        set(&mut settings.reach_columns, self.reach_columns);
         let roi = &mut settings.roi;
         set(&mut roi.x_mm, self.roi_x_mm.map(Into::into));
         set(&mut roi.y_mm, self.roi_y_mm.map(Into::into));

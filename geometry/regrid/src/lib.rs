@@ -1,5 +1,5 @@
-//! Irregular scanner columns to a uniform range image by moving least median of squares
-//! (MLMS), after Shim & Lee 1995, section II.1.
+//! Irregular scanner columns to a uniform range image, by local consensus or by moving least
+//! median of squares (MLMS), after Shim & Lee 1995, section II.1.
 //!
 //! At each node the M nearest samples are taken, nearest in x and y and within a hard reach
 //! in columns. The paper's estimator ([`Estimator::LeastMedian`]) draws N_s times three of
@@ -8,7 +8,7 @@
 //! may be wrong (outliers, the other side of a step edge) without harm.
 //!
 //! Where outliers and edges meet, more than half are wrong.
-//! [`Estimator::Consensus`] takes the noise from the scan itself, rates planes by the
+//! [`Estimator::Consensus`], the default, takes the noise from the scan itself, rates planes by the
 //! samples that lie within it, tells the surfaces at an edge apart and decides by the places
 //! of their samples on which of them the node is.
 //!

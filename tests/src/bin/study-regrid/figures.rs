@@ -18,9 +18,11 @@ pub(crate) struct Figures {
     squares_fine: f64,
     near: u64,
     near_gross: u64,
-    /// Nodes more than 0.5 mm from both planes, next to the step.
+    /// Nodes next to the step that are more than 0.5 mm from both planes: between them, above
+    /// or below.
     pub(crate) in_between: u64,
-    /// Nodes a pitch or more from the step that lie on the other plane.
+    /// Nodes a pitch or more from the step, however far, that are within 0.5 mm of the plane
+    /// on the other side of it.
     pub(crate) wrong_plane: u64,
     /// Nodes without a value, two pitches or more within the outermost samples.
     pub(crate) holes: u64,
@@ -54,15 +56,14 @@ impl Figures {
         let from_step_mm = truth.distance_to_step_mm(x_mm, y_mm).abs();
         let error_mm = z_mm - truth.z_mm(x_mm, y_mm);
         let gross = error_mm.abs() > GROSS_MM;
+        let above_mm = z_mm - truth.lower_mm(x_mm, y_mm);
+        let other_mm = (above_mm - STEP_MM).abs();
+        let on_neither = above_mm.abs() > GROSS_MM && other_mm > GROSS_MM;
+        self.wrong_plane += u64::from(from_step_mm >= PITCH_MM && gross && !on_neither);
         if from_step_mm < NEAR_MM {
             self.near += 1;
             self.near_gross += u64::from(gross);
-            let above_mm = z_mm - truth.lower_mm(x_mm, y_mm);
-            let other_mm = (above_mm - STEP_MM).abs();
-            self.in_between += u64::from(above_mm.abs() > GROSS_MM && other_mm > GROSS_MM);
-            self.wrong_plane += u64::from(
-                from_step_mm >= PITCH_MM && gross && above_mm.abs().min(other_mm) <= GROSS_MM,
-            );
+            self.in_between += u64::from(on_neither);
         } else {
             self.away += 1;
             self.away_gross += u64::from(gross);
