@@ -288,7 +288,7 @@ pub enum SettingsError {
         high: usize,
     },
     /// Limits of the region of interest that enclose nothing.
-    #[error("{axis} = [{low:?}, {high:?}]: the first limit must be below the second")]
+    #[error("{axis} = [{low}, {high}]: the first limit must be below the second")]
     Limits {
         /// Name of the setting.
         axis: &'static str,

@@ -30,6 +30,13 @@ fn each_setting_has_its_limits() {
         ),
         (
             RegridSettings {
+                pitch_mm: 1e300,
+                ..good
+            },
+            "pitch_mm = 1e300: must be from",
+        ),
+        (
+            RegridSettings {
                 pitch_mm: f64::INFINITY,
                 ..good
             },
