@@ -4,7 +4,7 @@ use core::f64::consts::PI;
 
 use range_image::{GridColumn, Lattice, NodeQuality};
 
-use crate::consensus::{Conditions, Consensus, Noise, Surface, WIDE, WIDTH, noise};
+use crate::consensus::{Conditions, Consensus, Effort, Noise, Surface, WIDTH, noise};
 use crate::draws::Draws;
 use crate::exhaustive;
 use crate::neighbours::{Neighbour, Search};
@@ -21,6 +21,8 @@ pub(crate) struct GridWorker {
     finder: PlaneFinder,
     surroundings: Surroundings,
     consensus: Consensus,
+    /// The last node by consensus in the column, and its plane.
+    before: Option<(i64, Plane)>,
     /// What is left of a node's window.
     samples: Vec<Neighbour>,
     lengths: Vec<f64>,
@@ -59,7 +61,7 @@ impl GridWorker {
         let near_x_mm = settings.support.radius * greatest.x_mm;
         let near_y_mm = settings.support.radius * greatest.y_mm;
         let noise = match settings.estimator {
-            Estimator::Consensus => noise(window.strips.iter().copied(), &mut self.lengths),
+            Estimator::Consensus => noise(window.near(NOISE_COLUMNS, x_mm), &mut self.lengths),
             Estimator::LeastMedian | Estimator::ExhaustiveLeastMedian | Estimator::LeastSquares => {
                 None
             }
@@ -70,6 +72,7 @@ impl GridWorker {
             z_mm: Vec::new(),
             quality: Vec::new(),
         };
+        self.before = None;
         self.search.begin(&window);
         self.search.advance(&window, f64::NEG_INFINITY);
         let first_row = |y_mm: f64| {
@@ -156,20 +159,33 @@ impl GridWorker {
                 noise_mm: noise_mm.min(allowed_mm).max(least_mm),
                 most_noise_mm: allowed_mm.max(4.0 * noise_mm),
                 spacing,
-                neighbours: settings.neighbours,
-                most_planes: PLANES_PER_DRAW * settings.draws,
+                effort: Effort {
+                    most_planes: PLANES_PER_DRAW * settings.draws,
+                    neighbours: settings.neighbours,
+                    // The plane of the node before, as seen from here.
+                    guess: self
+                        .before
+                        .filter(|b| b.0 + 1 == node.j)
+                        .map(|(_, plane)| Plane {
+                            c: plane.c + plane.b * settings.pitch_mm,
+                            ..plane
+                        }),
+                },
             };
             let surfaces =
                 self.consensus
-                    .surfaces(&self.samples, &conditions, &mut draws, |wide| {
-                        let number = WIDE * neighbours;
+                    .surfaces(&self.samples, &conditions, &mut draws, |wide, windows| {
+                        let number = windows * neighbours;
                         wide.extend_from_slice(self.search.wider(window, x_mm, y_mm, number));
                     });
             // Between strays the samples that count are thinner than samples are.
+            let thinner = thinner(&self.samples, surfaces, spacing);
             let support = SupportSettings {
-                radius: support.radius * thinner(&self.samples, surfaces, spacing),
+                radius: support.radius * thinner,
+                step_margin: SIDE_KNOWN * support.step_margin * thinner,
                 ..*support
             };
+            self.before = surfaces.first().map(|surface| (node.j, surface.plane));
             return surfaces.iter().find_map(|surface| {
                 let fit = Fit {
                     plane: surface.plane,
@@ -215,6 +231,11 @@ impl GridWorker {
     }
 }
 
+/// How many times farther from its surface's samples a node may lie where the line of the
+/// edge says on which side it is: more than half the diagonal of a square of samples.
+const SIDE_KNOWN: f64 = 4.0 / 3.0;
+/// Columns on either side that tell of the noise.
+const NOISE_COLUMNS: usize = 8;
 /// Least noise believed, in spacings: scans without any are computed ones.
 const LEAST_NOISE: f64 = 1e-3;
 /// How far strays may widen the radius in which samples support a node.

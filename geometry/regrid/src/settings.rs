@@ -123,8 +123,9 @@ pub struct SupportSettings {
     /// How far outside the hull of its inliers a node may lie. Default 0.4.
     pub margin: f64,
     /// The same where samples of another surface close the gap on the other side, as at a
-    /// step edge: a little more than half, so that one of the two gets the node.
-    /// Default 0.6.
+    /// step edge: a little more than half, so that one of the two gets the node. By consensus
+    /// a third more, since there the line of the edge tells which of the two, and farther in
+    /// proportion where outliers leave the samples thinner. Default 0.6.
     pub step_margin: f64,
     /// Least number of inliers within the radius. Default 3.
     pub least_samples: usize,
@@ -167,7 +168,8 @@ pub struct RegridSettings {
     pub draws: usize,
     /// Columns on either side of a node that its window may reach into; bounds memory and
     /// the delay until a node is finished. In y the window reaches as far as that many
-    /// columns, or that many sample spacings if they are wider. Default 8.
+    /// columns, or that many sample spacings if they are wider. [`Estimator::Consensus`] sees
+    /// the line of a step edge as far. Default 16.
     pub reach_columns: usize,
     /// The estimator.
     pub estimator: Estimator,
@@ -190,7 +192,7 @@ impl RegridSettings {
             pitch_mm,
             neighbours: Estimator::default().neighbours(),
             draws: 32,
-            reach_columns: 8,
+            reach_columns: 16,
             estimator: Estimator::default(),
             roi: Roi::default(),
             seed: 1,

@@ -67,6 +67,15 @@ impl<'a> Window<'a> {
         })
     }
 
+    /// The strips nearest to this x, up to so many on either side.
+    pub(crate) fn near(&self, number: usize, x_mm: f64) -> impl Iterator<Item = &'a Strip> {
+        let left = self.strips.partition_point(|s| s.x_mm < x_mm);
+        let right = self.strips.partition_point(|s| s.x_mm <= x_mm);
+        let first = left.saturating_sub(number);
+        let end = right.saturating_add(number);
+        self.strips.iter().take(end).skip(first).copied()
+    }
+
     /// The unit of support lengths in x and y where samples are this far apart in a column.
     pub(crate) fn spacing(&self, sample_spacing_mm: f64) -> Spacing {
         let mean_mm = (self.column_spacing_mm * sample_spacing_mm).sqrt();

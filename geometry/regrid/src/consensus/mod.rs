@@ -13,6 +13,6 @@ mod noise;
 mod side;
 mod surfaces;
 
-pub(crate) use node::{Conditions, Consensus, WIDE};
+pub(crate) use node::{Conditions, Consensus};
 pub(crate) use noise::{Noise, noise};
-pub(crate) use surfaces::{Surface, WIDTH};
+pub(crate) use surfaces::{Effort, Surface, WIDTH};

@@ -1,14 +1,18 @@
 //! Which of the surfaces near a node is its own, and z there.
 
-use super::side::{Labelled, signed_distance};
-use super::surfaces::{PlaneSums, Surface, Surfaces};
+use super::side::{Labelled, lengthen, separate};
+use super::surfaces::{Effort, PlaneSums, Surface, Surfaces};
 use crate::draws::Draws;
 use crate::neighbours::Neighbour;
 use crate::window::Spacing;
 
 /// Samples looked at where surfaces meet, in windows: the line between them is the better
 /// known the longer it is.
-pub(crate) const WIDE: usize = 8;
+const WIDE: usize = 8;
+/// The same for nodes beside that line.
+const FAR: usize = 16;
+/// Windows in which a second surface is sought where the first has few samples in one.
+const SECOND: usize = 2;
 /// Share of a window that a surface's samples must have for z to rest on them alone; with
 /// less, more are sought farther away.
 const ENOUGH: f64 = 0.75;
@@ -30,10 +34,8 @@ pub(crate) struct Conditions {
     pub(crate) most_noise_mm: f64,
     /// Local spacing of the samples.
     pub(crate) spacing: Spacing,
-    /// Samples of a window.
-    pub(crate) neighbours: usize,
-    /// Most planes tried for a surface.
-    pub(crate) most_planes: usize,
+    /// How hard surfaces are looked for in a window.
+    pub(crate) effort: Effort,
 }
 
 /// Estimates nodes; keeps its buffers from one to the next.
@@ -42,46 +44,61 @@ pub(crate) struct Consensus {
     surfaces: Surfaces,
     found: Vec<Surface>,
     wide: Vec<Neighbour>,
+    /// Samples of a still wider window, where they were needed.
+    far: Vec<Neighbour>,
     labelled: Vec<Labelled>,
     kept: Vec<Labelled>,
 }
 
 impl Consensus {
-    /// The surfaces at a node, its own first. `wider` gives the samples of a wider window,
+    /// The surfaces at a node, its own first. `wider` gives the samples of so many windows,
     /// nearest first.
     pub(crate) fn surfaces(
         &mut self,
         window: &[Neighbour],
         conditions: &Conditions,
         draws: &mut Draws,
-        wider: impl FnOnce(&mut Vec<Neighbour>),
+        mut wider: impl FnMut(&mut Vec<Neighbour>, usize),
     ) -> &[Surface] {
         let noise_mm = self.look(window, conditions, draws);
         let first = self.found.first().map_or(0, |s| s.inliers) as f64;
-        if self.found.len() == 1 && first >= ENOUGH * conditions.neighbours as f64 {
+        if self.found.len() == 1 && first >= ENOUGH * conditions.effort.neighbours as f64 {
             for surface in &mut self.found {
-                settle(surface, window, conditions.neighbours);
+                settle(surface, window, conditions.effort.neighbours);
             }
             return &self.found;
         }
+        let thorough = Effort {
+            guess: None,
+            ..conditions.effort
+        };
         self.wide.clear();
-        wider(&mut self.wide);
+        wider(&mut self.wide, WIDE);
+        self.far.clear();
         if first < POOR * window.len() as f64 {
             // Here outliers have the better of the window; farther away they do not.
+            let wide = self.surfaces.find(&self.wide, noise_mm, &thorough, draws);
+            if !wide.is_empty() {
+                self.found.clear();
+                self.found.extend_from_slice(wide);
+            }
+        } else if self.found.len() == 1 {
+            // Outliers may leave too little of a second one.
+            let number = (SECOND * window.len()).min(self.wide.len());
             let wide = self
                 .surfaces
-                .find(&self.wide, noise_mm, conditions.most_planes, draws);
-            if !wide.is_empty() {
+                .find(&self.wide[..number], noise_mm, &thorough, draws);
+            if wide.len() > 1 {
                 self.found.clear();
                 self.found.extend_from_slice(wide);
             }
         }
         for surface in &mut self.found {
-            settle(surface, &self.wide, conditions.neighbours);
+            settle(surface, &self.wide, conditions.effort.neighbours);
         }
         let mut other = 1;
         while other < self.found.len() {
-            match self.place(other, conditions.spacing) {
+            match self.place(other, conditions.spacing, &mut wider) {
                 Place::First => other += 1,
                 Place::Other => {
                     self.found.swap(0, other);
@@ -108,7 +125,7 @@ impl Consensus {
         loop {
             let found = self
                 .surfaces
-                .find(window, noise_mm, conditions.most_planes, draws);
+                .find(window, noise_mm, &conditions.effort, draws);
             self.found.clear();
             self.found.extend_from_slice(found);
             let wider_mm = 2.0 * noise_mm;
@@ -116,7 +133,7 @@ impl Consensus {
                 return noise_mm;
             }
             if let Some(first) = self.found.first() {
-                let ample = first.inliers as f64 >= ENOUGH * conditions.neighbours as f64;
+                let ample = first.inliers as f64 >= ENOUGH * conditions.effort.neighbours as f64;
                 let within_mm = 2.0 * first.width_mm;
                 let within = |n: &&Neighbour| first.plane.residual(n).abs() <= within_mm;
                 if ample
@@ -130,29 +147,56 @@ impl Consensus {
     }
 
     /// Whether the node lies on the side of the first surface or on that of another.
-    fn place(&mut self, other: usize, spacing: Spacing) -> Place {
+    fn place(
+        &mut self,
+        other: usize,
+        spacing: Spacing,
+        wider: &mut impl FnMut(&mut Vec<Neighbour>, usize),
+    ) -> Place {
         let (first, other) = (self.found[0], self.found[other]);
         if (first.plane.c - other.plane.c).abs() <= first.width_mm {
             return Place::First;
         }
-        self.labelled.clear();
-        for n in &self.wide {
-            let label = match (first.holds(n), other.holds(n)) {
-                (true, false) => 1.0,
-                (false, true) => -1.0,
-                _ => continue,
-            };
-            self.labelled.push(Labelled {
-                u: n.dx / spacing.x_mm,
-                v: n.dy / spacing.y_mm,
-                label,
-            });
+        label(&self.wide, &first, &other, spacing, &mut self.labelled);
+        let Some(mut line) = separate(&mut self.labelled) else {
+            return Place::Nowhere;
+        };
+        if line.is_near() {
+            if self.far.is_empty() {
+                wider(&mut self.far, FAR);
+            }
+            label(&self.far, &first, &other, spacing, &mut self.labelled);
+            line = lengthen(&line, &mut self.labelled, &mut self.kept).unwrap_or(line);
         }
-        match signed_distance(&self.labelled, &mut self.kept) {
-            Some(distance) if distance < 0.0 => Place::Other,
-            Some(_) => Place::First,
-            None => Place::Nowhere,
+        if line.distance() < 0.0 {
+            Place::Other
+        } else {
+            Place::First
         }
+    }
+}
+
+/// The samples that lie on one of the two surfaces alone.
+fn label(
+    samples: &[Neighbour],
+    first: &Surface,
+    other: &Surface,
+    spacing: Spacing,
+    labelled: &mut Vec<Labelled>,
+) {
+    labelled.clear();
+    for n in samples {
+        let label = match (first.holds(n), other.holds(n)) {
+            (true, false) => 1.0,
+            (false, true) => -1.0,
+            _ => continue,
+        };
+        labelled.push(Labelled {
+            u: n.dx / spacing.x_mm,
+            v: n.dy / spacing.y_mm,
+            label,
+            strip: n.strip,
+        });
     }
 }
 
@@ -166,13 +210,21 @@ enum Place {
 
 /// The least-squares plane of the nearest samples that agree, `most` at most.
 fn settle(surface: &mut Surface, samples: &[Neighbour], most: usize) {
+    let mut before = (0, 0);
     for _ in 0..FITS {
         let mut sums = PlaneSums::default();
-        let mut inliers = 0;
-        for n in samples.iter().filter(|n| surface.holds(n)).take(most) {
+        let (mut inliers, mut places) = (0, 0);
+        let agree = samples.iter().enumerate().filter(|(_, n)| surface.holds(n));
+        for (place, n) in agree.take(most) {
             sums.add(n.dx, n.dy, surface.plane.residual(n), 1.0);
             inliers += 1;
+            places += place * place;
         }
+        // Of the same samples comes the same plane.
+        if before == (inliers, places) {
+            return;
+        }
+        before = (inliers, places);
         let Some(change) = sums.plane() else {
             return;
         };

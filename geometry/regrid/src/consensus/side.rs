@@ -9,6 +9,8 @@ pub(crate) struct Labelled {
     pub(crate) v: f64,
     /// 1 for a sample of the first surface, -1 for one of the second.
     pub(crate) label: f64,
+    /// The column it comes from.
+    pub(crate) strip: usize,
 }
 
 /// How much a steeper transition costs against samples on the wrong side: so little that
@@ -28,52 +30,158 @@ const CLEAR: f64 = 1.2;
 const CLEAN: f64 = 0.1;
 /// Windows tried, each with half the samples of the one before.
 const WINDOWS: usize = 3;
+/// Turns of lengthening a line, each with the samples beside the line of the one before.
+const TURNS: usize = 2;
+/// Spacings from a line within which samples on the wrong side may be the line's fault.
+const BESIDE: f64 = 1.0;
+/// Spacings from a line within which samples have a say in where it goes.
+const LANE: f64 = 4.0;
+/// Steepness, per spacing, with which the search for a line begins at a known one.
+const STEEPNESS: f64 = 1.0;
+/// Samples left on the wrong side beside a long line beyond which the edge is bent.
+const BENT: usize = 2;
+/// Spacings from a sample to those of other columns that may contradict it, and how many
+/// times more of them must than speak for it.
+const VOTERS: f64 = 2.0;
+const OUTVOTED: usize = 3;
 
-/// Signed distance of the node from the line that separates the two sets best, in local
-/// spacings: positive on the side of the first. The line follows from logistic regression
-/// over all samples, which come nearest first; where it leaves too many of them on the
-/// wrong side, as at a bent edge or a corner, over the nearer half, and so on. `None` where
-/// the two sets do not lie apart.
-pub(crate) fn signed_distance(samples: &[Labelled], kept: &mut Vec<Labelled>) -> Option<f64> {
+/// A line between two sets of samples, with `g^2 + h^2 = 1`: a sample lies `g u + h v + o`
+/// spacings from it, on the side of the first set where that is positive.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Line([f64; 3]);
+
+impl Line {
+    fn of(raw: [f64; 3]) -> Option<Self> {
+        let length = (raw[0] * raw[0] + raw[1] * raw[1]).sqrt();
+        (length > 0.0).then(|| Self(raw.map(|value| value / length)))
+    }
+
+    /// The best line between these samples, sought from this one.
+    fn again(&self, samples: &[Labelled]) -> Option<Self> {
+        Self::of(logistic(samples, self.0.map(|value| STEEPNESS * value))?)
+    }
+
+    /// Signed distance of the node, in local spacings.
+    pub(crate) fn distance(&self) -> f64 {
+        self.0[2]
+    }
+
+    /// Whether the node is so near that a better line might put it on the other side.
+    pub(crate) fn is_near(&self) -> bool {
+        self.distance().abs() <= CLEAR
+    }
+}
+
+/// The line that separates the two sets best, as far as it matters for the node. It follows
+/// from logistic regression over all samples, which come nearest first; where it leaves too
+/// many of them on the wrong side, as at a bent edge or a corner, over the nearer half, and
+/// so on. `None` where the two sets do not lie apart. Samples that no surface can have are
+/// taken out.
+pub(crate) fn separate(samples: &mut Vec<Labelled>) -> Option<Line> {
     // Far from the edge the nearer samples tell.
     let near = samples.get(..samples.len() / NEARER)?;
-    if let Some(line) = logistic(near) {
-        let length = (line[0] * line[0] + line[1] * line[1]).sqrt();
-        let distance = line[2] / length;
-        if distance.abs() > CLEAR
-            && wrong_side(near, &line).1 <= CLEAN
-            && wrong_side(samples, &line).1 <= MIXED
-        {
-            return Some(distance);
-        }
+    if let Some(raw) = logistic(near, [0.0; 3])
+        && let Some(line) = Line::of(raw)
+        && !line.is_near()
+        && wrong_side(near, &raw).1 <= CLEAN
+        && wrong_side(samples, &raw).1 <= MIXED
+    {
+        return Some(line);
     }
-    let mut number = samples.len();
-    let mut distance = None;
+    let mut best = None;
     for window in 0..WINDOWS {
-        let near = samples.get(..number)?;
-        let line = logistic(near)?;
-        let (wrong, share) = wrong_side(near, &line);
+        let mut line = logistic(samples, [0.0; 3])?;
+        let (mut wrong, share) = wrong_side(samples, &line);
         if share > MIXED {
             break;
         }
-        distance = Some(line);
-        if wrong as f64 <= (STRAIGHT * number as f64).max(1.0) {
+        if wrong > 0 && take_out_strays(samples, &line) {
+            line = logistic(samples, [0.0; 3])?;
+            wrong = wrong_side(samples, &line).0;
+        }
+        best = Some(line);
+        if wrong as f64 <= (STRAIGHT * samples.len() as f64).max(1.0) {
             if wrong > 0 {
                 // Outliers that agree by chance; the line is better known without.
-                kept.clear();
-                kept.extend(near.iter().filter(|s| s.label * at(&line, s) > 0.0));
-                distance = logistic(kept).or(distance);
+                samples.retain(|s| s.label * at(&line, s) > 0.0);
+                best = logistic(samples, [0.0; 3]).or(best);
             }
             break;
         }
-        number /= 2;
-        if window + 1 < WINDOWS && number < 16 {
+        samples.truncate(samples.len() / 2);
+        if window + 1 < WINDOWS && samples.len() < 16 {
             break;
         }
     }
-    let line = distance?;
-    let length = (line[0] * line[0] + line[1] * line[1]).sqrt();
-    (length > 0.0).then(|| line[2] / length)
+    Line::of(best?)
+}
+
+/// Takes out the samples on the wrong side that samples of other columns, around them,
+/// contradict: outliers, of which whole runs along a column may happen to lie on the other
+/// surface. Tells whether there were any.
+fn take_out_strays(samples: &mut Vec<Labelled>, line: &[f64; 3]) -> bool {
+    let stray = |s: &Labelled| {
+        let (mut alike, mut unlike) = (0, 0);
+        for other in samples.iter().filter(|o| o.strip != s.strip) {
+            let (du, dv) = (other.u - s.u, other.v - s.v);
+            if du * du + dv * dv <= VOTERS * VOTERS {
+                if other.label == s.label {
+                    alike += 1;
+                } else {
+                    unlike += 1;
+                }
+            }
+        }
+        OUTVOTED * alike < unlike
+    };
+    let mut keep: Vec<bool> = Vec::with_capacity(samples.len());
+    keep.extend(
+        samples
+            .iter()
+            .map(|s| s.label * at(line, s) > 0.0 || !stray(s)),
+    );
+    let before = samples.len();
+    let mut keep = keep.into_iter();
+    samples.retain(|_| keep.next().unwrap_or(true));
+    samples.len() < before
+}
+
+/// The line from samples of a wider window, where the edge goes on as straight there: it is
+/// the better known the more samples lie along it. `None` where it bends.
+pub(crate) fn lengthen(
+    line: &Line,
+    samples: &mut Vec<Labelled>,
+    lane: &mut Vec<Labelled>,
+) -> Option<Line> {
+    let mut line = *line;
+    take_out_strays(samples, &line.0);
+    for _ in 0..TURNS {
+        let (mut wrong, mut beside) = (0, 0);
+        lane.clear();
+        for s in samples.iter() {
+            let distance = s.label * at(&line.0, s);
+            if distance < -BESIDE {
+                wrong += 1;
+            } else if distance < LANE {
+                beside += usize::from(distance < 0.0);
+                lane.push(*s);
+            }
+        }
+        if wrong as f64 > STRAIGHT * samples.len() as f64 {
+            return None;
+        }
+        line = line.again(lane)?;
+        if beside == 0 {
+            break;
+        }
+    }
+    let before = lane.len();
+    lane.retain(|s| s.label * at(&line.0, s) > 0.0);
+    match before - lane.len() {
+        0 => Some(line),
+        1..=BENT => line.again(lane),
+        _ => None,
+    }
 }
 
 fn at(line: &[f64; 3], s: &Labelled) -> f64 {
@@ -92,9 +200,9 @@ fn wrong_side(samples: &[Labelled], line: &[f64; 3]) -> (usize, f64) {
     (wrong[0] + wrong[1], share(0).max(share(1)))
 }
 
-/// `g, h, o` so that `g u + h v + o` is the logarithm of the odds of the first surface.
-fn logistic(samples: &[Labelled]) -> Option<[f64; 3]> {
-    let mut line = [0.0; 3];
+/// `g, h, o` so that `g u + h v + o` is the logarithm of the odds of the first surface,
+/// sought from the ones given.
+fn logistic(samples: &[Labelled], mut line: [f64; 3]) -> Option<[f64; 3]> {
     for _ in 0..STEPS {
         // The second ridge keeps the system regular where all samples have one label.
         let mut hessian = [[RIDGE, 0.0, 0.0], [0.0, RIDGE, 0.0], [0.0, 0.0, 1e-9]];

@@ -33,6 +33,26 @@ const STEEPEST_SEEN: f64 = 6.0;
 /// the first leaves over.
 const STEEPEST: f64 = 2.0;
 
+/// Most planes tried for each surface after the first: enough for two fifths of the samples
+/// which the first leaves over.
+const MOST_FURTHER: usize = 160;
+/// Share of the samples expected of a surface that must agree with a guess.
+const KNOWN: f64 = 0.9;
+
+/// How hard surfaces are looked for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Effort {
+    /// Most planes tried for a surface.
+    pub(crate) most_planes: usize,
+    /// Samples of a window that lies on one surface, outliers not counted.
+    pub(crate) neighbours: usize,
+    /// What the first surface probably is. Where nearly all samples say so, none is sought.
+    pub(crate) guess: Option<Plane>,
+}
+
+/// Sums of a score kept side by side.
+const LANES: usize = 4;
+
 /// A plane and the samples that agree with it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Surface {
@@ -65,13 +85,12 @@ pub(crate) struct Surfaces {
 }
 
 impl Surfaces {
-    /// The surfaces of a window, that with most evidence first; `most_planes` bounds the
-    /// planes tried for each.
+    /// The surfaces of a window, that with most evidence first.
     pub(crate) fn find(
         &mut self,
         window: &[Neighbour],
         noise_mm: f64,
-        most_planes: usize,
+        effort: &Effort,
         draws: &mut Draws,
     ) -> &[Surface] {
         self.found.clear();
@@ -90,7 +109,13 @@ impl Surfaces {
                 break;
             }
             self.load(radius2);
-            let Some(plane) = self.best(width_mm, most_planes, draws) else {
+            let plane = if self.found.is_empty() {
+                let known = effort.guess.and_then(|p| self.known(p, width_mm, effort));
+                known.or_else(|| self.best(width_mm, effort.most_planes, draws))
+            } else {
+                self.best(width_mm, effort.most_planes.min(MOST_FURTHER), draws)
+            };
+            let Some(plane) = plane else {
                 break;
             };
             let surface = Surface {
@@ -162,6 +187,23 @@ impl Surfaces {
         let fall = 0.8 / radius2.max(f64::MIN_POSITIVE);
         self.weight
             .extend(self.left.iter().map(|n| 1.0 - fall * n.distance2));
+        // Filled up to whole lanes with samples that agree with no plane.
+        let whole = self.left.len().next_multiple_of(LANES);
+        self.dx.resize(whole, 0.0);
+        self.dy.resize(whole, 0.0);
+        self.z.resize(whole, f64::INFINITY);
+        self.weight.resize(whole, 0.0);
+    }
+
+    /// The plane that a guess leads to, where nearly all samples expected agree with it.
+    fn known(&mut self, guess: Plane, width_mm: f64, effort: &Effort) -> Option<Plane> {
+        let enough = KNOWN * effort.neighbours as f64;
+        let mut plane = guess;
+        for _ in 0..2 {
+            plane = self.refined(&plane, width_mm)?;
+        }
+        let known = self.score(&plane, width_mm).1 >= enough;
+        (known && self.spans(&plane, width_mm)).then_some(plane)
     }
 
     /// The plane with most evidence among the samples loaded.
@@ -212,30 +254,36 @@ impl Surfaces {
         best.map(|(_, plane)| plane)
     }
 
-    /// Evidence for a plane, and the number of samples that give it.
+    /// Evidence for a plane, and the number of samples that give it. Summed up in several
+    /// lanes, always the same ones, which the compiler makes one instruction of.
     fn score(&self, plane: &Plane, width_mm: f64) -> (f64, f64) {
         let narrow = 1.0 / (width_mm * width_mm);
-        let (mut evidence, mut inliers) = (0.0, 0.0);
-        for (((dx, dy), z), weight) in self.dx.iter().zip(&self.dy).zip(&self.z).zip(&self.weight) {
-            let residual = z - (plane.a * dx + plane.b * dy + plane.c);
-            let share = (1.0 - narrow * residual * residual).max(0.0);
-            evidence += weight * share;
-            inliers += if share > 0.0 { 1.0 } else { 0.0 };
+        let (mut evidence, mut inliers) = ([0.0; LANES], [0.0; LANES]);
+        let lanes = self
+            .dx
+            .chunks_exact(LANES)
+            .zip(self.dy.chunks_exact(LANES))
+            .zip(self.z.chunks_exact(LANES))
+            .zip(self.weight.chunks_exact(LANES));
+        for (((dx, dy), z), weight) in lanes {
+            for k in 0..LANES {
+                let residual = z[k] - (plane.a * dx[k] + plane.b * dy[k] + plane.c);
+                let share = (1.0 - narrow * residual * residual).max(0.0);
+                evidence[k] += weight[k] * share;
+                inliers[k] += if share > 0.0 { 1.0 } else { 0.0 };
+            }
         }
-        (evidence, inliers)
+        (evidence.iter().sum(), inliers.iter().sum())
     }
 
     /// The weighted least-squares plane of the samples that agree with a plane.
     fn refined(&self, plane: &Plane, width_mm: f64) -> Option<Plane> {
         let mut fit = PlaneSums::default();
-        for (((dx, dy), z), weight) in self.dx.iter().zip(&self.dy).zip(&self.z).zip(&self.weight) {
-            let residual = z - (plane.a * dx + plane.b * dy + plane.c);
-            let weight = if residual.abs() < width_mm {
-                *weight
-            } else {
-                0.0
-            };
-            fit.add(*dx, *dy, residual, weight);
+        for (n, weight) in self.left.iter().zip(&self.weight) {
+            let residual = plane.residual(n);
+            if residual.abs() < width_mm {
+                fit.add(n.dx, n.dy, residual, *weight);
+            }
         }
         fit.plane().map(|change| Plane {
             a: plane.a + change.a,
