@@ -33,6 +33,11 @@ const STEEPEST_SEEN: f64 = 6.0;
 /// the first leaves over.
 const STEEPEST: f64 = 2.0;
 
+/// With so many columns the three samples of a plane are taken from different ones, or drawn
+/// again a few times: two of one run of outliers and one of another always make a plane on
+/// which both runs lie.
+const MANY_COLUMNS: usize = 5;
+const REDRAWS: usize = 4;
 /// Most planes tried for each surface after the first: enough for two fifths of the samples
 /// which the first leaves over.
 const MOST_FURTHER: usize = 160;
@@ -209,13 +214,21 @@ impl Surfaces {
     /// The plane with most evidence among the samples loaded.
     fn best(&mut self, width_mm: f64, most_planes: usize, draws: &mut Draws) -> Option<Plane> {
         let number = self.left.len();
+        let many = self.columns.len() >= MANY_COLUMNS;
         let mut best: Option<(f64, Plane)> = None;
         let mut enough = most_planes;
         let mut best_drawn = 0.0;
         let mut tried = 0;
         while tried < enough {
             tried += 1;
-            let [p, q, r] = draws.triple(number);
+            let mut triple = draws.triple(number);
+            for _ in 0..REDRAWS {
+                if !many || self.apart(triple) {
+                    break;
+                }
+                triple = draws.triple(number);
+            }
+            let [p, q, r] = triple;
             let Some(plane) =
                 Plane::through(&self.left[p], &self.left[q], &self.left[r], LEAST_SINE)
             else {
@@ -252,6 +265,12 @@ impl Surfaces {
             }
         }
         best.map(|(_, plane)| plane)
+    }
+
+    /// Whether the samples come from three columns.
+    fn apart(&self, [p, q, r]: [usize; 3]) -> bool {
+        let [p, q, r] = [p, q, r].map(|k| self.left[k].strip);
+        p != q && q != r && r != p
     }
 
     /// Evidence for a plane, and the number of samples that give it. Summed up in several

@@ -7,7 +7,7 @@ use crate::scene::{PITCH_MM, STEP_MM, Truth};
 /// Nodes off by more than this are gross errors, millimetres.
 const GROSS_MM: f64 = 0.5;
 /// Nodes within this of the step are next to it, millimetres.
-const NEAR_MM: f64 = 1.5;
+pub(crate) const NEAR_MM: f64 = 1.5;
 
 /// Sums over the nodes of any number of images.
 #[derive(Debug, Clone, Copy, Default)]

@@ -7,6 +7,7 @@
 
 mod bars;
 mod figures;
+mod oracle;
 mod peers;
 mod report;
 mod scene;
@@ -106,6 +107,9 @@ fn run(options: &Options) -> Result<()> {
                 println!("{}", report::row(&line));
                 lines.push(line);
             }
+            let line = oracle::line(seeds.clone(), outliers, share);
+            println!("{}", report::row(&line));
+            lines.push(line);
             if let Some(python) = &peers {
                 let scene = Scene {
                     seed: if options.tune { 1 } else { PEER_SEED },
