@@ -233,3 +233,96 @@ fn logistic(samples: &[Labelled], mut line: [f64; 3]) -> Option<[f64; 3]> {
     }
     line.iter().all(|v| v.is_finite()).then_some(line)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A grid of samples around the node, nearest first, within this many spacings; rows of
+    /// each column start anywhere. Positive labels where `u` is above the edge's at `v`.
+    fn grid(radius: f64, edge: impl Fn(f64) -> f64) -> Vec<Labelled> {
+        let reach = radius as i32;
+        let mut samples = Vec::new();
+        for column in -reach..=reach {
+            let start = libm::fmod(0.618 * f64::from(column + 100), 1.0);
+            for row in -reach..=reach {
+                let (u, v) = (f64::from(column) + 0.3, f64::from(row) + start);
+                samples.push(Labelled {
+                    u,
+                    v,
+                    label: if u > edge(v) { 1.0 } else { -1.0 },
+                    strip: (column + reach) as usize,
+                });
+            }
+        }
+        samples.retain(|s| s.u * s.u + s.v * s.v <= radius * radius);
+        samples.sort_by(|s, t| (s.u * s.u + s.v * s.v).total_cmp(&(t.u * t.u + t.v * t.v)));
+        samples
+    }
+
+    fn distance_to(slope: f64, offset: f64) -> f64 {
+        -offset / (1.0 + slope * slope).sqrt()
+    }
+
+    #[test]
+    fn a_longer_line_is_better_known() {
+        let (mut squares, mut squares_long) = (0.0, 0.0);
+        for k in 0..40 {
+            let (slope, offset) = (0.02 * f64::from(k) + 0.3, 0.02 * f64::from(k) - 0.4);
+            let edge = |v: f64| slope * v + offset;
+            let line = separate(&mut grid(8.0, edge)).unwrap();
+            let long = lengthen(&line, &mut grid(16.0, edge), &mut Vec::new()).unwrap();
+            let truth = distance_to(slope, offset);
+            squares += (line.distance() - truth).powi(2);
+            squares_long += (long.distance() - truth).powi(2);
+        }
+        let rms = |squares: f64| (squares / 40.0).sqrt();
+        assert!(rms(squares) < 0.08, "{}", rms(squares));
+        let long = rms(squares_long);
+        assert!(long < 0.85 * rms(squares), "{long} {}", rms(squares));
+    }
+
+    #[test]
+    fn a_bent_edge_is_not_lengthened() {
+        for (edge, name) in [
+            (
+                &(|v: f64| 0.3 + 0.4 * v + v * v / 60.0) as &dyn Fn(f64) -> f64,
+                "arc",
+            ),
+            (&|v: f64| 0.3 + 0.4 * v + 0.7 * v.max(0.0), "corner"),
+        ] {
+            let line = separate(&mut grid(8.0, edge)).unwrap();
+            assert!((line.distance() + 0.3).abs() < 0.4, "{name} {line:?}");
+            assert!(lengthen(&line, &mut grid(16.0, edge), &mut Vec::new()).is_none());
+        }
+    }
+
+    #[test]
+    fn a_run_of_outliers_does_not_move_the_line() {
+        let edge = |v: f64| 0.4 + 0.1 * v;
+        let mut samples = grid(9.0, edge);
+        let run = |s: &&mut Labelled| s.strip == 7 && s.v.abs() < 2.6;
+        let mut changed = 0;
+        for s in samples.iter_mut().filter(run) {
+            assert_eq!(s.label, -1.0);
+            s.label = 1.0;
+            changed += 1;
+        }
+        assert!((4..=6).contains(&changed));
+        let clean = separate(&mut grid(9.0, edge)).unwrap();
+        let line = separate(&mut samples).unwrap();
+        assert!(
+            (line.distance() - clean.distance()).abs() < 0.05,
+            "{line:?}"
+        );
+    }
+
+    #[test]
+    fn mixed_sets_have_no_line_between_them() {
+        let mut samples = grid(9.0, |_| 0.0);
+        for (k, s) in samples.iter_mut().enumerate() {
+            s.label = if k % 2 == 0 { 1.0 } else { -1.0 };
+        }
+        assert!(separate(&mut samples).is_none());
+    }
+}
