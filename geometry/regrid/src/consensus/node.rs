@@ -21,7 +21,7 @@ const ENOUGH: f64 = 0.75;
 const POOR: f64 = 0.38;
 /// How many times more samples must agree with a surface of twice the noise for that to be
 /// the noise.
-const GAIN: f64 = 1.4;
+const GAIN: f64 = 1.3;
 /// Fits after which the samples that agree no longer change.
 const FITS: usize = 3;
 
@@ -48,6 +48,8 @@ pub(crate) struct Consensus {
     far: Vec<Neighbour>,
     labelled: Vec<Labelled>,
     kept: Vec<Labelled>,
+    /// What noise the last node was estimated with.
+    noise_mm: f64,
 }
 
 impl Consensus {
@@ -121,29 +123,35 @@ impl Consensus {
     /// elsewhere where that makes many more samples agree, as on a surface that bends away
     /// from its plane by more than the noise, or is rough.
     fn look(&mut self, window: &[Neighbour], conditions: &Conditions, draws: &mut Draws) -> f64 {
+        let effort = &conditions.effort;
         let mut noise_mm = conditions.noise_mm;
+        if effort.guess.is_some() {
+            // The surface bends here as it did at the node before, or less.
+            noise_mm = noise_mm.max(0.5 * self.noise_mm);
+        }
         loop {
-            let found = self
-                .surfaces
-                .find(window, noise_mm, &conditions.effort, draws);
-            self.found.clear();
-            self.found.extend_from_slice(found);
+            let first = self.surfaces.first(window, noise_mm, effort, draws);
             let wider_mm = 2.0 * noise_mm;
             if wider_mm > conditions.most_noise_mm {
-                return noise_mm;
+                break;
             }
-            if let Some(first) = self.found.first() {
-                let ample = first.inliers as f64 >= ENOUGH * conditions.effort.neighbours as f64;
+            if let Some(first) = first {
+                let ample = first.inliers as f64 >= ENOUGH * effort.neighbours as f64;
                 let within_mm = 2.0 * first.width_mm;
                 let within = |n: &&Neighbour| first.plane.residual(n).abs() <= within_mm;
                 if ample
                     || (window.iter().filter(within).count() as f64) < GAIN * first.inliers as f64
                 {
-                    return noise_mm;
+                    break;
                 }
             }
             noise_mm = wider_mm;
         }
+        self.noise_mm = noise_mm;
+        let found = self.surfaces.further(window, noise_mm, effort, draws);
+        self.found.clear();
+        self.found.extend_from_slice(found);
+        noise_mm
     }
 
     /// Whether the node lies on the side of the first surface or on that of another.

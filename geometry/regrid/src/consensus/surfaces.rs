@@ -98,6 +98,18 @@ impl Surfaces {
         effort: &Effort,
         draws: &mut Draws,
     ) -> &[Surface] {
+        self.first(window, noise_mm, effort, draws);
+        self.further(window, noise_mm, effort, draws)
+    }
+
+    /// Forgets all surfaces, and seeks that with most evidence in a window.
+    pub(crate) fn first(
+        &mut self,
+        window: &[Neighbour],
+        noise_mm: f64,
+        effort: &Effort,
+        draws: &mut Draws,
+    ) -> Option<&Surface> {
         self.found.clear();
         self.left.clear();
         self.left.extend_from_slice(window);
@@ -105,36 +117,51 @@ impl Surfaces {
         self.columns.extend(window.iter().map(|n| (n.strip, 0)));
         self.columns.sort_unstable();
         self.columns.dedup();
+        if self.left.len() >= LEAST_INLIERS {
+            let width_mm = WIDTH * noise_mm;
+            self.load(window);
+            let known = effort.guess.and_then(|p| self.known(p, width_mm, effort));
+            let plane = known.or_else(|| self.best(width_mm, effort.most_planes, draws));
+            self.take(window, plane?, width_mm);
+        }
+        self.found.first()
+    }
+
+    /// Seeks the other surfaces of the window whose first one was just found.
+    pub(crate) fn further(
+        &mut self,
+        window: &[Neighbour],
+        noise_mm: f64,
+        effort: &Effort,
+        draws: &mut Draws,
+    ) -> &[Surface] {
         let radius2 = window.last().map_or(0.0, |n| n.distance2);
         let width_mm = WIDTH * noise_mm;
-        while self.found.len() < MOST_SURFACES && self.left.len() >= LEAST_INLIERS {
-            if let Some(first) = self.found.first().copied()
-                && !self.another_is_likely(&first, radius2.sqrt())
-            {
-                break;
-            }
-            self.load(radius2);
-            let plane = if self.found.is_empty() {
-                let known = effort.guess.and_then(|p| self.known(p, width_mm, effort));
-                known.or_else(|| self.best(width_mm, effort.most_planes, draws))
-            } else {
-                self.best(width_mm, effort.most_planes.min(MOST_FURTHER), draws)
-            };
-            let Some(plane) = plane else {
+        while let Some(first) = self.found.first().copied()
+            && self.found.len() < MOST_SURFACES
+            && self.left.len() >= LEAST_INLIERS
+            && self.another_is_likely(&first, radius2.sqrt())
+        {
+            self.load(window);
+            let most_planes = effort.most_planes.min(MOST_FURTHER);
+            let Some(plane) = self.best(width_mm, most_planes, draws) else {
                 break;
             };
-            let surface = Surface {
-                plane,
-                width_mm,
-                inliers: window
-                    .iter()
-                    .filter(|n| plane.residual(n).abs() <= width_mm)
-                    .count(),
-            };
-            self.found.push(surface);
-            self.left.retain(|n| !surface.holds(n));
+            self.take(window, plane, width_mm);
         }
         &self.found
+    }
+
+    /// Adds a surface, whose samples are left to no other.
+    fn take(&mut self, window: &[Neighbour], plane: Plane, width_mm: f64) {
+        let mut surface = Surface {
+            plane,
+            width_mm,
+            inliers: 0,
+        };
+        surface.inliers = window.iter().filter(|n| surface.holds(n)).count();
+        self.found.push(surface);
+        self.left.retain(|n| !surface.holds(n));
     }
 
     /// Whether as many of the samples left as a surface needs lie together above or below
@@ -181,7 +208,8 @@ impl Surfaces {
             && (few || others >= MANY_OTHERS || pairs >= LEAST_PAIRS && others >= LEAST_OTHERS)
     }
 
-    fn load(&mut self, radius2: f64) {
+    fn load(&mut self, window: &[Neighbour]) {
+        let radius2 = window.last().map_or(0.0, |n| n.distance2);
         self.dx.clear();
         self.dy.clear();
         self.z.clear();
