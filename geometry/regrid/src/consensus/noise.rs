@@ -11,9 +11,11 @@ const WIDTH: f64 = 2.5;
 /// Share of a normal distribution within that width, and its variance in there.
 const WITHIN: f64 = 0.987_58;
 const VARIANCE_WITHIN: f64 = 0.9113;
-/// Where this share of the differences taken for noise lies close together elsewhere, they
-/// are one step of the resolution among others. Outliers scatter far more.
+/// Where so many others, of the differences taken for noise, lie close together, those are one
+/// step of the resolution among others.
 const OTHER_STEP: f64 = 0.15;
+/// Spread of the differences that the next step shows, of the step.
+const STEP_SPREAD: f64 = 0.2;
 /// Fewest differences that make such a step.
 const LEAST_STEP: usize = 4;
 /// Quantile of the differences that are not zero below which lies the resolution of z.
@@ -127,15 +129,18 @@ fn variance_within(distances: &[f64], mut deviation: f64) -> f64 {
     deviation
 }
 
-/// Whether what seems noise is one step of the resolution: others lie as close together.
+/// Whether what seems noise is one step of the resolution: others lie as close together, or
+/// come next and lie about the next step, which slopes and uneven distances spread. Outliers
+/// scatter far more.
 fn is_step(distances: &[f64], deviation: f64) -> bool {
     let (end, length) = (WIDTH * deviation, 2.0 * WIDTH * deviation);
     let within = distances.partition_point(|d| *d <= end);
     let beyond = distances.get(within..).unwrap_or_default();
     let number = ((OTHER_STEP * within as f64) as usize).max(LEAST_STEP);
-    beyond
-        .windows(number)
-        .any(|some| some[number - 1] - some[0] <= length)
+    beyond.windows(number).enumerate().any(|(before, some)| {
+        let spread = some[number - 1] - some[0];
+        spread <= length || before <= number && spread <= STEP_SPREAD * some[0]
+    })
 }
 
 /// Quantile of the absolute value of a standard normal variable.
@@ -214,6 +219,17 @@ mod tests {
                 let clean = found.clean_share / (1.0 - outliers);
                 assert!((0.85..1.15).contains(&clean), "{case}");
             }
+        }
+    }
+
+    /// Of far coarser ones whole terraces agree, and what differs does so by one step.
+    #[test]
+    fn terraces_are_not_taken_for_exact_depths() {
+        for outliers in [0.0, 0.1] {
+            let strips = strips(0.005, 0.35, outliers);
+            let found = noise(strips.iter(), &mut Vec::new()).unwrap();
+            let ratio = found.deviation_mm / (0.35 / 12_f64.sqrt());
+            assert!((0.8..1.5).contains(&ratio), "{outliers}: {found:?}");
         }
     }
 
