@@ -232,8 +232,8 @@ impl GridWorker {
 }
 
 /// How many times farther from its surface's samples a node may lie where the line of the
-/// edge says on which side it is: more than half the diagonal of a square of samples.
-const SIDE_KNOWN: f64 = 4.0 / 3.0;
+/// edge says on which side it is: half the diagonal of a square of samples.
+const SIDE_KNOWN: f64 = 1.18;
 /// Columns on either side that tell of the noise.
 const NOISE_COLUMNS: usize = 8;
 /// Least noise believed, in spacings: scans without any are computed ones.

@@ -22,6 +22,9 @@ const POOR: f64 = 0.38;
 /// How many times more samples must agree with a surface of twice the noise for that to be
 /// the noise.
 const GAIN: f64 = 1.3;
+/// Share of a window's samples, the nearest, that z rests on: fewer than the search needs to
+/// withstand outliers in runs, since planes round creases the more the wider they are.
+const NEAREST: f64 = 0.8;
 /// Fits after which the samples that agree no longer change.
 const FITS: usize = 3;
 
@@ -63,10 +66,11 @@ impl Consensus {
         mut wider: impl FnMut(&mut Vec<Neighbour>, usize),
     ) -> &[Surface] {
         let noise_mm = self.look(window, conditions, draws);
+        let nearest = (NEAREST * conditions.effort.neighbours as f64).round() as usize;
         let first = self.found.first().map_or(0, |s| s.inliers) as f64;
         if self.found.len() == 1 && first >= ENOUGH * conditions.effort.neighbours as f64 {
             for surface in &mut self.found {
-                settle(surface, window, conditions.effort.neighbours);
+                settle(surface, window, nearest);
             }
             return &self.found;
         }
@@ -96,7 +100,7 @@ impl Consensus {
             }
         }
         for surface in &mut self.found {
-            settle(surface, &self.wide, conditions.effort.neighbours);
+            settle(surface, &self.wide, nearest);
         }
         let mut other = 1;
         while other < self.found.len() {
@@ -125,11 +129,18 @@ impl Consensus {
     fn look(&mut self, window: &[Neighbour], conditions: &Conditions, draws: &mut Draws) -> f64 {
         let effort = &conditions.effort;
         let mut noise_mm = conditions.noise_mm;
+        // The surface probably bends here about as it did at the node before.
+        let before_mm = self.noise_mm;
+        let halved_mm = noise_mm.max(0.5 * before_mm);
+        let doubled_mm = (2.0 * before_mm).min(conditions.most_noise_mm.max(before_mm));
+        let alike_mm = [halved_mm, before_mm, doubled_mm];
+        let followed = (before_mm > noise_mm)
+            .then(|| self.surfaces.follows(window, &alike_mm, effort))
+            .flatten();
         if effort.guess.is_some() {
-            // The surface bends here as it did at the node before, or less.
-            noise_mm = noise_mm.max(0.5 * self.noise_mm);
+            noise_mm = followed.unwrap_or(halved_mm);
         }
-        loop {
+        while followed.is_none() {
             let first = self.surfaces.first(window, noise_mm, effort, draws);
             let wider_mm = 2.0 * noise_mm;
             if wider_mm > conditions.most_noise_mm {

@@ -110,6 +110,36 @@ impl Surfaces {
         effort: &Effort,
         draws: &mut Draws,
     ) -> Option<&Surface> {
+        self.begin(window);
+        if self.left.len() >= LEAST_INLIERS {
+            let width_mm = WIDTH * noise_mm;
+            let known = effort.guess.and_then(|p| self.known(p, width_mm, effort));
+            let plane = known.or_else(|| self.best(width_mm, effort.most_planes, draws));
+            self.take(window, plane?, width_mm);
+        }
+        self.found.first()
+    }
+
+    /// Forgets all surfaces; whether that which was guessed is one with any of these noises,
+    /// the first that will do.
+    pub(crate) fn follows(
+        &mut self,
+        window: &[Neighbour],
+        noises_mm: &[f64],
+        effort: &Effort,
+    ) -> Option<f64> {
+        self.begin(window);
+        let guess = effort.guess?;
+        let (noise_mm, plane) = noises_mm.iter().find_map(|&noise_mm| {
+            let plane = self.known(guess, WIDTH * noise_mm, effort)?;
+            Some((noise_mm, plane))
+        })?;
+        self.take(window, plane, WIDTH * noise_mm);
+        Some(noise_mm)
+    }
+
+    /// Forgets all surfaces, and leaves every sample of a window to the next one.
+    fn begin(&mut self, window: &[Neighbour]) {
         self.found.clear();
         self.left.clear();
         self.left.extend_from_slice(window);
@@ -117,14 +147,7 @@ impl Surfaces {
         self.columns.extend(window.iter().map(|n| (n.strip, 0)));
         self.columns.sort_unstable();
         self.columns.dedup();
-        if self.left.len() >= LEAST_INLIERS {
-            let width_mm = WIDTH * noise_mm;
-            self.load(window);
-            let known = effort.guess.and_then(|p| self.known(p, width_mm, effort));
-            let plane = known.or_else(|| self.best(width_mm, effort.most_planes, draws));
-            self.take(window, plane?, width_mm);
-        }
-        self.found.first()
+        self.load(window);
     }
 
     /// Seeks the other surfaces of the window whose first one was just found.
