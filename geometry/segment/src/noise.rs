@@ -1,11 +1,20 @@
 //! The noise of a range image, measured in the image itself.
 
 use crate::grid::Grid;
+use range_image::RangeImage;
 
 /// Noise below this share of the pitch is of no account to any decision.
 const LEAST_SHARE_OF_PITCH: f64 = 1e-3;
 /// Nodes from which on noise is taken to be unlike.
 const FAR: usize = 5;
+/// Standard deviation of a node that is right but for what its window rounds off, in those of the
+/// samples.
+const TOLD: f64 = 0.75;
+/// Quantile of the nodes that tells. Over half of them may lie on terraces of coarse depths,
+/// whose samples agree to the last digit.
+const TOLD_QUANTILE: f64 = 0.8;
+/// What the regridder tells counts as alike over so many nodes at most.
+const MOST_ALIKE: f64 = 3.5;
 /// Noise is never taken to be alike over more nodes than this.
 const GREATEST_AREA: f64 = 25.0;
 
@@ -36,15 +45,39 @@ impl Noise {
 /// median keeps creases and steps out. Regridded noise is alike in neighbouring nodes, which
 /// hides it from differences of neighbours, so those over every second node are taken as
 /// well, and the greater figure counts. How much neighbours hide tells how far noise is alike.
-pub(crate) fn noise(grid: &Grid<'_>) -> Noise {
+///
+/// Wide windows make nodes alike farther than differences of any use reach. What the regridder
+/// says of each node's samples is no more than the least that its value can stray, but does
+/// not mind how far; the greatest figure counts.
+pub(crate) fn noise(image: &RangeImage, grid: &Grid<'_>) -> Noise {
     let near = third_differences(grid, 1);
     let middle = third_differences(grid, 2);
     let far = third_differences(grid, FAR).min(2.0 * near.max(middle));
-    let deviation_mm = near.max(middle).max(LEAST_SHARE_OF_PITCH * grid.pitch_mm);
+    let told = told_mm(image);
+    let deviation_mm = near
+        .max(middle)
+        .max(told)
+        .max(LEAST_SHARE_OF_PITCH * grid.pitch_mm);
     Noise {
         deviation_mm,
-        area_nodes: area(near, middle.max(far).max(near)),
+        area_nodes: area(near, middle.max(far).max(near)).min(MOST_ALIKE),
     }
+}
+
+/// The deviation of z that the nodes' samples tell of, millimetres; 0 where nothing is known of
+/// them.
+fn told_mm(image: &RangeImage) -> f64 {
+    let mut scales_mm: Vec<f32> = image
+        .qualities()
+        .filter(|quality| quality.inliers > 0)
+        .map(|quality| quality.scale_mm)
+        .collect();
+    let place = (TOLD_QUANTILE * scales_mm.len() as f64) as usize;
+    if place >= scales_mm.len() {
+        return 0.0;
+    }
+    let (_, scale_mm, _) = scales_mm.select_nth_unstable_by(place, f32::total_cmp);
+    TOLD * f64::from(*scale_mm)
 }
 
 /// The autocorrelation's sum, taken for a Gaussian, from the deviation seen by third differences

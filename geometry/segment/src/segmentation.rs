@@ -92,7 +92,7 @@ pub fn segment_with_report(
     settings.validate()?;
     check(image)?;
     let measured = Grid::new(image);
-    let noise = noise(&measured);
+    let noise = noise(image, &measured);
     let working = filled(&measured);
     let grid = Grid {
         z_mm: &working,

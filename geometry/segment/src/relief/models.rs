@@ -254,7 +254,7 @@ mod tests {
         let scene = Scene {
             grid,
             links: Links::new(&grid, PITCH_MM),
-            noise: noise(&grid),
+            noise: noise(&image, &grid),
             step_mm: PITCH_MM,
             crease_rad: 0.1,
         };
