@@ -285,13 +285,12 @@ fn set<T>(place: &mut T, value: Option<T>) {
 impl RegridConfig {
     fn apply(&self, settings: &mut regrid::RegridSettings) {
         if let Some(estimator) = self.estimator {
-            settings.estimator = match estimator {
+            *settings = settings.with_estimator(match estimator {
                 Estimator::Consensus => regrid::Estimator::Consensus,
                 Estimator::LeastMedian => regrid::Estimator::LeastMedian,
                 Estimator::ExhaustiveLeastMedian => regrid::Estimator::ExhaustiveLeastMedian,
                 Estimator::LeastSquares => regrid::Estimator::LeastSquares,
-            };
-            settings.neighbours = settings.estimator.neighbours();
+            });
         }
         set(&mut settings.neighbours, self.neighbours);
         set(&mut settings.draws, self.draws);

@@ -94,7 +94,7 @@ fn the_examples_are_sound_and_show_the_defaults() {
         .collect();
     assert_ne!(all, text);
     let all = Config::parse(&all, Path::new("serial.toml")).unwrap();
-    assert_eq!(all.regrid.neighbours, Some(32));
+    assert_eq!(all.regrid.neighbours, Some(49));
     assert_eq!(all.journal, Config::default().journal);
     assert_eq!(all.queue, Config::default().queue);
     assert_eq!(all.log, Config::default().log);

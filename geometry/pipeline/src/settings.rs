@@ -42,15 +42,14 @@ impl Settings {
         .with_seed(1)
     }
 
-    /// The same settings on one road throughout, the regridder's estimator and the size of
-    /// its windows included.
+    /// The same settings on one road throughout, the regridder's estimator with its windows
+    /// included.
     #[must_use]
     pub fn with_method(mut self, method: Method) -> Self {
-        self.regrid.estimator = match method {
+        self.regrid = self.regrid.with_estimator(match method {
             Method::Relief => Estimator::default(),
             Method::ShimLee => Estimator::LeastMedian,
-        };
-        self.regrid.neighbours = self.regrid.estimator.neighbours();
+        });
         self.segment.method = method.into();
         self.reconstruct.method = method.into();
         self

@@ -46,13 +46,23 @@ impl Estimator {
         }
     }
 
-    /// M, the samples in a node's window, where nothing else is set: 32 for the paper's
-    /// estimator and 49 for others, for which more samples are less noise.
+    /// M, the samples in a node's window, where nothing else is set: 32 as in the paper, 49
+    /// for others, for which more samples withstand more outliers and are less noise.
     #[must_use]
     pub fn neighbours(self) -> usize {
         match self {
             Self::LeastMedian | Self::ExhaustiveLeastMedian => 32,
             Self::Consensus | Self::LeastSquares => 49,
+        }
+    }
+
+    /// Columns on either side that a window may reach into, where nothing else is set:
+    /// consensus follows step edges farther than its window.
+    #[must_use]
+    pub fn reach_columns(self) -> usize {
+        match self {
+            Self::Consensus => 16,
+            Self::LeastMedian | Self::ExhaustiveLeastMedian | Self::LeastSquares => 8,
         }
     }
 }
@@ -158,9 +168,10 @@ pub struct RegridSettings {
     pub pitch_mm: f64,
     /// M: samples in a node's window. At most half of them come from one column, so that
     /// columns far apart with dense samples still span a plane. Default
-    /// [`Estimator::neighbours`]: of noise of 0.05 mm on a plane 49 samples leave 0.0075 mm
-    /// by consensus, and 32 leave 0.021 mm by the median. By consensus the window grows with
-    /// the share of outliers, to as many samples without any.
+    /// [`Estimator::neighbours`]: of noise of 0.05 mm on a plane 49 samples leave 0.0083 mm
+    /// by consensus, which takes z from the nearest four fifths, and 32 leave 0.021 mm by the
+    /// median. By consensus the window grows with the share of outliers, to as many samples
+    /// without any.
     pub neighbours: usize,
     /// N_s: planes tried at a node ([`Estimator::LeastMedian`]). [`Estimator::Consensus`]
     /// tries no more than it needs to be sure of the best to 1 in 10,000, and at most 16
@@ -169,7 +180,7 @@ pub struct RegridSettings {
     /// Columns on either side of a node that its window may reach into; bounds memory and
     /// the delay until a node is finished. In y the window reaches as far as that many
     /// columns, or that many sample spacings if they are wider. [`Estimator::Consensus`] sees
-    /// the line of a step edge as far. Default 16.
+    /// the line of a step edge as far. Default [`Estimator::reach_columns`].
     pub reach_columns: usize,
     /// The estimator.
     pub estimator: Estimator,
@@ -192,13 +203,22 @@ impl RegridSettings {
             pitch_mm,
             neighbours: Estimator::default().neighbours(),
             draws: 32,
-            reach_columns: 16,
+            reach_columns: Estimator::default().reach_columns(),
             estimator: Estimator::default(),
             roi: Roi::default(),
             seed: 1,
             support: SupportSettings::default(),
             threads: 0,
         }
+    }
+
+    /// The same settings with an estimator, its window and its reach.
+    #[must_use]
+    pub fn with_estimator(mut self, estimator: Estimator) -> Self {
+        self.estimator = estimator;
+        self.neighbours = estimator.neighbours();
+        self.reach_columns = estimator.reach_columns();
+        self
     }
 
     /// Checks every setting.

@@ -159,10 +159,8 @@ fn ours(
             share,
         };
         let settings = RegridSettings {
-            estimator,
-            neighbours: estimator.neighbours(),
             threads: 1,
-            ..RegridSettings::with_pitch(PITCH_MM)
+            ..RegridSettings::with_pitch(PITCH_MM).with_estimator(estimator)
         };
         let columns = scene.columns();
         let begun = Instant::now();
