@@ -129,13 +129,15 @@ impl Consensus {
     fn look(&mut self, window: &[Neighbour], conditions: &Conditions, draws: &mut Draws) -> f64 {
         let effort = &conditions.effort;
         let mut noise_mm = conditions.noise_mm;
-        // The surface probably bends here about as it did at the node before.
+        // The surface probably bends here as it did at the node before, or less. Wider is never
+        // followed: from node to node that would lead on over a crease.
         let before_mm = self.noise_mm;
         let halved_mm = noise_mm.max(0.5 * before_mm);
-        let doubled_mm = (2.0 * before_mm).min(conditions.most_noise_mm.max(before_mm));
-        let alike_mm = [halved_mm, before_mm, doubled_mm];
         let followed = (before_mm > noise_mm)
-            .then(|| self.surfaces.follows(window, &alike_mm, effort))
+            .then(|| {
+                self.surfaces
+                    .follows(window, [halved_mm, before_mm], effort)
+            })
             .flatten();
         if effort.guess.is_some() {
             noise_mm = followed.unwrap_or(halved_mm);
@@ -173,12 +175,10 @@ impl Consensus {
         wider: &mut impl FnMut(&mut Vec<Neighbour>, usize),
     ) -> Place {
         let (first, other) = (self.found[0], self.found[other]);
-        if (first.plane.c - other.plane.c).abs() <= first.width_mm {
-            return Place::First;
-        }
+        let meet = (first.plane.c - other.plane.c).abs() <= first.width_mm;
         label(&self.wide, &first, &other, spacing, &mut self.labelled);
         let Some(mut line) = separate(&mut self.labelled) else {
-            return Place::Nowhere;
+            return if meet { Place::First } else { Place::Nowhere };
         };
         if line.is_near() {
             if self.far.is_empty() {

@@ -125,12 +125,12 @@ impl Surfaces {
     pub(crate) fn follows(
         &mut self,
         window: &[Neighbour],
-        noises_mm: &[f64],
+        noises_mm: [f64; 2],
         effort: &Effort,
     ) -> Option<f64> {
         self.begin(window);
         let guess = effort.guess?;
-        let (noise_mm, plane) = noises_mm.iter().find_map(|&noise_mm| {
+        let (noise_mm, plane) = noises_mm.into_iter().find_map(|noise_mm| {
             let plane = self.known(guess, WIDTH * noise_mm, effort)?;
             Some((noise_mm, plane))
         })?;
