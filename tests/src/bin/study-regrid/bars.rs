@@ -27,7 +27,10 @@ impl Bounds {
         let (few, gross) = if clustered { (4, 1e-4) } else { (0, 0.0) };
         let target = Self::target(line);
         if line.share > 0.3 {
-            return target;
+            return Self {
+                in_between: few,
+                ..target
+            };
         }
         Self {
             rms_mm: if clustered { f64::INFINITY } else { 0.010 },
