@@ -134,8 +134,8 @@ pub struct SupportSettings {
     pub margin: f64,
     /// The same where samples of another surface close the gap on the other side, as at a
     /// step edge: a little more than half, so that one of the two gets the node. By consensus
-    /// a third more, since there the line of the edge tells which of the two, and farther in
-    /// proportion where outliers leave the samples thinner. Default 0.6.
+    /// half the diagonal of a square of samples at the default, since there the line of the
+    /// edge tells which of the two, and farther in proportion where outliers leave the samples thinner. Default 0.6.
     pub step_margin: f64,
     /// Least number of inliers within the radius. Default 3.
     pub least_samples: usize,

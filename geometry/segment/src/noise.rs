@@ -7,8 +7,8 @@ use range_image::RangeImage;
 const LEAST_SHARE_OF_PITCH: f64 = 1e-3;
 /// Nodes from which on noise is taken to be unlike.
 const FAR: usize = 5;
-/// Standard deviation of a node that is right but for what its window rounds off, in those of the
-/// samples.
+/// Standard deviation that a node is granted, in those of its samples: what is left of their
+/// noise, and what its window rounds off at creases.
 const TOLD: f64 = 0.75;
 /// Quantile of the nodes that tells. Over half of them may lie on terraces of coarse depths,
 /// whose samples agree to the last digit.
@@ -46,9 +46,9 @@ impl Noise {
 /// hides it from differences of neighbours, so those over every second node are taken as
 /// well, and the greater figure counts. How much neighbours hide tells how far noise is alike.
 ///
-/// Wide windows make nodes alike farther than differences of any use reach. What the regridder
-/// says of each node's samples is no more than the least that its value can stray, but does
-/// not mind how far; the greatest figure counts.
+/// Wide windows make nodes alike farther than differences of any use reach, and round creases
+/// by as much as their samples stray. So what the regridder says of each node's samples is
+/// asked, too; the greatest figure counts.
 pub(crate) fn noise(image: &RangeImage, grid: &Grid<'_>) -> Noise {
     let near = third_differences(grid, 1);
     let middle = third_differences(grid, 2);
