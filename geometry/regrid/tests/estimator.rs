@@ -150,6 +150,29 @@ fn consensus_holds_next_to_a_step_among_runs_of_outliers() {
     assert!(fine < 0.012, "{fine}");
 }
 
+/// Steep faces that meet at an oblique ridge, whose noise along z is the more: no plane of one
+/// is carried on over the ridge.
+#[test]
+fn consensus_keeps_ridges() {
+    let across = |x: f64, y: f64| (x + 0.7 * y - 25.13) / (1.0_f64 + 0.7 * 0.7).sqrt();
+    let height = |x: f64, y: f64| -(0.9 * across(x, y)).max(-1.1 * across(x, y));
+    let mut noise = Noise::new(31);
+    let columns = scan(30.0, (0.4, 0.55), (0.2, 0.4), |x, y| {
+        Some(height(x, y) + 2.0 * NOISE_MM * noise.normal())
+    });
+    let settings = RegridSettings::with_pitch(0.45);
+    let (mut worst, mut near) = (0.0_f64, 0);
+    for (x, y, z) in nodes(&image(&columns, &settings)) {
+        if across(x, y).abs() < 3.0 && (2.0..28.0).contains(&x) && (2.0..28.0).contains(&y) {
+            worst = worst.max((z - height(x, y)).abs());
+            near += 1;
+        }
+    }
+    println!("{worst} of {near}");
+    assert!(near > 500, "{near}");
+    assert!(worst < 0.4, "{worst}");
+}
+
 /// The window averages: noise at the nodes is well below that of the samples, and on a
 /// sphere the bias of a plane stays below the noise.
 #[test]
