@@ -136,3 +136,37 @@ fn third_differences(grid: &Grid<'_>, lag: usize) -> f64 {
     // 1.4826: median of sizes to standard deviation; sqrt(1 + 9 + 9 + 1) of the weights.
     1.4826 * *median / libm::sqrt(20.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use range_image::{Lattice, NodeQuality};
+
+    /// A plane without any noise whose nodes, all or the first half of the columns, have samples
+    /// that stray.
+    fn deviation_mm(straying_columns: usize) -> f64 {
+        let (side, lattice) = (20, Lattice { pitch_mm: 0.5 });
+        let mut image = RangeImage::masked(lattice, 0, 0, side, side);
+        for column in 0..side {
+            for row in 0..side {
+                image.set_z_mm(column, row, Some(0.1 * column as f64));
+                let strays = column < straying_columns;
+                let quality = NodeQuality {
+                    inliers: 40,
+                    samples: 49,
+                    scale_mm: if strays { 0.1 } else { 0.0 },
+                    nearest_mm: 0.1,
+                };
+                image.set_quality(column, row, quality);
+            }
+        }
+        noise(&image, &Grid::new(&image)).deviation_mm
+    }
+
+    #[test]
+    fn what_samples_stray_is_granted_to_nodes_that_do_not() {
+        assert!((deviation_mm(20) - 0.075).abs() < 1e-6);
+        assert!((deviation_mm(8) - 0.075).abs() < 1e-6, "most are terraces");
+        assert!(deviation_mm(0) < 1e-3);
+    }
+}
