@@ -61,7 +61,7 @@ impl Estimator {
     #[must_use]
     pub fn reach_columns(self) -> usize {
         match self {
-            Self::Consensus => 16,
+            Self::Consensus => 20,
             Self::LeastMedian | Self::ExhaustiveLeastMedian | Self::LeastSquares => 8,
         }
     }

@@ -1,5 +1,6 @@
 //! Which of the surfaces near a node is its own, and z there.
 
+use super::between::Between;
 use super::side::{Labelled, lengthen, separate};
 use super::surfaces::{Effort, PlaneSums, Surface, Surfaces};
 use crate::draws::Draws;
@@ -9,8 +10,8 @@ use crate::window::Spacing;
 /// Samples looked at where surfaces meet, in windows: the line between them is the better
 /// known the longer it is.
 const WIDE: usize = 8;
-/// The same for nodes beside that line.
-const FAR: usize = 16;
+/// The same for nodes beside that line; fewer where it bends.
+const FAR: [usize; 2] = [25, 16];
 /// Windows in which a second surface is sought where the first has few samples in one.
 const SECOND: usize = 2;
 /// Share of a window that a surface's samples must have for z to rest on them alone; with
@@ -51,6 +52,9 @@ pub(crate) struct Consensus {
     far: Vec<Neighbour>,
     labelled: Vec<Labelled>,
     kept: Vec<Labelled>,
+    between: Between,
+    /// Numbers of samples, strip by strip.
+    by_strip: Vec<u32>,
     /// What noise the last node was estimated with.
     noise_mm: f64,
 }
@@ -150,20 +154,24 @@ impl Consensus {
             }
             if let Some(first) = first {
                 let ample = first.inliers as f64 >= ENOUGH * effort.neighbours as f64;
-                let within_mm = 2.0 * first.width_mm;
-                let within = |n: &&Neighbour| first.plane.residual(n).abs() <= within_mm;
-                if ample
-                    || (window.iter().filter(within).count() as f64) < GAIN * first.inliers as f64
-                {
+                let more = f64::from(more_samples(window, first, &mut self.by_strip));
+                if ample || more < (GAIN - 1.0) * first.inliers as f64 {
                     break;
                 }
             }
             noise_mm = wider_mm;
         }
-        self.noise_mm = noise_mm;
-        let found = self.surfaces.further(window, noise_mm, effort, draws);
+        let mut found = self.surfaces.further(window, noise_mm, effort, draws);
+        let held: usize = found.iter().map(|s| s.inliers).sum();
+        if noise_mm > conditions.noise_mm && (held as f64) < ENOUGH * effort.neighbours as f64 {
+            // Surfaces that are so rough would hold nearly all; these hold outliers, too.
+            noise_mm = conditions.noise_mm;
+            self.surfaces.first(window, noise_mm, effort, draws);
+            found = self.surfaces.further(window, noise_mm, effort, draws);
+        }
         self.found.clear();
         self.found.extend_from_slice(found);
+        self.noise_mm = noise_mm;
         noise_mm
     }
 
@@ -177,15 +185,28 @@ impl Consensus {
         let (first, other) = (self.found[0], self.found[other]);
         let meet = (first.plane.c - other.plane.c).abs() <= first.width_mm;
         label(&self.wide, &first, &other, spacing, &mut self.labelled);
-        let Some(mut line) = separate(&mut self.labelled) else {
+        let Some(mut line) = separate(&mut self.labelled, &mut self.between) else {
             return if meet { Place::First } else { Place::Nowhere };
         };
         if line.is_near() {
             if self.far.is_empty() {
-                wider(&mut self.far, FAR);
+                wider(&mut self.far, FAR[0]);
             }
-            label(&self.far, &first, &other, spacing, &mut self.labelled);
-            line = lengthen(&line, &mut self.labelled, &mut self.kept).unwrap_or(line);
+            for windows in FAR {
+                let number = self.far.len() * windows / FAR[0];
+                label(
+                    &self.far[..number],
+                    &first,
+                    &other,
+                    spacing,
+                    &mut self.labelled,
+                );
+                let longer = lengthen(&line, &mut self.labelled, &mut self.kept, &mut self.between);
+                if let Some(longer) = longer {
+                    line = longer;
+                    break;
+                }
+            }
         }
         if line.distance() < 0.0 {
             Place::Other
@@ -193,6 +214,24 @@ impl Consensus {
             Place::First
         }
     }
+}
+
+/// How many more samples of the window would agree with the surface if the noise were twice
+/// what it is, without those of the one column that has most of them: a run of outliers may
+/// happen to lie there.
+fn more_samples(window: &[Neighbour], surface: &Surface, by_strip: &mut Vec<u32>) -> u32 {
+    by_strip.clear();
+    for n in window {
+        let off_mm = surface.plane.residual(n).abs();
+        if off_mm > surface.width_mm && off_mm <= 2.0 * surface.width_mm {
+            if by_strip.len() <= n.strip {
+                by_strip.resize(n.strip + 1, 0);
+            }
+            by_strip[n.strip] += 1;
+        }
+    }
+    let most = by_strip.iter().copied().max().unwrap_or(0);
+    by_strip.iter().sum::<u32>() - most
 }
 
 /// The samples that lie on one of the two surfaces alone.

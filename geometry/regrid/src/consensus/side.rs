@@ -1,5 +1,6 @@
 //! On which side of the line between two surfaces a node lies.
 
+use super::between::Between;
 use crate::solve::solve;
 
 /// A sample of one of the two surfaces, as seen from the node, in local spacings.
@@ -61,6 +62,22 @@ impl Line {
         Self::of(logistic(samples, self.0.map(|value| STEEPNESS * value))?)
     }
 
+    /// The mean of all lines that separate these samples: of the line that is sought no more
+    /// is known. This line, if it is none of them.
+    fn between(self, samples: &[Labelled], between: &mut Between) -> Self {
+        let [g, h, o] = self.0;
+        between.begin();
+        for s in samples {
+            let across = at(&self.0, s);
+            between.keep(h * s.u - g * s.v, across, s.label);
+        }
+        // A point at (along, across) lies above where across - offset - slope * along > 0.
+        let mean = between
+            .mean()
+            .map(|[offset, slope]| [g - slope * h, h + slope * g, o - offset]);
+        mean.and_then(Self::of).unwrap_or(self)
+    }
+
     /// Signed distance of the node, in local spacings.
     pub(crate) fn distance(&self) -> f64 {
         self.0[2]
@@ -77,7 +94,7 @@ impl Line {
 /// many of them on the wrong side, as at a bent edge or a corner, over the nearer half, and
 /// so on. `None` where the two sets do not lie apart. Samples that no surface can have are
 /// taken out.
-pub(crate) fn separate(samples: &mut Vec<Labelled>) -> Option<Line> {
+pub(crate) fn separate(samples: &mut Vec<Labelled>, between: &mut Between) -> Option<Line> {
     // Far from the edge the nearer samples tell.
     let near = samples.get(..samples.len() / NEARER)?;
     if let Some(raw) = logistic(near, [0.0; 3])
@@ -113,7 +130,7 @@ pub(crate) fn separate(samples: &mut Vec<Labelled>) -> Option<Line> {
             break;
         }
     }
-    Line::of(best?)
+    Some(Line::of(best?)?.between(samples, between))
 }
 
 /// Takes out the samples on the wrong side that samples of other columns, around them,
@@ -152,6 +169,7 @@ pub(crate) fn lengthen(
     line: &Line,
     samples: &mut Vec<Labelled>,
     lane: &mut Vec<Labelled>,
+    between: &mut Between,
 ) -> Option<Line> {
     let mut line = *line;
     take_out_strays(samples, &line.0);
@@ -177,11 +195,12 @@ pub(crate) fn lengthen(
     }
     let before = lane.len();
     lane.retain(|s| s.label * at(&line.0, s) > 0.0);
-    match before - lane.len() {
-        0 => Some(line),
-        1..=BENT => line.again(lane),
-        _ => None,
-    }
+    let line = match before - lane.len() {
+        0 => line,
+        1..=BENT => line.again(lane)?,
+        _ => return None,
+    };
+    Some(line.between(lane, between))
 }
 
 fn at(line: &[f64; 3], s: &Labelled) -> f64 {
@@ -270,8 +289,14 @@ mod tests {
         for k in 0..40 {
             let (slope, offset) = (0.02 * f64::from(k) + 0.3, 0.02 * f64::from(k) - 0.4);
             let edge = |v: f64| slope * v + offset;
-            let line = separate(&mut grid(8.0, edge)).unwrap();
-            let long = lengthen(&line, &mut grid(16.0, edge), &mut Vec::new()).unwrap();
+            let line = separate(&mut grid(8.0, edge), &mut Between::default()).unwrap();
+            let long = lengthen(
+                &line,
+                &mut grid(16.0, edge),
+                &mut Vec::new(),
+                &mut Between::default(),
+            )
+            .unwrap();
             let truth = distance_to(slope, offset);
             squares += (line.distance() - truth).powi(2);
             squares_long += (long.distance() - truth).powi(2);
@@ -291,9 +316,17 @@ mod tests {
             ),
             (&|v: f64| 0.3 + 0.4 * v + 0.7 * v.max(0.0), "corner"),
         ] {
-            let line = separate(&mut grid(8.0, edge)).unwrap();
+            let line = separate(&mut grid(8.0, edge), &mut Between::default()).unwrap();
             assert!((line.distance() + 0.3).abs() < 0.4, "{name} {line:?}");
-            assert!(lengthen(&line, &mut grid(16.0, edge), &mut Vec::new()).is_none());
+            assert!(
+                lengthen(
+                    &line,
+                    &mut grid(16.0, edge),
+                    &mut Vec::new(),
+                    &mut Between::default()
+                )
+                .is_none()
+            );
         }
     }
 
@@ -309,8 +342,8 @@ mod tests {
             changed += 1;
         }
         assert!((4..=6).contains(&changed));
-        let clean = separate(&mut grid(9.0, edge)).unwrap();
-        let line = separate(&mut samples).unwrap();
+        let clean = separate(&mut grid(9.0, edge), &mut Between::default()).unwrap();
+        let line = separate(&mut samples, &mut Between::default()).unwrap();
         assert!(
             (line.distance() - clean.distance()).abs() < 0.05,
             "{line:?}"
@@ -323,6 +356,6 @@ mod tests {
         for (k, s) in samples.iter_mut().enumerate() {
             s.label = if k % 2 == 0 { 1.0 } else { -1.0 };
         }
-        assert!(separate(&mut samples).is_none());
+        assert!(separate(&mut samples, &mut Between::default()).is_none());
     }
 }

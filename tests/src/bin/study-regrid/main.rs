@@ -31,7 +31,8 @@ struct Options {
     /// One scan of a few cases, without peers or table; fails where a bar is missed
     #[arg(long)]
     short: bool,
-    /// The scans looked at while tuning, not those for figures; no table is written
+    /// The scans looked at while tuning, not those for figures, by consensus alone; no table
+    /// is written
     #[arg(long)]
     tune: bool,
     /// Leave out what other programs make of the same samples
@@ -85,7 +86,7 @@ fn run(options: &Options) -> Result<()> {
         (false, true) => 1..=10,
         (false, false) => 101..=110,
     };
-    let estimators: &[(&str, Estimator)] = if options.short {
+    let estimators: &[(&str, Estimator)] = if options.short || options.tune {
         &[("consensus", Estimator::Consensus)]
     } else {
         &[
