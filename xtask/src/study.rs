@@ -9,6 +9,13 @@ use crate::shell;
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Study {
+    /// Hold the CAD models of recorded scans against the samples.
+    #[command(disable_help_flag = true)]
+    RealScans {
+        /// Options of the study; `--help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
     /// Score the regridder on a plane pair with a step, among outliers.
     #[command(disable_help_flag = true)]
     Regrid {
@@ -35,6 +42,7 @@ pub(crate) enum Study {
 pub(crate) fn run(study: &Study) -> Result<()> {
     match study {
         Study::Outline { options } => program("study-outline", options),
+        Study::RealScans { options } => program("study-real-scans", options),
         Study::Regrid { options } => program("study-regrid", options),
         Study::Segmentation { options } => program("study-segmentation", options),
     }

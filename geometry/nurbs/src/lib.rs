@@ -10,6 +10,7 @@ pub mod fit;
 pub mod knots;
 pub mod piecewise;
 pub mod surface;
+pub mod uniform;
 
 pub use banded::{BandedCholesky, BandedMatrix, Singular};
 pub use curve::{BSplineCurve, ControlCountError};
@@ -17,3 +18,4 @@ pub use fit::{Observation, TensorSpline, thirds};
 pub use knots::{Basis, KnotError, KnotVector, MAX_DEGREE};
 pub use piecewise::{PatchSurface, PiecewiseCubic, PiecewiseError, cubic_through_thirds};
 pub use surface::BSplineSurface;
+pub use uniform::{Parameter, UniformSpline};

@@ -1,25 +1,16 @@
 //! Surfaces of regions.
 
+use nurbs::uniform::Lines;
 use nurbs::{KnotVector, Observation, PatchSurface, TensorSpline};
 use range_image::RangeImage;
 
 use crate::extension::{ExtendedRegion, NodeRectangle, extend};
+use crate::refine;
 
-/// Degree of the fitted splines: bi-quadratic, as in section III.
+pub use crate::refine::Demand;
+
+/// Degree of the splines over whole rectangles: bi-quadratic, as in section III.
 pub const DEGREE: usize = 2;
-
-/// Numbers of spans along the longer side that are tried, besides the greatest allowed.
-const LADDER: [usize; 9] = [1, 2, 3, 4, 6, 8, 12, 16, 20];
-
-/// A span is at least this many pitches wide, so that it averages over the noise that
-/// neighbouring nodes share.
-const MIN_SPAN_PITCHES: f64 = 4.0;
-
-/// More knots must lower the cross-validation score by this factor to be taken.
-const WORTHWHILE: f64 = 0.95;
-
-/// Weight of bending against data: carries surfaces on where there are none.
-const BENDING: f64 = 1e-5;
 
 /// Residuals beyond this many robust standard deviations count as mistakes.
 const GROSS: f64 = 8.0;
@@ -138,98 +129,28 @@ pub fn patches_through_nodes(
     })?)
 }
 
-/// Patches that are the spans of a spline fitted to the observations alone and carried
-/// on with little bending to the borders of `domain`. Knots are added while they pay:
-/// until the root mean square residual is within `tolerance_mm` or generalised
-/// cross-validation sees no gain. Few grossly wrong values do not count.
+/// Patches of a bicubic spline with continuous curvature, fitted to the observations
+/// alone and refined where they ask for it. Few grossly wrong values do not count.
+/// Observations should come line by line of equal u.
 ///
 /// # Errors
-/// [`FitError`] when the observations lie on a line or are fewer than four.
+/// [`FitError`] when the observations lie on a line or are fewer than three.
 pub fn patches_from_spline(
     observations: &mut [Observation],
     domain: &Domain,
-    pitch_mm: f64,
-    tolerance_mm: f64,
-    max_spans: usize,
+    demand: &Demand,
 ) -> Result<PatchSurface, FitError> {
-    let mut spline = climb(observations, domain, pitch_mm, tolerance_mm, max_spans)?;
-    if reweigh(
-        &spline,
-        observations,
-        |size| if size > GROSS { 0.0 } else { 1.0 },
-    ) {
-        spline = climb(observations, domain, pitch_mm, tolerance_mm, max_spans)?;
-    }
-    for _ in 0..2 {
-        if !reweigh(&spline, observations, |size| (HUBER / size).min(1.0)) {
-            break;
-        }
-        let (u, v) = (spline.u_knots().clone(), spline.v_knots().clone());
-        spline = TensorSpline::fit_scattered(u, v, observations, BENDING)?;
+    let mut spline = refine::fit(observations, domain, demand)?;
+    let residuals = spline.residuals(&Lines::new(observations));
+    if reweigh(&residuals, observations) {
+        spline = refine::fit(observations, domain, demand)?;
     }
     Ok(spline.to_patches()?)
 }
 
-/// Fits with more and more knots, and keeps the last that paid.
-fn climb(
-    observations: &[Observation],
-    domain: &Domain,
-    pitch_mm: f64,
-    tolerance_mm: f64,
-    max_spans: usize,
-) -> Result<TensorSpline, FitError> {
-    let (width, height) = (domain.x_mm.1 - domain.x_mm.0, domain.y_mm.1 - domain.y_mm.0);
-    let longer = width.max(height);
-    let most = ((longer / (MIN_SPAN_PITCHES * pitch_mm)) as usize).clamp(1, max_spans);
-    let data: f64 = observations.iter().map(|o| o.weight).sum();
-    let mut best: Option<(f64, TensorSpline)> = None;
-    let mut failures = 0;
-    for spans in LADDER.into_iter().filter(|&n| n < most).chain([most]) {
-        let side = |length: f64| ((length / longer * spans as f64).round() as usize).max(1);
-        let u = KnotVector::uniform(DEGREE, side(width), domain.x_mm.0, domain.x_mm.1)?;
-        let v = KnotVector::uniform(DEGREE, side(height), domain.y_mm.0, domain.y_mm.1)?;
-        let unknowns = (u.control_count() * v.control_count()) as f64;
-        let spline = TensorSpline::fit_scattered(u, v, observations, BENDING)?;
-        let residuals = residuals(&spline, observations);
-        let squares = residuals
-            .iter()
-            .zip(observations)
-            .map(|(r, o)| o.weight * r * r);
-        let mean_square = squares.sum::<f64>() / data;
-        // Not every unknown meets data; counting all is on the cautious side.
-        let freedom = 1.0 - (unknowns / data).min(0.9);
-        let score = mean_square / (freedom * freedom);
-        if best
-            .as_ref()
-            .is_none_or(|(least, _)| score < WORTHWHILE * least)
-        {
-            best = Some((score, spline));
-            failures = 0;
-        } else {
-            failures += 1;
-        }
-        if mean_square.sqrt() <= tolerance_mm || failures == 3 {
-            break;
-        }
-    }
-    best.map(|b| b.1).ok_or(FitError::Empty)
-}
-
-fn residuals(spline: &TensorSpline, observations: &[Observation]) -> Vec<f64> {
-    observations
-        .iter()
-        .map(|o| o.value - spline.value(o.u, o.v))
-        .collect()
-}
-
-/// Gives each observation the weight of its residual in robust standard deviations; false
-/// when every one keeps full weight.
-fn reweigh(
-    spline: &TensorSpline,
-    observations: &mut [Observation],
-    weight: impl Fn(f64) -> f64,
-) -> bool {
-    let residuals = residuals(spline, observations);
+/// Gives each observation the weight that its residual leaves it; false when every one
+/// keeps full weight.
+fn reweigh(residuals: &[f64], observations: &mut [Observation]) -> bool {
     let mut sizes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
     let middle = sizes.len() / 2;
     if sizes.is_empty() {
@@ -242,8 +163,13 @@ fn reweigh(
         return false;
     }
     let mut changed = false;
-    for (o, r) in observations.iter_mut().zip(&residuals) {
-        o.weight = weight(r.abs() / sigma);
+    for (o, r) in observations.iter_mut().zip(residuals) {
+        let size = r.abs() / sigma;
+        o.weight = if size > GROSS {
+            0.0
+        } else {
+            (HUBER / size).min(1.0)
+        };
         changed |= o.weight < 1.0;
     }
     changed
@@ -280,6 +206,15 @@ mod tests {
         }
     }
 
+    fn demand(tolerance_mm: f64) -> Demand {
+        Demand {
+            tolerance_mm,
+            noise_density_mm2: 1e-6,
+            least_span_mm: 1.0,
+            most_spans: 100,
+        }
+    }
+
     fn observations(image: &RangeImage, member: impl Fn(usize, usize) -> bool) -> Vec<Observation> {
         let mut seen = Vec::new();
         for column in 0..image.columns() {
@@ -302,7 +237,7 @@ mod tests {
         let plane = |x: f64, y: f64| 3.0 + 0.4 * x - 0.7 * y;
         let image = image(plane);
         let mut seen = observations(&image, disc(&image));
-        let surface = patches_from_spline(&mut seen, &domain(&image), 0.5, 0.01, 25).unwrap();
+        let surface = patches_from_spline(&mut seen, &domain(&image), &demand(0.01)).unwrap();
         assert_eq!(surface.patches.len(), 1);
         for o in &seen {
             assert!((surface.z(o.u, o.v) - o.value).abs() < 1e-9);
@@ -317,7 +252,7 @@ mod tests {
         for k in (0..seen.len()).step_by(97) {
             seen[k].value += 5.0;
         }
-        let surface = patches_from_spline(&mut seen, &domain(&image), 0.5, 1e-3, 25).unwrap();
+        let surface = patches_from_spline(&mut seen, &domain(&image), &demand(1e-3)).unwrap();
         let worst = seen
             .iter()
             .map(|o| (surface.z(o.u, o.v) - wave(o.u, o.v)).abs())

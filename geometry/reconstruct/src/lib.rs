@@ -19,7 +19,9 @@ pub mod settings;
 mod assemble;
 mod border;
 mod lift;
+mod noise;
 mod pieces;
+mod refine;
 mod run;
 #[cfg(test)]
 mod testing;

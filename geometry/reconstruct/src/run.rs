@@ -7,9 +7,10 @@ use crate::assemble::{Carrier, Placement, domains, model};
 use crate::border::cracks::trace;
 use crate::border::intersection::intersections;
 use crate::border::map::{BorderSettings, PlanarMap, build};
-use crate::fit::{Domain, FitError, patches_from_spline, patches_through_nodes};
+use crate::fit::{Demand, Domain, FitError, patches_from_spline, patches_through_nodes};
 use crate::metrics::{Metrics, compare, psnr_db};
 use crate::model::{Model, Surface};
+use crate::noise::ImageNoise;
 use crate::pieces::{PieceLimits, PieceMap};
 use crate::settings::{Method, ReconstructError, ReconstructSettings};
 use crate::trim::Trim;
@@ -54,11 +55,14 @@ pub struct RegionFit {
     pub psnr_db: f64,
 }
 
-/// A node with its place and height in millimetres.
 /// Margin of a surface around the nodes of its region, pitches: half of one to the
 /// border, and what smoothing may do.
 const SURFACE_MARGIN: f64 = 3.0;
 
+/// Narrowest span of a fitted spline, pitches.
+const LEAST_SPAN: f64 = 2.0;
+
+/// A node with its place and height in millimetres.
 #[derive(Debug, Clone, Copy)]
 struct Node {
     column: usize,
@@ -99,6 +103,7 @@ pub fn reconstruct(
     };
     let nodes = nodes_of(image, map, &pieces);
     let placement = Placement::of(image);
+    let noise = ImageNoise::of(image);
     let cracks = trace(&pieces);
     let failed = |region: u16| {
         move |e: FitError| ReconstructError::Fit {
@@ -112,7 +117,7 @@ pub fn reconstruct(
         for (k, nodes) in nodes.iter().enumerate() {
             monitor.check()?;
             let domain = around(image, nodes).ok_or(FitError::Empty);
-            let surface = domain.and_then(|domain| surface(image, nodes, &domain, settings));
+            let surface = domain.and_then(|domain| surface(image, nodes, &domain, &noise, settings));
             early.push(surface.map_err(failed(pieces.regions[k]))?);
         }
     }
@@ -129,7 +134,7 @@ pub fn reconstruct(
         let domain = domain.ok_or(FitError::Empty).map_err(failed(region))?;
         let surface = match early.get(k) {
             Some(surface) if domain.is_within(surface) => surface.clone(),
-            _ => surface(image, &nodes[k], &domain, settings).map_err(failed(region))?,
+            _ => surface(image, &nodes[k], &domain, &noise, settings).map_err(failed(region))?,
         };
         let rms_mm = tally(&mut fits, region, image, &nodes[k], &surface);
         carriers.push(Carrier {
@@ -221,6 +226,7 @@ fn surface(
     image: &RangeImage,
     nodes: &[Node],
     domain: &Domain,
+    noise: &ImageNoise,
     settings: &ReconstructSettings,
 ) -> Result<PatchSurface, FitError> {
     match settings.method {
@@ -234,13 +240,14 @@ fn surface(
                     weight: 1.0,
                 })
                 .collect();
-            patches_from_spline(
-                &mut observations,
-                domain,
-                image.pitch_mm(),
-                settings.tolerance_mm,
-                settings.knots_per_side - 1,
-            )
+            let qualities = nodes.iter().filter_map(|n| image.quality(n.column, n.row));
+            let demand = Demand {
+                tolerance_mm: settings.tolerance_mm,
+                noise_density_mm2: noise.density_mm2(qualities),
+                least_span_mm: LEAST_SPAN * image.pitch_mm(),
+                most_spans: settings.knots_per_side - 1,
+            };
+            patches_from_spline(&mut observations, domain, &demand)
         }
         Method::ShimLee => {
             let mut member = vec![false; image.raw_z_mm().len()];

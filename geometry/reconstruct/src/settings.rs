@@ -20,12 +20,13 @@ pub struct ReconstructSettings {
     /// How faces are made.
     pub method: Method,
     /// Root mean square residual at which the fitted spline gets no further knots, even
-    /// if those would bring it nearer; millimetres. Method [`Method::Relief`] only.
+    /// if those would bring it nearer, and the least change of it that is worth knots;
+    /// millimetres. Method [`Method::Relief`] only.
     pub tolerance_mm: f64,
-    /// Distinct knots ("nodes" in the paper) of the fitted spline along the longer side
-    /// of a region, ends included: one more than there are spans. The paper's Table 1
-    /// has 26 along each side. [`Method::Relief`] takes fewer where the data give no
-    /// reason for more.
+    /// Most distinct knots ("nodes" in the paper) of a fitted spline along a side, ends
+    /// included: one more than there are spans. As many are taken as the data give reason
+    /// for. The comparison of the paper's Table 1 has 26 whatever is set here.
+    /// [`Method::Relief`] only.
     pub knots_per_side: usize,
     /// Grid pitches between the points that cut a patch in thirds, so that a patch is
     /// three times as wide. The paper gives neither this nor M and N; 2 keeps most of
@@ -50,7 +51,7 @@ impl Default for ReconstructSettings {
         Self {
             method: Method::Relief,
             tolerance_mm: 0.01,
-            knots_per_side: 26,
+            knots_per_side: 257,
             patch_third_nodes: 2,
             corner_angle_rad: 0.35,
             piece_price_pitch2: 7.0,
@@ -98,8 +99,8 @@ impl ReconstructSettings {
             "knots_per_side",
             count(self.knots_per_side),
             2.0,
-            101.0,
-            "from 2 to 101",
+            1025.0,
+            "from 2 to 1025",
         )?;
         check(
             "patch_third_nodes",
@@ -220,6 +221,6 @@ mod tests {
             ..Default::default()
         };
         let message = bad.validate().unwrap_err().to_string();
-        assert_eq!(message, "knots_per_side is 1, but must be from 2 to 101");
+        assert_eq!(message, "knots_per_side is 1, but must be from 2 to 1025");
     }
 }
