@@ -141,7 +141,7 @@ pub struct ReconstructConfig {
         skip_serializing_if = "Option::is_none"
     )]
     pub tolerance_mm: Option<f64>,
-    /// Most knots of a fitted spline along the longer side of a region.
+    /// Most knots of a fitted spline along a side; method `relief` only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub knots_per_side: Option<usize>,
     /// Width of a patch in thirds, in grid pitches; method `shim-lee` only.

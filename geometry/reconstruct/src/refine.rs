@@ -69,8 +69,8 @@ pub(crate) fn fit(
                 Parameter::U => columns,
                 Parameter::V => rows,
             } - 3;
-            let allowed = spline.span(along) >= 2.0 * demand.least_span_mm
-                && 2 * spans <= demand.most_spans;
+            let allowed =
+                spline.span(along) >= 2.0 * demand.least_span_mm && 2 * spans <= demand.most_spans;
             allowed.then(|| Candidate::new(&spline, along, &lines, &residuals, demand))
         });
         let [u, v] = candidates;

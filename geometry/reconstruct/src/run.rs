@@ -117,7 +117,8 @@ pub fn reconstruct(
         for (k, nodes) in nodes.iter().enumerate() {
             monitor.check()?;
             let domain = around(image, nodes).ok_or(FitError::Empty);
-            let surface = domain.and_then(|domain| surface(image, nodes, &domain, &noise, settings));
+            let surface =
+                domain.and_then(|domain| surface(image, nodes, &domain, &noise, settings));
             early.push(surface.map_err(failed(pieces.regions[k]))?);
         }
     }

@@ -323,7 +323,10 @@ mod tests {
         }
         let fine = coarse.halved(Parameter::U).halved(Parameter::V);
         for k in 0..50 {
-            let (u, v) = (-3.0 + 0.16 * f64::from(k), 0.5 + 0.14 * f64::from(k * 17 % 50));
+            let (u, v) = (
+                -3.0 + 0.16 * f64::from(k),
+                0.5 + 0.14 * f64::from(k * 17 % 50),
+            );
             assert!((coarse.value(u, v) - fine.value(u, v)).abs() < 1e-12);
         }
     }

@@ -84,7 +84,10 @@ fn columns(scan: PointScan) -> Recording {
 fn height_map(bytes: &[u8]) -> Result<Vec<[f64; 3]>> {
     let mut rest = bytes;
     let mut line = || -> Result<String> {
-        let end = rest.iter().position(|b| *b == b'\n').context("it ends early")?;
+        let end = rest
+            .iter()
+            .position(|b| *b == b'\n')
+            .context("it ends early")?;
         let (head, tail) = rest.split_at(end);
         rest = tail.get(1..).unwrap_or_default();
         Ok(String::from_utf8_lossy(head).into_owned())
@@ -95,7 +98,9 @@ fn height_map(bytes: &[u8]) -> Result<Vec<[f64; 3]>> {
     ensure!(line()? == "65535", "its values are not of 16 bits");
     let scale = |name: &str| -> Result<f64> {
         let words = comment.split_whitespace();
-        let found = words.filter_map(|w| w.split_once('=')).find(|w| w.0 == name);
+        let found = words
+            .filter_map(|w| w.split_once('='))
+            .find(|w| w.0 == name);
         let (_, value) = found.with_context(|| format!("its comment lacks {name}"))?;
         Ok(value.parse()?)
     };
@@ -122,7 +127,8 @@ mod tests {
 
     #[test]
     fn a_height_map_is_read_row_by_row() {
-        let mut bytes = b"P5\n# px_x_mm=0.5 px_y_mm=2 px_z_mm=0.01 missing=0\n3 2\n65535\n".to_vec();
+        let mut bytes =
+            b"P5\n# px_x_mm=0.5 px_y_mm=2 px_z_mm=0.01 missing=0\n3 2\n65535\n".to_vec();
         for value in [0_u16, 100, 0, 300, 0, 65535] {
             bytes.extend(value.to_be_bytes());
         }

@@ -172,6 +172,10 @@ fn check(cases: &[Case], options: &Options) -> Result<()> {
         !near || case.all.coverage() < coverage
     });
     let names: Vec<&str> = failing.map(|case| case.name.as_str()).collect();
-    ensure!(names.is_empty(), "the bar does not hold for {}", names.join(", "));
+    ensure!(
+        names.is_empty(),
+        "the bar does not hold for {}",
+        names.join(", ")
+    );
     Ok(())
 }

@@ -82,7 +82,10 @@ impl<'a> Outline<'a> {
 
     /// Where the line at this x enters and leaves the face, in turns.
     fn crossings(&self, x: f64) -> Vec<f64> {
-        let crossed = self.sides.iter().filter(|[a, b]| (a[0] <= x) != (b[0] <= x));
+        let crossed = self
+            .sides
+            .iter()
+            .filter(|[a, b]| (a[0] <= x) != (b[0] <= x));
         let mut crossings: Vec<f64> = crossed
             .map(|[a, b]| a[1] + (b[1] - a[1]) * (x - a[0]) / (b[0] - a[0]))
             .collect();
