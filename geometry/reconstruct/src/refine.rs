@@ -16,7 +16,7 @@ use crate::fit::Domain;
 /// least this part of the functions on spans of one size takes as much. In normal noise
 /// one function in 200 takes 8 times as much, one in 5000 14 times; where many more do,
 /// few of them are accidents (Benjamini & Hochberg 1995). Nodes from least medians have
-/// longer tails: on planes of 40,000 nodes up to 40 times has been seen.
+/// longer tails: of three planes of 40,000 nodes one had more than 36 times, none 50.
 const SIGNIFICANT: [(f64, f64); 3] = [(8.0, 0.1), (14.0, 0.03), (50.0, 0.0)];
 
 /// Price of a term of the polynomial, in the noise's density.
