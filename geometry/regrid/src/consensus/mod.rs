@@ -8,6 +8,7 @@
 //! samples that the best surface leaves over agree among themselves on another one, the
 //! places of both surfaces' samples tell on whose side of the edge the node lies.
 
+mod bend;
 mod between;
 mod node;
 mod noise;

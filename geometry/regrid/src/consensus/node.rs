@@ -1,5 +1,6 @@
 //! Which of the surfaces near a node is its own, and z there.
 
+use super::bend::straighten;
 use super::between::Between;
 use super::side::{Labelled, lengthen, separate};
 use super::surfaces::{Effort, PlaneSums, Surface, Surfaces};
@@ -280,7 +281,7 @@ fn settle(surface: &mut Surface, samples: &[Neighbour], most: usize) {
         }
         // Of the same samples comes the same plane.
         if before == (inliers, places) {
-            return;
+            break;
         }
         before = (inliers, places);
         let Some(change) = sums.plane() else {
@@ -291,4 +292,5 @@ fn settle(surface: &mut Surface, samples: &[Neighbour], most: usize) {
         surface.plane.c += change.c;
         surface.inliers = inliers;
     }
+    straighten(surface, samples, most);
 }
