@@ -3,18 +3,21 @@
 //! ```sh
 //! cargo xtask study real-scans                          # a table of all recordings
 //! cargo xtask study real-scans --only bun000 --regions  # and one of each region
-//! cargo xtask study real-scans --sheets 3            # simulated sheets, truth known
+//! cargo xtask study real-scans --sheets 3                # simulated sheets, truth known
 //! ```
 
 mod files;
+mod report;
 mod residuals;
 mod sheets;
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
 use clap::Parser;
+use deliverables::picture;
 use pipeline::{Method, Outcome, Settings, process_columns};
 use range_image::{RangeImage, Unmonitored};
 
@@ -36,6 +39,12 @@ struct Options {
     /// A table of the regions of each recording, too
     #[arg(long)]
     regions: bool,
+    /// Write the range image and the regions of each recording as PNG files into this folder
+    #[arg(long, value_name = "DIR")]
+    pictures: Option<PathBuf>,
+    /// Write the table as a page
+    #[arg(long, value_name = "FILE")]
+    write: Option<PathBuf>,
     /// Instead of recordings, fit this many scans of each simulated sheet, whose truth is
     /// known
     #[arg(long, value_name = "SCANS")]
@@ -59,16 +68,15 @@ fn main() -> ExitCode {
     }
 }
 
-/// The part of a scan's samples for which the model must hold.
-const NEAREST: f64 = 0.97;
-
 /// A recording and what became of it.
-struct Case {
-    name: String,
-    image: RangeImage,
-    outcome: Outcome,
-    all: Residuals,
-    each: Vec<Residuals>,
+pub(crate) struct Case {
+    pub(crate) name: String,
+    pub(crate) image: RangeImage,
+    pub(crate) outcome: Outcome,
+    /// Of all samples.
+    pub(crate) all: Residuals,
+    /// Of those within each face.
+    pub(crate) each: Vec<Residuals>,
 }
 
 fn study(options: &Options) -> Result<()> {
@@ -84,11 +92,15 @@ fn study(options: &Options) -> Result<()> {
     for path in &files {
         cases.push(case(path, options).with_context(|| path.display().to_string())?);
     }
-    print!("{}", table(&cases));
+    print!("{}", report::table(&cases));
     if options.regions {
         for case in &cases {
-            print!("\n{}", of_regions(case));
+            print!("\n{}", report::of_regions(case));
         }
+    }
+    if let Some(page) = &options.write {
+        std::fs::write(page, report::page(&cases))
+            .with_context(|| format!("cannot write {}", page.display()))?;
     }
     check(&cases, options)
 }
@@ -100,10 +112,12 @@ fn case(path: &Path, options: &Options) -> Result<Case> {
     let (image, outcome) = process_columns(columns.iter().cloned(), &settings, &Unmonitored)?;
     let faces = &outcome.reconstruction.model.faces;
     let (all, each) = residuals(&columns, &image, &outcome.regions, faces);
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned());
-    let name = name.unwrap_or_default();
+    let name = files::name(path);
+    if let Some(folder) = &options.pictures {
+        pictures(folder, &name, &image, &outcome)?;
+    }
     Ok(Case {
-        name: name.split('.').next().unwrap_or(&name).to_owned(),
+        name,
         image,
         outcome,
         all,
@@ -111,57 +125,16 @@ fn case(path: &Path, options: &Options) -> Result<Case> {
     })
 }
 
-fn table(cases: &[Case]) -> String {
-    let mut text = String::from(
-        "| recording | pitch, mm | samples | regions | faces | patches | samples within faces \
-         | of these within three sigma | rms along the normal, mm | rms of the nearest 97 %, mm |\n\
-         | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
-    );
-    for case in cases {
-        let reconstruction = &case.outcome.reconstruction;
-        let patches: usize = reconstruction.regions.iter().map(|r| r.patches).sum();
-        text += &format!(
-            "| {} | {} | {} | {} | {} | {} | {:.1} % | {:.1} % | {:.3} | {:.3} |\n",
-            case.name,
-            case.image.pitch_mm(),
-            case.all.samples,
-            case.outcome.regions.regions(),
-            reconstruction.model.faces.len(),
-            patches,
-            100.0 * case.all.coverage(),
-            100.0 * case.all.near_share(),
-            case.all.rms_mm(),
-            case.all.rms_of_nearest_mm(NEAREST),
-        );
-    }
-    text
-}
-
-fn of_regions(case: &Case) -> String {
-    let mut text = format!(
-        "{}\n\n| face | nodes | patches | rms of the nodes, mm | samples | within three sigma \
-         | rms along the normal, mm |\n| --- | ---: | ---: | ---: | ---: | ---: | ---: |\n",
-        case.name
-    );
-    let reconstruction = &case.outcome.reconstruction;
-    for (face, residuals) in reconstruction.model.faces.iter().zip(&case.each) {
-        let mut fits = reconstruction.regions.iter();
-        let Some(fit) = fits.find(|fit| fit.label == face.region) else {
-            continue;
-        };
-        let reconstruct::Surface::Patches(surface) = &face.surface;
-        text += &format!(
-            "| {} | {} | {} | {:.3} | {} | {:.1} % | {:.3} |\n",
-            face.name,
-            fit.nodes,
-            surface.patches.len(),
-            fit.rms_mm,
-            residuals.samples,
-            100.0 * residuals.near_share(),
-            residuals.rms_mm(),
-        );
-    }
-    text
+fn pictures(folder: &Path, name: &str, image: &RangeImage, outcome: &Outcome) -> Result<()> {
+    std::fs::create_dir_all(folder)?;
+    let file = |what: &str| {
+        let path = folder.join(format!("{name}-{what}.png"));
+        let made = File::create(&path);
+        made.with_context(|| format!("cannot write {}", path.display()))
+    };
+    picture::write_range(image, name, file("range")?)?;
+    picture::write_regions(image, outcome, &[], name, file("regions")?)?;
+    Ok(())
 }
 
 fn check(cases: &[Case], options: &Options) -> Result<()> {
