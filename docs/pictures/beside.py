@@ -1,6 +1,6 @@
 """Puts pictures side by side at one height.
 
-    python beside.py OUT.png LEFT.png [...] [--height PIXELS]
+    python beside.py OUT.png LEFT.png [...] [--height PIXELS] [--colours NUMBER]
 
 Needs the package pillow.
 """
@@ -15,6 +15,7 @@ def main():
     parser.add_argument("out")
     parser.add_argument("pictures", nargs="+")
     parser.add_argument("--height", type=int, default=480)
+    parser.add_argument("--colours", type=int, help="as few as these make a small file")
     options = parser.parse_args()
     pictures = [Image.open(path).convert("RGB") for path in options.pictures]
     scaled = [p.resize((round(p.width * options.height / p.height), options.height)) for p in pictures]
@@ -23,6 +24,8 @@ def main():
     for picture in scaled:
         sheet.paste(picture, (x, 0))
         x += picture.width
+    if options.colours:
+        sheet = sheet.quantize(options.colours, dither=Image.Dither.NONE)
     sheet.save(options.out, optimize=True)
 
 

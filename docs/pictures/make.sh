@@ -3,8 +3,8 @@
 #
 #   docs/pictures/make.sh [PYTHON]
 #
-# PYTHON has cadquery-ocp, matplotlib and pillow. The recorded scan is drawn where it is
-# to be had (../shared/data beside the repository).
+# PYTHON has cadquery-ocp, matplotlib and pillow. Recorded scans are drawn where they are to
+# be had (../shared/data beside the repository), with their table in docs/studies.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 python=${1:-python3}
@@ -25,4 +25,14 @@ if [ -e "$scan" ]; then
         --elevation 20 --azimuth=-75
     "$python" docs/pictures/beside.py docs/pictures/bunny.png \
         "$work/bunny/range.png" "$work/bunny/regions.png" "$work/bunny.png"
+fi
+
+if [ -d ../shared/data ]; then
+    cargo xtask study real-scans --pictures "$work/real" --write docs/studies/real-scans.md
+    mkdir -p docs/pictures/real
+    for range in "$work"/real/*-range.png; do
+        name=$(basename "$range" -range.png)
+        "$python" docs/pictures/beside.py "docs/pictures/real/$name.png" \
+            "$range" "$work/real/$name-regions.png" --height 420 --colours 96
+    done
 fi

@@ -168,7 +168,7 @@ pub struct RegridSettings {
     pub pitch_mm: f64,
     /// M: samples in a node's window. At most half of them come from one column, so that
     /// columns far apart with dense samples still span a plane. Default
-    /// [`Estimator::neighbours`]: of noise of 0.05 mm on a plane 49 samples leave 0.0083 mm
+    /// [`Estimator::neighbours`]: of noise of 0.05 mm on a plane 49 samples leave 0.0085 mm
     /// by consensus, which takes z from the nearest four fifths, and 32 leave 0.021 mm by the
     /// median. By consensus the window grows with the share of outliers, to as many samples
     /// without any.
