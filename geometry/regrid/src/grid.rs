@@ -158,6 +158,8 @@ impl GridWorker {
             let conditions = Conditions {
                 noise_mm: noise_mm.min(allowed_mm).max(least_mm),
                 most_noise_mm: allowed_mm.max(4.0 * noise_mm),
+                // A window that is not full may be of lone ones.
+                strays: !dense || node.noise.is_none_or(|noise| noise.clean_share < 1.0),
                 spacing,
                 effort: Effort {
                     most_planes: PLANES_PER_DRAW * settings.draws,
@@ -196,7 +198,7 @@ impl GridWorker {
                     self.surroundings
                         .supported(&self.samples, spacing, &support, agrees);
                 let quality = || quality(&self.samples, &fit.plane, |n| surface.holds(n));
-                supported.then(|| (fit.plane.c, quality()))
+                supported.then(|| (fit.plane.c + surface.lift_mm, quality()))
             });
         }
         while self.samples.len() >= LEAST_WINDOW {

@@ -12,13 +12,13 @@ const SIGNIFICANT: f64 = 5.0;
 /// Terms of a quadratic, of which a plane has three.
 const TERMS: usize = 6;
 
-/// Brings the surface nearer at the node where its samples, the nearest `most` of those that
-/// agree, bend away from its plane: a plane runs through the middle of a hollow's samples,
-/// and so above its ground.
-pub(crate) fn straighten(surface: &mut Surface, samples: &[Neighbour], most: usize) {
+/// How far the surface is above its plane at the node, in millimetres, where its samples, the
+/// nearest `most` of those that agree, bend away from that plane: it runs through the middle
+/// of a hollow's samples, and so above its ground. 0 where they do not bend.
+pub(crate) fn lift_mm(surface: &Surface, samples: &[Neighbour], most: usize) -> f64 {
     let agree = || samples.iter().filter(|n| surface.holds(n)).take(most);
     let Some(farthest) = agree().last() else {
-        return;
+        return 0.0;
     };
     let scale = 1.0 / farthest.distance2.max(f64::MIN_POSITIVE).sqrt();
     let mut matrix = [[0.0; TERMS]; TERMS];
@@ -36,17 +36,17 @@ pub(crate) fn straighten(surface: &mut Surface, samples: &[Neighbour], most: usi
         flat += off_mm * off_mm;
     }
     if number < LEAST_SAMPLES {
-        return;
+        return 0.0;
     }
     let Some(solution) = solve(matrix, right) else {
-        return;
+        return 0.0;
     };
     let taken: f64 = solution.iter().zip(&right).map(|(x, r)| x * r).sum();
     let left = (flat - taken).max(0.0) / (number - TERMS) as f64;
     if taken / 3.0 > SIGNIFICANT * left {
-        surface.plane.c += solution[0];
-        surface.plane.a += scale * solution[1];
-        surface.plane.b += scale * solution[2];
+        solution[0]
+    } else {
+        0.0
     }
 }
 
@@ -78,17 +78,16 @@ mod tests {
             plane: Plane { a: 0.1, b: 0.0, c },
             width_mm: 0.5,
             inliers: 0,
+            lift_mm: 0.0,
         }
     }
 
     #[test]
     fn the_ground_of_a_hollow_is_met() {
         let hollow = |x: f64, y: f64| 2.0 + 0.1 * x + 0.02 * (x * x + y * y);
-        // The plane through the middle of the samples lies a tenth above the ground.
-        let mut surface = surface(2.13);
-        straighten(&mut surface, &samples(hollow), 39);
-        assert!((surface.plane.c - 2.0).abs() < 1e-9, "{surface:?}");
-        assert!((surface.plane.a - 0.1).abs() < 1e-9, "{surface:?}");
+        // The plane through the middle of the samples lies above the ground.
+        let lift_mm = lift_mm(&surface(2.13), &samples(hollow), 39);
+        assert!((lift_mm + 0.13).abs() < 1e-9, "{lift_mm}");
     }
 
     #[test]
@@ -96,16 +95,13 @@ mod tests {
         // 0.05 up and down, in no order to speak of.
         let noise = |x: f64, y: f64| 0.05 * libm::sin(4e4 * libm::sin(13.0 * x + 78.0 * y));
         let flat = |x: f64, y: f64| 2.0 + 0.1 * x + noise(x, y);
-        let mut surface = surface(2.0);
-        straighten(&mut surface, &samples(flat), 39);
-        assert_eq!(surface.plane.c, 2.0);
+        assert_eq!(lift_mm(&surface(2.0), &samples(flat), 39), 0.0);
     }
 
     #[test]
     fn few_samples_tell_of_no_bend() {
         let hollow = |x: f64, y: f64| 2.0 + 0.1 * x + 0.1 * (x * x + y * y);
-        let mut surface = surface(2.1);
-        straighten(&mut surface, &samples(hollow), LEAST_SAMPLES - 1);
-        assert_eq!(surface.plane.c, 2.1);
+        let few = LEAST_SAMPLES - 1;
+        assert_eq!(lift_mm(&surface(2.1), &samples(hollow), few), 0.0);
     }
 }

@@ -1,6 +1,6 @@
 //! Which of the surfaces near a node is its own, and z there.
 
-use super::bend::straighten;
+use super::bend::lift_mm;
 use super::between::Between;
 use super::side::{Labelled, lengthen, separate};
 use super::surfaces::{Effort, PlaneSums, Surface, Surfaces};
@@ -37,6 +37,8 @@ pub(crate) struct Conditions {
     pub(crate) noise_mm: f64,
     /// The greatest noise believed at a single node, millimetres.
     pub(crate) most_noise_mm: f64,
+    /// Whether there are outliers around, or nothing is known of them.
+    pub(crate) strays: bool,
     /// Local spacing of the samples.
     pub(crate) spacing: Spacing,
     /// How hard surfaces are looked for in a window.
@@ -155,7 +157,12 @@ impl Consensus {
             }
             if let Some(first) = first {
                 let ample = first.inliers as f64 >= ENOUGH * effort.neighbours as f64;
-                let more = f64::from(more_samples(window, first, &mut self.by_strip));
+                let more = f64::from(more_samples(
+                    window,
+                    first,
+                    conditions.strays,
+                    &mut self.by_strip,
+                ));
                 if ample || more < (GAIN - 1.0) * first.inliers as f64 {
                     break;
                 }
@@ -164,7 +171,8 @@ impl Consensus {
         }
         let mut found = self.surfaces.further(window, noise_mm, effort, draws);
         let held: usize = found.iter().map(|s| s.inliers).sum();
-        if noise_mm > conditions.noise_mm && (held as f64) < ENOUGH * effort.neighbours as f64 {
+        let wider = noise_mm > conditions.noise_mm;
+        if conditions.strays && wider && (held as f64) < ENOUGH * effort.neighbours as f64 {
             // Surfaces that are so rough would hold nearly all; these hold outliers, too.
             noise_mm = conditions.noise_mm;
             self.surfaces.first(window, noise_mm, effort, draws);
@@ -218,9 +226,14 @@ impl Consensus {
 }
 
 /// How many more samples of the window would agree with the surface if the noise were twice
-/// what it is, without those of the one column that has most of them: a run of outliers may
-/// happen to lie there.
-fn more_samples(window: &[Neighbour], surface: &Surface, by_strip: &mut Vec<u32>) -> u32 {
+/// what it is; among outliers without those of the one column that has most of them, since a
+/// run of outliers may happen to lie there.
+fn more_samples(
+    window: &[Neighbour],
+    surface: &Surface,
+    strays: bool,
+    by_strip: &mut Vec<u32>,
+) -> u32 {
     by_strip.clear();
     for n in window {
         let off_mm = surface.plane.residual(n).abs();
@@ -231,8 +244,8 @@ fn more_samples(window: &[Neighbour], surface: &Surface, by_strip: &mut Vec<u32>
             by_strip[n.strip] += 1;
         }
     }
-    let most = by_strip.iter().copied().max().unwrap_or(0);
-    by_strip.iter().sum::<u32>() - most
+    let most = by_strip.iter().copied().max().filter(|_| strays);
+    by_strip.iter().sum::<u32>() - most.unwrap_or(0)
 }
 
 /// The samples that lie on one of the two surfaces alone.
@@ -292,5 +305,5 @@ fn settle(surface: &mut Surface, samples: &[Neighbour], most: usize) {
         surface.plane.c += change.c;
         surface.inliers = inliers;
     }
-    straighten(surface, samples, most);
+    surface.lift_mm = lift_mm(surface, samples, most);
 }

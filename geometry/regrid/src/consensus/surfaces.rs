@@ -66,6 +66,8 @@ pub(crate) struct Surface {
     pub(crate) width_mm: f64,
     /// How many samples of the window agree.
     pub(crate) inliers: usize,
+    /// How far above the plane the surface is at the node, where it bends.
+    pub(crate) lift_mm: f64,
 }
 
 impl Surface {
@@ -181,6 +183,7 @@ impl Surfaces {
             plane,
             width_mm,
             inliers: 0,
+            lift_mm: 0.0,
         };
         surface.inliers = window.iter().filter(|n| surface.holds(n)).count();
         self.found.push(surface);
