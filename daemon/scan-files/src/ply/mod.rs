@@ -16,6 +16,8 @@ use vertex::{Skipped, Vertex};
 
 /// Entries read at a time: bounds memory beside the points themselves.
 const CHUNK: usize = 1 << 15;
+/// Bytes after the last entry of a binary file that are taken for padding.
+const PADDING_BYTES: usize = 4;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 pub(crate) fn parse(
@@ -34,13 +36,57 @@ pub(crate) fn parse(
     check(&head, gather)?;
     let units = units(&head, gather);
     widen_ascii(&mut head);
+    let mut after_vertices = false;
     for element in head.elements.values() {
         if element.name == "vertex" {
-            return vertices(&mut reader, &head, element, units, gather);
+            vertices(&mut reader, &head, element, units, gather)?;
+            after_vertices = true;
+        } else if !after_vertices {
+            skip(&mut reader, &head, element, gather)?;
+        } else if let Err(error) = skip(&mut reader, &head, element, gather) {
+            // The vertices have been read; only what nobody needs is wrong.
+            gather.note(format!(
+                "the {} data after the vertices do not fit the header ({error}); check that all \
+                 points are there",
+                element.name
+            ));
+            return Ok(());
         }
-        skip(&mut reader, &head, element, gather)?;
     }
-    Ok(())
+    surplus(&mut reader, &head, gather)
+}
+
+/// Refuses a file with more data than announced, whose points would be lost in silence. A
+/// line end or two after binary data are no harm.
+fn surplus(
+    reader: &mut Reader<impl BufRead>,
+    head: &Header,
+    gather: &Gather<'_>,
+) -> Result<(), ScanFileError> {
+    let ascii = head.encoding == Encoding::Ascii;
+    let failed = |source| ScanFileError::Read {
+        file: gather.file.to_owned(),
+        after: "the last vertex".to_owned(),
+        source,
+    };
+    let mut left = 0;
+    loop {
+        let piece = reader.get_mut().fill_buf().map_err(failed)?;
+        let length = piece.len();
+        let blank = |b: &&u8| ascii && b.is_ascii_whitespace();
+        left += length - piece.iter().filter(blank).count();
+        if length == 0 {
+            return Ok(());
+        }
+        if left > if ascii { 1 } else { PADDING_BYTES } {
+            let vertices = head.elements.get("vertex");
+            return Err(ScanFileError::PlySurplus {
+                file: gather.file.to_owned(),
+                announced: vertices.map_or(0, |element| element.count as u64),
+            });
+        }
+        reader.get_mut().consume(length);
+    }
 }
 
 /// Refuses headers whose data could not be read or would be meaningless.
@@ -169,6 +215,13 @@ fn data_error(
             announced: element.count as u64,
         };
     }
+    if let Some(source) = from_below(error) {
+        return ScanFileError::Read {
+            file,
+            after: format!("{vertices_read} vertices"),
+            source,
+        };
+    }
     let place = match (head.encoding, error.line()) {
         (Encoding::Ascii, Some(line)) => Place::Line(line as u64),
         _ => Place::Vertex(vertices_read + 1),
@@ -176,8 +229,31 @@ fn data_error(
     ScanFileError::PlyData {
         file,
         place,
-        detail: one_line(error),
+        detail: detail(error, head),
     }
+}
+
+/// An error of the source itself, such as damaged compressed data, which the parser hands on.
+fn from_below(error: &ParseError) -> Option<std::io::Error> {
+    let text = one_line(error);
+    (error.kind() == ErrorKind::InvalidData && text.contains("compressed data"))
+        .then(|| std::io::Error::new(ErrorKind::InvalidData, text))
+}
+
+/// What is wrong with the data, in the user's words where the parser has none.
+fn detail(error: &ParseError, head: &Header) -> String {
+    let text = one_line(error);
+    if text.contains("valid UTF-8") && head.encoding == Encoding::Ascii {
+        return "the data are not text, though the header says `format ascii`".into();
+    }
+    if text.contains("unsupported by the destination") {
+        return format!(
+            "a list of more than {} values; the data are damaged, or not in the byte order and \
+             format that the header says",
+            vertex::LONGEST_LIST
+        );
+    }
+    text
 }
 
 /// The parser's message without its line breaks and the line's number, which stands

@@ -5,8 +5,9 @@ use std::ops::Range;
 
 use super::error::ReadError;
 
-/// Largest file that is read, bytes; it is held in memory as a whole.
-pub const MAX_FILE_BYTES: u64 = 1 << 29;
+/// Largest file that is read, bytes; it is held in memory as a whole. Some four million
+/// points fit.
+pub const MAX_FILE_BYTES: u64 = 1 << 27;
 
 /// Columns of a line.
 const COLUMNS: usize = 80;
