@@ -162,9 +162,13 @@ fn vertices(
     let parser = Parser::<Vertex>::new();
     let mut number = 0_u64;
     for chunk in chunks(element) {
-        let rows = parser
-            .read_payload_for_element(reader, &chunk, head)
-            .map_err(|e| data_error(&e, head, element, number, gather))?;
+        let rows = match parser.read_payload_for_element(reader, &chunk, head) {
+            Ok(rows) => rows,
+            Err(error) if is_short(&error) && at_end(reader) => {
+                return Err(truncated(element, gather));
+            }
+            Err(error) => return Err(data_error(&error, head, element, number, gather)),
+        };
         for row in rows {
             number += 1;
             gather.push(row.xyz, row.intensity, units, Place::Vertex(number))?;
@@ -200,6 +204,23 @@ fn chunks(element: &ElementDef) -> impl Iterator<Item = ElementDef> {
     })
 }
 
+fn truncated(element: &ElementDef, gather: &Gather<'_>) -> ScanFileError {
+    ScanFileError::PlyTruncated {
+        file: gather.file.to_owned(),
+        element: element.name.clone(),
+        announced: element.count as u64,
+    }
+}
+
+/// A line of text without all of its values.
+fn is_short(error: &ParseError) -> bool {
+    error.to_string().contains("found nothing")
+}
+
+fn at_end(reader: &mut Reader<impl BufRead>) -> bool {
+    reader.get_mut().fill_buf().is_ok_and(<[u8]>::is_empty)
+}
+
 fn data_error(
     error: &ParseError,
     head: &Header,
@@ -209,11 +230,7 @@ fn data_error(
 ) -> ScanFileError {
     let file = gather.file.to_owned();
     if error.kind() == ErrorKind::UnexpectedEof {
-        return ScanFileError::PlyTruncated {
-            file,
-            element: element.name.clone(),
-            announced: element.count as u64,
-        };
+        return truncated(element, gather);
     }
     if let Some(source) = from_below(error) {
         return ScanFileError::Read {
@@ -245,6 +262,10 @@ fn detail(error: &ParseError, head: &Header) -> String {
     let text = one_line(error);
     if text.contains("valid UTF-8") && head.encoding == Encoding::Ascii {
         return "the data are not text, though the header says `format ascii`".into();
+    }
+    if is_short(error) {
+        let line = text.split('\'').nth(1).unwrap_or_default().trim();
+        return format!("`{line}` has fewer values than the header announces");
     }
     if text.contains("unsupported by the destination") {
         return format!(
