@@ -509,6 +509,11 @@ fn iges_files_that_are_damaged() {
     bench.refuses(
         "cut.igs",
         &sound[..sound.len() / 2],
+        &["this line of", "the file was cut off"],
+    );
+    bench.refuses(
+        "whole_lines.igs",
+        lines[..50].join("\n"),
         &["no Terminate section", "cut off"],
     );
     let tabs = sound.replace("        ", "\t");

@@ -92,7 +92,12 @@ fn gzip_some(bytes: &[u8], dice: &mut Dice) -> io::Result<Vec<u8>> {
 }
 
 fn damage(bytes: &mut Vec<u8>, seeds: &[Seed], dice: &mut Dice) {
-    let times = 1 + dice.below(4);
+    // Much damage is found at once; a little of it goes further.
+    let times = if dice.once_in(2) {
+        1
+    } else {
+        1 + dice.below(4)
+    };
     for _ in 0..times {
         once(bytes, seeds, dice);
     }
@@ -100,7 +105,7 @@ fn damage(bytes: &mut Vec<u8>, seeds: &[Seed], dice: &mut Dice) {
 
 fn once(bytes: &mut Vec<u8>, seeds: &[Seed], dice: &mut Dice) {
     let at = dice.below(bytes.len());
-    match dice.below(12) {
+    match dice.below(16) {
         0 => {
             if let Some(byte) = bytes.get_mut(at) {
                 *byte ^= 1 << dice.below(8);
@@ -154,9 +159,24 @@ fn once(bytes: &mut Vec<u8>, seeds: &[Seed], dice: &mut Dice) {
         _ => {
             if let Some(number) = number_after(bytes, at) {
                 let word = dice.pick(&WORDS).unwrap_or_default();
-                bytes.splice(number, word.bytes());
+                if dice.once_in(3) {
+                    bytes.splice(number, word.bytes());
+                } else {
+                    in_place(bytes, number, word);
+                }
             }
         }
+    }
+}
+
+/// Columns count in some formats: the word takes the number's place, and what follows it
+/// on the line where it is longer.
+fn in_place(bytes: &mut [u8], number: Range<usize>, word: &str) {
+    let filled = word.bytes().chain(std::iter::repeat(b' '));
+    let length = word.len().max(number.len());
+    let rest = bytes.iter_mut().skip(number.start).take(length);
+    for (byte, new) in rest.take_while(|b| !b.is_ascii_control()).zip(filled) {
+        *byte = new;
     }
 }
 

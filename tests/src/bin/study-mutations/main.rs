@@ -38,7 +38,7 @@ struct Options {
     #[arg(long, value_name = "N", default_value_t = 1)]
     first: u64,
     /// Make models of every so many files that can be read; 0 for none
-    #[arg(long, value_name = "N", default_value_t = 10)]
+    #[arg(long, value_name = "N", default_value_t = 5)]
     through_every: u64,
     /// Write the file of this number to standard output, and end
     #[arg(long, value_name = "N")]
