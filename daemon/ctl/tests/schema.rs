@@ -1,6 +1,12 @@
 //! What is published about the JSON documents in `docs/schema` holds for real ones, and
 //! leaves out nothing that they hold.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on says where"
+)]
+
 mod common;
 
 use std::fs;

@@ -319,7 +319,7 @@ fn files_of_other_formats_are_called_by_their_name() {
         (b"solid part\nfacet normal 0 0 1\n", "an STL mesh"),
         (b"PK\x03\x04\x14\0", "a ZIP archive"),
         (b"BZh91AY&SY", "compressed with bzip2"),
-        (b"\xff\xfe1\0 \02\0", "text in UTF-16, not UTF-8"),
+        (b"\xff\xfe1\x00 \x002\x00", "text in UTF-16, not UTF-8"),
         (b"<!DOCTYPE html>", "an HTML file"),
         (&tar(), "a tar archive"),
     ] {
