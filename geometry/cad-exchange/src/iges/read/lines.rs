@@ -292,7 +292,7 @@ mod tests {
         check("", "is empty");
         check(" \n\n", "is empty");
         check("solid part\n", "line 1: an IGES line has 80 columns");
-        let cut = [line("", 'S', 1), line("", 'G', 1)].join("\n");
+        let cut = [line("", 'S', 1), line(",,;", 'G', 1)].join("\n");
         check(&cut[..120], "line 2: an IGES line has 80 columns");
         check(&cut[..120], "the file was cut off");
         check(&line("", 'C', 1), "compressed form");
