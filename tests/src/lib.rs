@@ -5,12 +5,15 @@
 //! road from a scan to a CAD file, without a service, for comparison. The tests proper lie
 //! in `tests/`; the program `scan-scene` scans a scene for judges outside.
 //!
+//! [`mutations`] damages scan files of every format and reads them with every reader.
+//!
 //! The program `study-segmentation` judges the segmentation: [`scenes`] draws objects from
 //! seeds, scans them and knows the face over each node; [`score`] compares labels with it.
 
 pub mod columns;
 pub mod direct;
 pub mod iges;
+pub mod mutations;
 pub mod outline;
 pub mod rig;
 pub mod scenes;

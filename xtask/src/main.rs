@@ -59,6 +59,9 @@ fn full() -> anyhow::Result<()> {
         freecad: true,
         out: None,
     })?;
+    study::run(&study::Study::Mutations {
+        options: Vec::new(),
+    })?;
     study::run(&study::Study::Segmentation {
         options: ["--set", "judge", "--full", "--peers", "--check"]
             .map(Into::into)

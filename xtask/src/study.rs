@@ -23,6 +23,13 @@ pub(crate) enum Study {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
+    /// Read damaged scan files of every format with every reader.
+    #[command(disable_help_flag = true)]
+    Mutations {
+        /// Options of the study; `--help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
     /// Measure how far the outlines of simulated scans lie from the true ones.
     #[command(disable_help_flag = true)]
     Outline {
@@ -41,6 +48,7 @@ pub(crate) enum Study {
 
 pub(crate) fn run(study: &Study) -> Result<()> {
     match study {
+        Study::Mutations { options } => program("study-mutations", options),
         Study::Outline { options } => program("study-outline", options),
         Study::RealScans { options } => program("study-real-scans", options),
         Study::Regrid { options } => program("study-regrid", options),

@@ -1,26 +1,27 @@
 //! Scan files of every kind the program knows, as columns.
 
+mod format;
+
 use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor, Read};
+use std::io::BufRead;
 use std::path::Path;
 
 use deliverables::ScanReport;
-use flate2::bufread::MultiGzDecoder;
 use jiff::Timestamp;
 use pipeline::Settings;
 use range_image::{Column, Sample};
 use reliefd::config::Processing;
-use scan_files::{PointScan, ReadOptions, Units, recommended_pitch_mm};
+use scan_files::{PointScan, ReadOptions, ScanFileError, Units, Unpacked, recommended_pitch_mm};
 use scan_record::{Ending, JournalReader};
 
 use crate::failure::Failure;
+use format::Format;
 
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
-/// Enough to tell the formats apart: a line of IGES and a little more.
-const HEAD_BYTES: u64 = 96;
-/// Column (from 0) of the section letter in a line of IGES, and its columns in all.
-const IGES_SECTION_COLUMN: usize = 72;
-const IGES_LINE: usize = 80;
+/// Said of files of other formats.
+const NOT_READ: &str = "which is not read";
+/// Most samples of a journal that are held in memory: twice as many as of a cloud, since
+/// they come in columns and need no sorting.
+const MOST_SAMPLES: u64 = 1 << 25;
 
 /// A scan file's content.
 #[derive(Debug)]
@@ -41,6 +42,8 @@ pub(crate) struct Input {
     pub(crate) timestamp: Option<Timestamp>,
     /// What was decided or is missing, for the user.
     pub(crate) notes: Vec<String>,
+    /// Why the coordinates are probably in another unit, if so; one of the notes, too.
+    pub(crate) units_suspected: Option<String>,
 }
 
 impl Input {
@@ -62,52 +65,72 @@ impl Input {
 /// Reads a scan file; the format is told by its content.
 pub(crate) fn read(path: &Path, units: Option<Units>) -> Result<Input, Failure> {
     let name = path.display().to_string();
-    let failed = |error: std::io::Error| Failure::at(format!("cannot read {name}"), &error);
-    let file = File::open(path).map_err(failed)?;
-    let (head, plain) = peek(BufReader::with_capacity(1 << 18, file)).map_err(failed)?;
-    if head.starts_with(&GZIP_MAGIC) {
-        let unpacked = BufReader::with_capacity(1 << 18, MultiGzDecoder::new(plain));
-        let (head, unpacked) = peek(unpacked).map_err(failed)?;
-        by_format(&head, unpacked, &name, units)
-    } else {
-        by_format(&head, plain, &name, units)
+    if path.is_dir() {
+        return Err(Failure::Failed(format!(
+            "{name} is a directory; name a scan file in it"
+        )));
     }
+    let file =
+        File::open(path).map_err(|error| Failure::at(format!("cannot read {name}"), &error))?;
+    let mut source = Unpacked::new(file, &name).map_err(told)?;
+    let format = Format::of(source.head(), path);
+    let packed = source.layers() > 0;
+    let mut input = match by_format(format, &mut source, &name, units) {
+        Ok(input) => input,
+        Err(failure) => {
+            // Damage in compressed data first shows as content that makes no sense.
+            let damage = source.damage().filter(|_| format != Format::Text);
+            return Err(match (damage, format.hint(path)) {
+                (Some(damage), _) => told(damage),
+                // Where it is known what the file is, its name does not matter.
+                (None, Some(hint)) if !failure.to_string().contains(NOT_READ) => {
+                    Failure::Failed(format!("{failure}; {hint}"))
+                }
+                (None, _) => failure,
+            });
+        }
+    };
+    input.notes.extend(format.note(path, packed));
+    Ok(input)
 }
 
 fn by_format(
-    head: &[u8],
-    reader: impl BufRead,
+    format: Format,
+    source: &mut Unpacked<'_>,
     name: &str,
     units: Option<Units>,
 ) -> Result<Input, Failure> {
-    if head.starts_with(&scan_record::MAGIC) {
-        return journal(reader, name);
-    }
     let options = ReadOptions {
         units,
         ..ReadOptions::default()
     };
-    let told = |error: scan_files::ScanFileError| Failure::Failed(error.to_string());
-    let scan = if is_iges(head) {
-        let points =
-            cad_exchange::iges::read_points(reader).map_err(|error| Failure::at(name, &error))?;
-        scan_files::from_points_mm(points, name, &options).map_err(told)?
-    } else {
-        scan_files::read_from(reader, name, &options).map_err(told)?
+    let scan = match format {
+        Format::Journal => return journal(source, name),
+        Format::Iges => {
+            let points = cad_exchange::iges::read_points(source)
+                .map_err(|error| Failure::at(name, &error))?;
+            scan_files::from_points_mm(points, name, &options).map_err(told)?
+        }
+        Format::Text | Format::Ply => {
+            scan_files::read_unpacked(source, name, &options).map_err(told)?
+        }
     };
     Ok(from_points(scan, name))
 }
 
-fn is_iges(head: &[u8]) -> bool {
-    let line = head
-        .split(|&b| b == b'\n' || b == b'\r')
-        .next()
-        .unwrap_or_default();
-    let tail = line.get(IGES_SECTION_COLUMN + 1..IGES_LINE);
-    matches!(
-        line.get(IGES_SECTION_COLUMN),
-        Some(b'S' | b'F' | b'B' | b'C')
-    ) && tail.is_some_and(|tail| tail.iter().all(|b| b.is_ascii_digit() || *b == b' '))
+/// The reader's own words, but for what it cannot know: which formats are read here.
+fn told(error: ScanFileError) -> Failure {
+    const READ: &str = "expected lines of `x y z`, PLY, IGES with points (106, 116) or a .scan \
+                        journal, each plain or gzip-compressed";
+    Failure::Failed(match error {
+        ScanFileError::OtherFormat { file, format } => {
+            format!("{file}: is {format}, {NOT_READ}; {READ}")
+        }
+        ScanFileError::NotText { file, byte, value } => format!(
+            "{file}: byte {byte} (value {value:#04x}) cannot be part of a text file; {READ}"
+        ),
+        other => other.to_string(),
+    })
 }
 
 fn from_points(scan: PointScan, name: &str) -> Input {
@@ -138,6 +161,7 @@ fn from_points(scan: PointScan, name: &str) -> Input {
         name: None,
         timestamp: None,
         notes: scan.notes,
+        units_suspected: scan.units_suspected,
     }
 }
 
@@ -152,6 +176,13 @@ fn journal(reader: impl BufRead, name: &str) -> Result<Input, Failure> {
         samples += raw.samples.len() as u64;
         dropouts += u64::from(raw.dropouts);
         columns.push(raw.calibrated(&header.calibration));
+        // A column without samples needs memory, too.
+        if samples + columns.len() as u64 > MOST_SAMPLES {
+            return Err(Failure::Failed(format!(
+                "{name}: holds more than {MOST_SAMPLES} samples, the most that are read; let the \
+                 service process it (relief rerun), or scan in parts"
+            )));
+        }
     }
     let mut notes = Vec::new();
     if let Some(ending) = journal.ending()
@@ -187,6 +218,7 @@ fn journal(reader: impl BufRead, name: &str) -> Result<Input, Failure> {
         timestamp: kept.as_ref().and_then(|scan| scan.started_at.parse().ok()),
         name: kept.map(|scan| scan.name),
         notes,
+        units_suspected: None,
     })
 }
 
@@ -218,13 +250,6 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// The first bytes, and a reader that still delivers them.
-fn peek<R: BufRead>(mut reader: R) -> std::io::Result<(Vec<u8>, impl BufRead + use<R>)> {
-    let mut head = Vec::new();
-    reader.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
-    Ok((head.clone(), Cursor::new(head).chain(reader)))
-}
-
 fn file_name(name: &str) -> String {
     Path::new(name).file_name().map_or_else(
         || name.to_owned(),
@@ -235,15 +260,6 @@ fn file_name(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn iges_is_told_by_the_letter_of_its_first_line() {
-        let line = |letter: char| format!("{:<72}{letter}{:>7}\n", "A scan", 1);
-        assert!(is_iges(line('S').as_bytes()));
-        assert!(!is_iges(line('x').as_bytes()));
-        assert!(!is_iges(b"1.0 2.0 3.0\n"));
-        assert!(!is_iges(&[b'S'; 96]));
-    }
 
     #[test]
     fn an_unknown_spacing_is_taken_from_the_columns() {

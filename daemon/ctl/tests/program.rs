@@ -242,15 +242,20 @@ fn points_without_a_measurement_are_left_out_and_told() {
     let output = relief(directory.path(), &["convert", "roof.xyz"]);
     let told = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{told}");
-    assert!(told.contains("1 point(s) without a measurement"), "{told}");
+    let remarks = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        remarks.contains("relief: note: roof.xyz: 1 point(s) without a measurement"),
+        "{remarks}"
+    );
     assert!(told.contains("1 edge shared"), "{told}");
 }
 
 #[test]
-fn four_dots_are_no_part_and_the_user_learns_why() {
+fn scattered_dots_are_no_part_and_the_user_learns_why() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
-    fs::write(at.join("dots.xyz"), "0 0 0\n0 1 0\n1 0 0\n1 1 0\n").unwrap();
+    let dots = (0..25).map(|k| format!("{} {} 0\n", k % 5, k / 5));
+    fs::write(at.join("dots.xyz"), dots.collect::<String>()).unwrap();
     let output = relief(at, &["convert", "dots.xyz"]);
     let told = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{told}");

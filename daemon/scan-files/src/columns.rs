@@ -22,6 +22,12 @@ const GREATEST_ANISOTROPY: u32 = 16;
 const CLOUD_BINS: f64 = 4.0;
 /// Parts smaller than this in x and y are probably in other units than assumed, mm.
 const SMALL_PART_MM: f64 = 2.0;
+/// Parts larger than this, likewise: no slide table is so long.
+const LARGE_PART_MM: f64 = 10_000.0;
+/// A column is at least this many times as high as it is wide.
+const COLUMN_SLENDERNESS: u32 = 4;
+/// Widths up to this many lattice counts are from rounding, whatever the height.
+const ROUNDING_COUNTS: u32 = 100;
 
 /// A run of points, sorted by x, that make one column.
 struct Group {
@@ -42,7 +48,7 @@ pub(crate) fn build(mut gather: Gather<'_>) -> Result<PointScan, ScanFileError> 
     }
     if points.len() < read {
         gather.note(format!(
-            "{} repeated point(s) were left out",
+            "{} of {read} points were repeated and are used once only",
             read - points.len()
         ));
     }
@@ -54,12 +60,8 @@ pub(crate) fn build(mut gather: Gather<'_>) -> Result<PointScan, ScanFileError> 
         });
     }
     let size_mm = f64::from(width.max(height)) * LATTICE_MM;
-    if gather.options.units.is_none() && size_mm < SMALL_PART_MM {
-        gather.note(format!(
-            "the part is only {size_mm:.3} across in x and y, taken as millimetres; \
-             if the file is in metres or inches, say so with --units m or --units inch"
-        ));
-    }
+    let units_suspected = units_suspected(size_mm, gather.options.units.is_some());
+    gather.notes.extend(units_suspected.clone());
     let intensity_scale = intensity_scale(&points, &mut gather);
     let Grouping {
         groups,
@@ -86,6 +88,29 @@ pub(crate) fn build(mut gather: Gather<'_>) -> Result<PointScan, ScanFileError> 
         column_pitch_mm: pitch_mm.unwrap_or(fallback_mm),
         sample_spacing_mm: spacing_mm.unwrap_or(fallback_mm),
         notes: gather.notes,
+        units_suspected,
+    })
+}
+
+/// Why the coordinates are probably not in the unit they were taken for, if so.
+fn units_suspected(size_mm: f64, unit_given: bool) -> Option<String> {
+    if size_mm > LARGE_PART_MM {
+        return Some(format!(
+            "the points spread over {:.1} m in x or y, which no slide table reaches: check the \
+             unit ({}), and leave out single points far away with --roi-x-mm and --roi-y-mm",
+            size_mm / 1000.0,
+            if unit_given {
+                "the one that was given"
+            } else {
+                "millimetres, unless --units says otherwise"
+            }
+        ));
+    }
+    (!unit_given && size_mm < SMALL_PART_MM).then(|| {
+        format!(
+            "the part is only {size_mm:.3} mm across in x and y, taken as millimetres; if the \
+             file is in metres or inches, say so with --units m or --units inch"
+        )
     })
 }
 
@@ -170,11 +195,34 @@ fn shared_x(points: &[Point]) -> Option<(Vec<Group>, Option<u32>)> {
             }
         });
         let filled = points.len() >= LEAST_MEAN_COLUMN * groups.len();
-        if narrow && filled && plausible(points, &groups, pitch) {
+        if narrow && filled && slender(points, &groups) && plausible(points, &groups, pitch) {
             return Some((groups, pitch));
         }
     }
     None
+}
+
+/// Whether most points are in groups of a column's shape. Beside a point that lies far
+/// away a whole part would else pass for one column.
+fn slender(points: &[Point], groups: &[Group]) -> bool {
+    let is_column = |members: &[Point]| {
+        let (Some(first), Some(last)) = (members.first(), members.last()) else {
+            return true;
+        };
+        let width = last.x.abs_diff(first.x);
+        if width <= ROUNDING_COUNTS {
+            return true;
+        }
+        let low = members.iter().map(|p| p.y).min().unwrap_or(0);
+        let high = members.iter().map(|p| p.y).max().unwrap_or(0);
+        width <= high.abs_diff(low) / COLUMN_SLENDERNESS
+    };
+    let inside: usize = groups
+        .iter()
+        .filter(|group| is_column(&points[group.members.clone()]))
+        .map(|group| group.members.len())
+        .sum();
+    2 * inside >= points.len()
 }
 
 fn plausible(points: &[Point], groups: &[Group], pitch: Option<u32>) -> bool {

@@ -37,7 +37,7 @@ pub enum ScanFileError {
         source: io::Error,
     },
     /// Reading or decompressing failed part of the way.
-    #[error("{file}: reading failed after {after}: {source}; is the file complete?")]
+    #[error("{file}: reading failed after {after}: {source}")]
     Read {
         /// The file.
         file: String,
@@ -45,6 +45,30 @@ pub enum ScanFileError {
         after: String,
         /// What the system or the decompressor said.
         source: io::Error,
+    },
+    /// Compressed data that turn out to be damaged after their content made no sense.
+    #[error("{file}: {source}")]
+    Damaged {
+        /// The file.
+        file: String,
+        /// What the decompressor said.
+        source: io::Error,
+    },
+    /// Compressed within compressed within compressed.
+    #[error("{file}: is gzip-compressed more than {limit} times over; unpack it first")]
+    PackedTooOften {
+        /// The file.
+        file: String,
+        /// Most layers accepted.
+        limit: u32,
+    },
+    /// Not a byte.
+    #[error("{file}: is empty{}", if *packed { " when unpacked" } else { "" })]
+    Empty {
+        /// The file.
+        file: String,
+        /// It is so after decompression.
+        packed: bool,
     },
     /// Neither PLY nor text.
     #[error(
@@ -113,6 +137,19 @@ pub enum ScanFileError {
         /// Values found.
         found: usize,
     },
+    /// The last line ends before its point does.
+    #[error(
+        "{file}, line {line}: the file ends in the middle of this line, after {found} value(s) \
+         of `x y z`; it was cut off, copy or export it again"
+    )]
+    CutOff {
+        /// The file.
+        file: String,
+        /// The line, from 1.
+        line: u64,
+        /// Whole or broken values found.
+        found: usize,
+    },
     /// Most points have a coordinate that is NaN or infinite.
     #[error(
         "{file}: {unmeasured} of {all} points have a coordinate that is not a finite number, \
@@ -174,14 +211,25 @@ pub enum ScanFileError {
         /// Number announced.
         announced: u64,
     },
+    /// More data than the header announces.
+    #[error(
+        "{file}: more data follow the {announced} vertex entries that its header announces; \
+         the number or the format in the header is wrong"
+    )]
+    PlySurplus {
+        /// The file.
+        file: String,
+        /// Number announced.
+        announced: u64,
+    },
     /// Nothing to work on.
-    #[error("{file}: holds no points")]
+    #[error("{file}: holds no points, only comments, blank lines or a header")]
     NoPoints {
         /// The file.
         file: String,
     },
     /// All points lie on one line of sight.
-    #[error("{file}: its {points} point(s) all share one x and y; there is no surface")]
+    #[error("{file}: {}", no_extent(*points))]
     NoExtent {
         /// The file.
         file: String,
@@ -189,7 +237,10 @@ pub enum ScanFileError {
         points: usize,
     },
     /// More points than the caller allows.
-    #[error("{file}: more than {limit} points; thin the file, or raise the limit")]
+    #[error(
+        "{file}: more than {limit} points, the most that are read; leave out every second column, or \
+         cut the file into parts"
+    )]
     TooManyPoints {
         /// The file.
         file: String,
@@ -202,6 +253,16 @@ pub enum ScanFileError {
         /// The pitch.
         pitch_mm: f64,
     },
+}
+
+fn no_extent(points: usize) -> String {
+    if points == 1 {
+        return "holds a single point, perhaps repeated; a surface needs hundreds".into();
+    }
+    format!(
+        "all its points lie at one x and y ({points} different), so that there is no surface \
+         between them"
+    )
 }
 
 /// A number as people write it, whatever its size.

@@ -26,6 +26,7 @@ mod source;
 mod spacing;
 mod text;
 mod units;
+mod unpack;
 
 use std::fs::File;
 use std::io::Read;
@@ -35,8 +36,13 @@ pub use error::{Place, ScanFileError};
 pub use lattice::{LATTICE_MM, lattice_counts, lattice_mm};
 pub use pitch::recommended_pitch_mm;
 pub use units::Units;
+pub use unpack::Unpacked;
 
 use gather::Gather;
+
+/// Most points that are read by default: as many as 4096 columns of 4096 have, which keeps
+/// memory below 1 GB whatever the file holds.
+pub const MOST_POINTS: usize = 1 << 24;
 
 /// What a caller may prescribe; everything else is found in the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,7 +55,7 @@ pub struct ReadOptions {
     /// distance of its points (the square root of the covered area per point).
     /// Given: points are put into columns of exactly this pitch, anchored at x = 0.
     pub column_pitch_mm: Option<f64>,
-    /// Most points accepted, as a bound on memory (about 50 bytes a point at the peak).
+    /// Most points accepted, as a bound on memory (about 60 bytes a point at the peak).
     pub max_points: usize,
 }
 
@@ -58,7 +64,7 @@ impl Default for ReadOptions {
         Self {
             units: None,
             column_pitch_mm: None,
-            max_points: 200_000_000,
+            max_points: MOST_POINTS,
         }
     }
 }
@@ -95,6 +101,9 @@ pub struct PointScan {
     pub sample_spacing_mm: f64,
     /// What was decided or left out while reading, one sentence each, for the user.
     pub notes: Vec<String>,
+    /// Why the unit of the coordinates is probably another one, if it is; stands among
+    /// the notes, too.
+    pub units_suspected: Option<String>,
 }
 
 impl PointScan {
@@ -133,8 +142,24 @@ pub fn read_from(
     name: &str,
     options: &ReadOptions,
 ) -> Result<PointScan, ScanFileError> {
+    read_unpacked(&mut Unpacked::new(source, name)?, name, options)
+}
+
+/// As [`read_from`], for a caller that has looked at the head of the file.
+///
+/// # Errors
+/// As [`read_from`].
+pub fn read_unpacked(
+    source: &mut Unpacked<'_>,
+    name: &str,
+    options: &ReadOptions,
+) -> Result<PointScan, ScanFileError> {
     let mut gather = Gather::new(name, options)?;
-    source::parse(source, &mut gather)?;
+    // Damage in compressed data first shows as content that makes no sense.
+    source::parse(source, &mut gather).map_err(|error| match error {
+        ScanFileError::Read { .. } => error,
+        other => source.damage().unwrap_or(other),
+    })?;
     columns::build(gather)
 }
 

@@ -1,76 +1,71 @@
-//! From bytes to a parser: decompression and the choice of format, by content.
-
-use std::io::{BufRead, BufReader, Cursor, Read};
-
-use flate2::bufread::MultiGzDecoder;
+//! The choice of a parser, by content.
 
 use crate::error::ScanFileError;
 use crate::gather::Gather;
+use crate::unpack::Unpacked;
 use crate::{ply, text};
 
-const BUFFER_BYTES: usize = 256 * 1024;
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 const PLY_MAGIC: [u8; 3] = *b"ply";
-/// Enough to tell the formats apart.
-const HEAD_BYTES: u64 = 16;
 /// How files begin that users may take for scan files.
-const OTHERS: [(&[u8], &str); 11] = [
+const OTHERS: [(&[u8], &str); 26] = [
     (b"P2\n", "a PGM picture"),
     (b"P5\n", "a PGM picture"),
     (b"\x89PNG", "a PNG picture"),
+    (b"\xff\xd8\xff", "a JPEG picture"),
     (b"{", "a JSON file"),
+    (b"[[", "a JSON file"),
+    (b"[{", "a JSON file"),
+    (b"<?xml", "an XML file"),
+    (b"<!", "an HTML file"),
+    (b"<html", "an HTML file"),
     (b"solid ", "an STL mesh"),
+    (b"OFF\n", "an OFF mesh"),
+    (b"v ", "an OBJ mesh"),
     (b"ISO-10303-21", "a STEP file"),
     (b"%PDF", "a PDF document"),
     (b"PK\x03\x04", "a ZIP archive"),
+    (b"BZh", "compressed with bzip2"),
+    (b"\xfd7zXZ", "compressed with xz"),
+    (b"\x28\xb5\x2f\xfd", "compressed with zstd"),
+    (b"7z\xbc\xaf", "a 7-Zip archive"),
     (b"ASTM-E57", "an E57 point cloud"),
     (b"LASF", "a LAS point cloud"),
     (b"# .PCD", "a PCD point cloud"),
+    (b"\xff\xfe", "text in UTF-16, not UTF-8"),
+    (b"\xfe\xff", "text in UTF-16, not UTF-8"),
+    (b"RELSCAN\n", "a scan journal"),
 ];
+/// The mark of a tar archive, and where it stands.
+const TAR_MAGIC: (usize, &[u8]) = (257, b"ustar");
 
 /// Parses a whole file into `gather`.
-pub(crate) fn parse(source: impl Read, gather: &mut Gather<'_>) -> Result<(), ScanFileError> {
-    let (head, plain) = peek(BufReader::with_capacity(BUFFER_BYTES, source), gather)?;
-    if head.starts_with(&GZIP_MAGIC) {
-        let unpacked = BufReader::with_capacity(BUFFER_BYTES, MultiGzDecoder::new(plain));
-        let (head, unpacked) = peek(unpacked, gather)?;
-        by_format(&head, unpacked, gather)
-    } else {
-        by_format(&head, plain, gather)
-    }
-}
-
-fn by_format(
-    head: &[u8],
-    reader: impl BufRead,
+pub(crate) fn parse(
+    source: &mut Unpacked<'_>,
     gather: &mut Gather<'_>,
 ) -> Result<(), ScanFileError> {
-    if head.starts_with(&PLY_MAGIC) {
-        ply::parse(reader, gather)
-    } else if let Some((_, format)) = OTHERS.iter().find(|(magic, _)| head.starts_with(magic)) {
-        Err(ScanFileError::OtherFormat {
+    if source.layers() > 1 {
+        gather.note(format!(
+            "the file is gzip-compressed {} times over",
+            source.layers()
+        ));
+    }
+    if source.head().starts_with(&PLY_MAGIC) {
+        return ply::parse(source, gather);
+    }
+    match other_format(source.head()) {
+        Some(format) => Err(ScanFileError::OtherFormat {
             file: gather.file.to_owned(),
             format,
-        })
-    } else {
-        text::parse(reader, gather)
+        }),
+        None => text::parse(source, gather),
     }
 }
 
-/// The first bytes, and a reader that still delivers them.
-fn peek<R: BufRead>(
-    mut reader: R,
-    gather: &Gather<'_>,
-) -> Result<(Vec<u8>, impl BufRead + use<R>), ScanFileError> {
-    let mut head = Vec::new();
-    reader
-        .by_ref()
-        .take(HEAD_BYTES)
-        .read_to_end(&mut head)
-        .map_err(|source| ScanFileError::Read {
-            file: gather.file.to_owned(),
-            after: "0 bytes".to_owned(),
-            source,
-        })?;
-    Ok((head.clone(), Cursor::new(head).chain(reader)))
+fn other_format(head: &[u8]) -> Option<&'static str> {
+    let (place, mark) = TAR_MAGIC;
+    if head.get(place..).is_some_and(|rest| rest.starts_with(mark)) {
+        return Some("a tar archive");
+    }
+    let known = OTHERS.iter().find(|(magic, _)| head.starts_with(magic));
+    known.map(|(_, format)| *format)
 }

@@ -58,6 +58,11 @@ fn binary(big_endian: bool, wide_x: bool) -> Vec<u8> {
         put(&[7]);
         put(&z.to_le_bytes());
     }
+    put(&[1]);
+    put(&0_i32.to_le_bytes());
+    put(&[0]);
+    put(&[1]);
+    put(&5_i32.to_le_bytes());
     bytes
 }
 
@@ -130,28 +135,77 @@ fn vertices_after_other_elements_are_found() {
 
 #[test]
 fn headers_that_promise_too_much_are_errors_not_memory() {
-    for count in ["4000000000", "18446744073709551615"] {
-        for format in ["ascii", "binary_little_endian"] {
-            let text = header(format, count, "float");
-            let error = read(text.as_bytes()).unwrap_err();
+    for format in ["ascii", "binary_little_endian"] {
+        let text = header(format, "4000000000", "float");
+        let error = read(text.as_bytes()).unwrap_err();
+        assert!(
+            matches!(error, ScanFileError::PlyTruncated { .. }),
+            "{error}"
+        );
+        assert!(error.to_string().contains("4000000000"));
+        for count in ["18446744073709551615", "-5", "many", "1e6", ""] {
+            let told = read(header(format, count, "float").as_bytes()).unwrap_err();
+            let told = told.to_string();
             assert!(
-                matches!(error, ScanFileError::PlyTruncated { .. }),
-                "{error}"
+                told.contains("line 4: `element vertex") && told.contains("as a whole number"),
+                "{told}"
             );
-            assert!(error.to_string().contains(count));
         }
     }
-    let empty = "ply\nformat ascii 1.0\nelement nothing 4000000000000\nelement vertex 1\n\
+    let empty = "ply\nformat ascii 1.0\nelement nothing 4000000000\nelement vertex 1\n\
                  property float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n";
     let error = read(empty.as_bytes()).unwrap_err().to_string();
     assert!(error.contains("`nothing` has no properties"), "{error}");
     let list = "ply\nformat binary_little_endian 1.0\nelement face 1\n\
                 property list uint float v\nelement vertex 1\nproperty float x\n\
                 property float y\nproperty float z\nend_header\n\u{7f}\u{7f}\u{7f}\u{7f}abcd";
-    assert!(matches!(
-        read(list.as_bytes()),
-        Err(ScanFileError::PlyTruncated { .. })
-    ));
+    let told = read(list.as_bytes()).unwrap_err().to_string();
+    assert!(told.contains("a list of more than 65536 values"), "{told}");
+}
+
+#[test]
+fn headers_that_promise_too_little_lose_no_points_in_silence() {
+    let bare = |text: String| {
+        text.replace("element range_grid 3\n", "")
+            .replace("property list uchar int vertex_indices\n", "")
+    };
+    let row = |k: i32| format!("{k} {} 7 1\n", k % 2);
+    let rows: String = (0..6).map(row).collect();
+    let ascii = bare(header("ascii", "6", "float")) + &rows;
+    assert_eq!(read(ascii.as_bytes()).unwrap().points(), 6);
+    assert_eq!(
+        read((ascii.clone() + "\n \n").as_bytes()).unwrap().points(),
+        6
+    );
+    let told = |bytes: &[u8]| read(bytes).unwrap_err().to_string();
+    let fewer = ascii.replace("vertex 6", "vertex 5");
+    assert!(told(fewer.as_bytes()).contains("more data follow the 5 vertex entries"));
+
+    let mut binary = bare(header("binary_little_endian", "6", "float")).into_bytes();
+    let fewer = bare(header("binary_little_endian", "5", "float"));
+    let mut rows = Vec::new();
+    for point in POINTS {
+        rows.extend_from_slice(&point[0].to_le_bytes());
+        rows.extend_from_slice(&point[1].to_le_bytes());
+        rows.push(7);
+        rows.extend_from_slice(&point[2].to_le_bytes());
+    }
+    binary.extend_from_slice(&rows);
+    assert_eq!(read(&binary).unwrap().points(), 6);
+    binary.extend_from_slice(b"\r\n");
+    assert_eq!(read(&binary).unwrap().points(), 6);
+    let fewer = [fewer.as_bytes(), &rows].concat();
+    assert!(told(&fewer).contains("more data follow the 5 vertex entries"));
+    // Text under a header that says binary, and the other way round.
+    let text = ascii.replace("ascii", "binary_little_endian") + &"0 0 0 0\n".repeat(20);
+    assert!(told(text.as_bytes()).contains("more data follow"));
+    let bytes = [bare(header("ascii", "6", "float")).as_bytes(), &rows[..]].concat();
+    assert!(told(&bytes).contains("the data are not text, though the header says"));
+    // What follows the vertices is of no use, but shows that the count may be wrong.
+    let mesh = self::ascii().replace("1 0\n0 \n1 5\n", "1 0\n0 \n");
+    let scan = read(mesh.as_bytes()).unwrap();
+    assert_eq!(scan.points(), 6);
+    assert!(scan.notes[0].starts_with("the range_grid data after the vertices do not fit"));
 }
 
 #[test]
@@ -191,8 +245,9 @@ fn faults_are_named_with_their_place() {
         }
     }
     let mut not_finite = binary(false, false);
-    let at = not_finite.len() - 4;
-    not_finite[at..].copy_from_slice(&f32::NAN.to_le_bytes());
+    // The last vertex's z, before the 11 bytes of the range grid.
+    let at = not_finite.len() - 15;
+    not_finite[at..at + 4].copy_from_slice(&f32::NAN.to_le_bytes());
     let scan = read(&not_finite).unwrap();
     assert_eq!(scan.points(), 5);
     assert!(

@@ -154,9 +154,10 @@ fn further_values_are_ignored_with_a_note() {
 fn errors_name_file_place_and_cause() {
     let message = |text: &str| read_text(text).unwrap_err().to_string();
     for (text, parts) in [
-        ("", &["holds no points"][..]),
+        ("", &["is empty"][..]),
         ("# only a comment\n", &["holds no points"]),
         ("1 2 3\n4 5\n", &["line 2", "2 value(s)"]),
+        ("1 2 3\n4 5", &["line 2", "in the middle of this line"]),
         ("1 2 3\n\n4 x 6\n", &["line 3", "`x`"]),
         (
             "1 2 3\n4 nan 6\n7 8 inf\n",
@@ -165,7 +166,7 @@ fn errors_name_file_place_and_cause() {
         ("1 2 1e300\n", &["line 1", "a coordinate of 1e300 mm"]),
         ("1,5 2,0 3,1\n", &["line 1", "decimal commas", "semicolons"]),
         ("1 2 30000\n", &["line 1", "30000", "units"]),
-        ("1 2 3\n1 2 4\n1 2 5\n", &["share one x and y"]),
+        ("1 2 3\n1 2 4\n1 2 5\n", &["one x and y (3 different)"]),
         ("1 2 3\n\u{0}\u{1}", &["byte 6", "0x00"]),
     ] {
         let message = message(text);
@@ -224,6 +225,91 @@ fn no_damage_to_a_file_panics() {
     }
 }
 
+fn tar() -> Vec<u8> {
+    let mut head = vec![0; 1024];
+    head[..8].copy_from_slice(b"scan.xyz");
+    head[257..262].copy_from_slice(b"ustar");
+    head
+}
+
+#[test]
+fn damaged_compression_is_told_from_damaged_content() {
+    let plain = regular(60, 60).join("\n") + "\n";
+    let packed = gzip(plain.as_bytes());
+    let read = |bytes: &[u8]| read_from(bytes, "scan.gz", &ReadOptions::default());
+    let told = |bytes: &[u8]| read(bytes).unwrap_err().to_string();
+    let whole = read(&packed).unwrap();
+    assert_eq!(
+        read(&[&packed[..], &packed[..]].concat()).unwrap().columns,
+        whole.columns
+    );
+    for end in [
+        2,
+        9,
+        15,
+        packed.len() / 2,
+        packed.len() - 8,
+        packed.len() - 1,
+    ] {
+        let told = told(&packed[..end]);
+        assert!(
+            told.contains("compressed data (gzip) end too early"),
+            "{end}: {told}"
+        );
+    }
+    for at in [40, packed.len() / 3, packed.len() / 2, packed.len() - 6] {
+        let mut damaged = packed.clone();
+        damaged[at] ^= 0x11;
+        let told = told(&damaged);
+        assert!(told.contains("compressed data (gzip)"), "{at}: {told}");
+        assert!(told.starts_with("scan.gz: "), "{told}");
+    }
+    let joined = told(&[&packed[..], b"no gzip at all"].concat());
+    assert!(
+        joined.contains("something that is not gzip follows"),
+        "{joined}"
+    );
+    // Sound compression around content that makes no sense: the content is to blame.
+    let content = told(&gzip(b"1 2 3\n4 x 6\n"));
+    assert!(content.contains("line 2: `x` is not a number"), "{content}");
+    let nothing = told(&gzip(b""));
+    assert!(nothing.contains("is empty when unpacked"), "{nothing}");
+}
+
+#[test]
+fn what_was_packed_twice_by_mistake_is_read_and_more_is_refused() {
+    let once = gzip(regular(8, 8).join("\n").as_bytes());
+    let read = |bytes: &[u8]| read_from(bytes, "scan.gz", &ReadOptions::default());
+    let twice = gzip(&once);
+    let scan = read(&twice).unwrap();
+    assert_eq!(scan.columns, read(&once).unwrap().columns);
+    assert!(
+        scan.notes
+            .iter()
+            .any(|n| n.contains("gzip-compressed 2 times"))
+    );
+    let told = read(&gzip(&twice)).unwrap_err().to_string();
+    assert!(
+        told.contains("more than 2 times over; unpack it first"),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_point_far_away_does_not_make_one_column_of_the_part() {
+    let part = regular(30, 30);
+    let alone = read_text(&part.join("\n")).unwrap();
+    let scan = read_text(&(part.join("\n") + "\n20000 1 1\n")).unwrap();
+    assert_eq!(scan.column_pitch_mm, alone.column_pitch_mm);
+    assert_eq!(scan.columns.len(), alone.columns.len() + 1);
+    let suspicion = scan.units_suspected.unwrap();
+    assert!(
+        suspicion.contains("20.0 m") && suspicion.contains("--roi-x-mm"),
+        "{suspicion}"
+    );
+    assert!(alone.units_suspected.is_none());
+}
+
 #[test]
 fn files_of_other_formats_are_called_by_their_name() {
     let read = |bytes: &[u8]| read_from(bytes, "scan", &ReadOptions::default());
@@ -232,6 +318,10 @@ fn files_of_other_formats_are_called_by_their_name() {
         (b"{\"width\": 2560}", "a JSON file"),
         (b"solid part\nfacet normal 0 0 1\n", "an STL mesh"),
         (b"PK\x03\x04\x14\0", "a ZIP archive"),
+        (b"BZh91AY&SY", "compressed with bzip2"),
+        (b"\xff\xfe1\x00 \x002\x00", "text in UTF-16, not UTF-8"),
+        (b"<!DOCTYPE html>", "an HTML file"),
+        (&tar(), "a tar archive"),
     ] {
         for bytes in [head.to_vec(), gzip(head)] {
             let told = read(&bytes).unwrap_err().to_string();

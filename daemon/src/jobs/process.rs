@@ -107,14 +107,16 @@ fn attempt(
     settings.regrid.threads = service.config().queue.threads;
 
     let watch = Stopwatch::new(progress);
-    let (image, kept) = match streamed(service, job, &settings.regrid) {
+    let (image, mut kept) = match streamed(service, job, &settings.regrid) {
         Some(image) => (image, count(&mut journal, &header, progress)?),
         None => {
             watch.stage(Stage::Regrid);
             regrid(&mut journal, &header, &settings.regrid, &scan, &watch)?
         }
     };
-    let outcome = pipeline::process_in_view(&image, &kept.view, &settings, &watch)?;
+    let outcome = pipeline::process_in_view(&image, &kept.view, &settings, &watch)
+        .map_err(|error| explained(error, service, job, kept.samples))?;
+    kept.warnings.extend(pipeline::unusual_size(&image));
     let timestamp = scan
         .started_at
         .parse()
@@ -136,6 +138,35 @@ fn attempt(
     progress.check()?;
     progress.begin("publish");
     Ok(service.spool.publish(&job.result)?)
+}
+
+/// Larger scans than this are not read again to find out why there is no surface.
+const MOST_EXPLAINED_SAMPLES: u64 = 1 << 22;
+
+/// The error in terms of what was measured, where that alone explains it.
+fn explained(error: PipelineError, service: &Service, job: &Job, samples: u64) -> Stop {
+    let unexplained = matches!(
+        error,
+        PipelineError::NothingMeasured | PipelineError::NoSurface { .. }
+    );
+    if unexplained && samples <= MOST_EXPLAINED_SAMPLES {
+        let why = || -> Result<Option<String>, ReadError> {
+            let mut journal = JournalReader::open(&service.journal_path(&job.scan))?;
+            let header = journal.header().clone();
+            let mut columns = Vec::new();
+            while let Some(raw) = journal.next_column()? {
+                columns.push(raw.calibrated(&header.calibration));
+            }
+            Ok(pipeline::no_surface(&columns, header.column_pitch_mm))
+        };
+        if let Ok(Some(why)) = why() {
+            return Stop::failed(
+                format!("scan {}: {why}", job.scan),
+                PipelineError::NothingMeasured.hint(),
+            );
+        }
+    }
+    error.into()
 }
 
 /// What the journal held.

@@ -195,9 +195,13 @@ fn what_is_wrong_is_named() {
     refusal(&file(MM, &circle), "in a circle");
     refusal(
         &file(MM, &[(110, 0, "00000000", 0, "110,0;")]),
-        "only 1 of type 110",
+        "holds no measured points (entities 106 or 116), but 1 of type 110; it is a CAD model, not a scan",
     );
-    refusal(&file(MM, &[]), "only no entities at all");
+    refusal(&file(MM, &[]), "and no other entities");
+    refusal(
+        &file(MM, &[(116, 0, "00010000", 0, "116,4.,2.,3.;")]),
+        "only such as other entities are made of, among 1 of type 116",
+    );
     let text = one("106,2,1,1.,2.,3.;");
     refusal(
         &text.replace("     106       1", "     106      x1"),

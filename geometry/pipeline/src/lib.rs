@@ -11,12 +11,14 @@
 //! [`Observer`] learns when each stage begins, so that time is measured outside.
 
 mod background;
+mod extent;
 mod method;
 mod observer;
 mod process;
 mod settings;
 
 pub use background::{BackgroundPolicy, Crumb, NodeRole, UnknownPolicy};
+pub use extent::{Extent, no_surface, unusual_size};
 pub use method::{Method, UnknownMethod};
 pub use observer::{Observer, Stage};
 pub use process::{Outcome, PipelineError, process, process_columns, process_in_view};

@@ -93,6 +93,14 @@ impl PipelineError {
                 "the regions are too narrow for their borders to be followed; scan with a finer \
                  column pitch or choose a smaller grid pitch",
             ),
+            Self::Regrid(RegridError::NotMonotone { .. }) => Some(
+                "the table went back or stood still while columns were taken: check its drive, \
+                 and scan again",
+            ),
+            Self::Regrid(RegridError::TooManyNodes { .. }) => Some(
+                "if the part is not that large, single samples far from it or a wrong calibration \
+                 are the cause",
+            ),
             _ => None,
         }
     }

@@ -1,6 +1,7 @@
 //! The service driven through its API with a simulated scanner on a real pseudo-terminal.
 
 mod abort;
+mod bad_input;
 mod errors;
 mod line;
 mod queue;

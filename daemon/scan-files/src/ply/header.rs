@@ -7,6 +7,9 @@ use crate::gather::Gather;
 
 /// Longest accepted header, bytes; real ones hold a few hundred.
 const HEADER_LIMIT: usize = 256 * 1024;
+/// Most entries of a kind that a header may announce; all numbers of 32 bits, with which
+/// other programs count.
+const MOST_ENTRIES: u64 = u32::MAX as u64;
 /// Longest stretch of data without a line end, bytes, where lines are expected.
 const LINE_LIMIT: usize = 1 << 20;
 const KEYWORDS: [&str; 7] = [
@@ -62,6 +65,9 @@ pub(super) fn read_cleaned(
         if keyword == "end_header" {
             break;
         }
+        if let Some(detail) = count_problem(text) {
+            return Err(refuse(number, &detail));
+        }
         if !KEYWORDS.contains(&keyword) {
             if !keyword.is_empty() {
                 strays.push(format!("line {number} `{}`", text.trim()));
@@ -76,6 +82,24 @@ pub(super) fn read_cleaned(
         ));
     }
     Ok(header)
+}
+
+/// What is wrong with the number in `element NAME NUMBER`.
+fn count_problem(line: &str) -> Option<String> {
+    let mut words = line.split_whitespace();
+    if words.next() != Some("element") {
+        return None;
+    }
+    let (name, count) = (words.next()?, words.next().unwrap_or_default());
+    let whole = !count.is_empty() && count.bytes().all(|b| b.is_ascii_digit());
+    if whole && count.parse::<u64>().is_ok_and(|n| n <= MOST_ENTRIES) {
+        return None;
+    }
+    Some(format!(
+        "`{}` should announce how many {name} entries there are, as a whole number up to \
+         {MOST_ENTRIES}",
+        line.trim()
+    ))
 }
 
 fn replace_by_comment(header: &mut Vec<u8>, start: usize) {

@@ -16,6 +16,8 @@ use vertex::{Skipped, Vertex};
 
 /// Entries read at a time: bounds memory beside the points themselves.
 const CHUNK: usize = 1 << 15;
+/// Bytes after the last entry of a binary file that are taken for padding.
+const PADDING_BYTES: usize = 4;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 pub(crate) fn parse(
@@ -34,13 +36,57 @@ pub(crate) fn parse(
     check(&head, gather)?;
     let units = units(&head, gather);
     widen_ascii(&mut head);
+    let mut after_vertices = false;
     for element in head.elements.values() {
         if element.name == "vertex" {
-            return vertices(&mut reader, &head, element, units, gather);
+            vertices(&mut reader, &head, element, units, gather)?;
+            after_vertices = true;
+        } else if !after_vertices {
+            skip(&mut reader, &head, element, gather)?;
+        } else if let Err(error) = skip(&mut reader, &head, element, gather) {
+            // The vertices have been read; only what nobody needs is wrong.
+            gather.note(format!(
+                "the {} data after the vertices do not fit the header ({error}); check that all \
+                 points are there",
+                element.name
+            ));
+            return Ok(());
         }
-        skip(&mut reader, &head, element, gather)?;
     }
-    Ok(())
+    surplus(&mut reader, &head, gather)
+}
+
+/// Refuses a file with more data than announced, whose points would be lost in silence. A
+/// line end or two after binary data are no harm.
+fn surplus(
+    reader: &mut Reader<impl BufRead>,
+    head: &Header,
+    gather: &Gather<'_>,
+) -> Result<(), ScanFileError> {
+    let ascii = head.encoding == Encoding::Ascii;
+    let failed = |source| ScanFileError::Read {
+        file: gather.file.to_owned(),
+        after: "the last vertex".to_owned(),
+        source,
+    };
+    let mut left = 0;
+    loop {
+        let piece = reader.get_mut().fill_buf().map_err(failed)?;
+        let length = piece.len();
+        let blank = |b: &&u8| ascii && b.is_ascii_whitespace();
+        left += length - piece.iter().filter(blank).count();
+        if length == 0 {
+            return Ok(());
+        }
+        if left > if ascii { 1 } else { PADDING_BYTES } {
+            let vertices = head.elements.get("vertex");
+            return Err(ScanFileError::PlySurplus {
+                file: gather.file.to_owned(),
+                announced: vertices.map_or(0, |element| element.count as u64),
+            });
+        }
+        reader.get_mut().consume(length);
+    }
 }
 
 /// Refuses headers whose data could not be read or would be meaningless.
@@ -116,9 +162,13 @@ fn vertices(
     let parser = Parser::<Vertex>::new();
     let mut number = 0_u64;
     for chunk in chunks(element) {
-        let rows = parser
-            .read_payload_for_element(reader, &chunk, head)
-            .map_err(|e| data_error(&e, head, element, number, gather))?;
+        let rows = match parser.read_payload_for_element(reader, &chunk, head) {
+            Ok(rows) => rows,
+            Err(error) if is_short(&error) && at_end(reader) => {
+                return Err(truncated(element, gather));
+            }
+            Err(error) => return Err(data_error(&error, head, element, number, gather)),
+        };
         for row in rows {
             number += 1;
             gather.push(row.xyz, row.intensity, units, Place::Vertex(number))?;
@@ -154,6 +204,23 @@ fn chunks(element: &ElementDef) -> impl Iterator<Item = ElementDef> {
     })
 }
 
+fn truncated(element: &ElementDef, gather: &Gather<'_>) -> ScanFileError {
+    ScanFileError::PlyTruncated {
+        file: gather.file.to_owned(),
+        element: element.name.clone(),
+        announced: element.count as u64,
+    }
+}
+
+/// A line of text without all of its values.
+fn is_short(error: &ParseError) -> bool {
+    error.to_string().contains("found nothing")
+}
+
+fn at_end(reader: &mut Reader<impl BufRead>) -> bool {
+    reader.get_mut().fill_buf().is_ok_and(<[u8]>::is_empty)
+}
+
 fn data_error(
     error: &ParseError,
     head: &Header,
@@ -163,10 +230,13 @@ fn data_error(
 ) -> ScanFileError {
     let file = gather.file.to_owned();
     if error.kind() == ErrorKind::UnexpectedEof {
-        return ScanFileError::PlyTruncated {
+        return truncated(element, gather);
+    }
+    if let Some(source) = from_below(error) {
+        return ScanFileError::Read {
             file,
-            element: element.name.clone(),
-            announced: element.count as u64,
+            after: format!("{vertices_read} vertices"),
+            source,
         };
     }
     let place = match (head.encoding, error.line()) {
@@ -176,8 +246,35 @@ fn data_error(
     ScanFileError::PlyData {
         file,
         place,
-        detail: one_line(error),
+        detail: detail(error, head),
     }
+}
+
+/// An error of the source itself, such as damaged compressed data, which the parser hands on.
+fn from_below(error: &ParseError) -> Option<std::io::Error> {
+    let text = one_line(error);
+    (error.kind() == ErrorKind::InvalidData && text.contains("compressed data"))
+        .then(|| std::io::Error::new(ErrorKind::InvalidData, text))
+}
+
+/// What is wrong with the data, in the user's words where the parser has none.
+fn detail(error: &ParseError, head: &Header) -> String {
+    let text = one_line(error);
+    if text.contains("valid UTF-8") && head.encoding == Encoding::Ascii {
+        return "the data are not text, though the header says `format ascii`".into();
+    }
+    if is_short(error) {
+        let line = text.split('\'').nth(1).unwrap_or_default().trim();
+        return format!("`{line}` has fewer values than the header announces");
+    }
+    if text.contains("unsupported by the destination") {
+        return format!(
+            "a list of more than {} values; the data are damaged, or not in the byte order and \
+             format that the header says",
+            vertex::LONGEST_LIST
+        );
+    }
+    text
 }
 
 /// The parser's message without its line breaks and the line's number, which stands

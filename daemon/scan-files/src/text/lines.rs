@@ -10,6 +10,15 @@ const BYTE_ORDER_MARK: &str = "\u{feff}";
 /// Ctrl-Z, the end-of-file mark that some DOS programs leave behind.
 const END_MARK: char = '\u{1a}';
 
+/// A line of the file.
+pub(super) struct Line<'a> {
+    /// Its number, from 1.
+    pub(super) number: u64,
+    pub(super) text: &'a str,
+    /// A line end follows it; false for what a file that was cut off ends with.
+    pub(super) ended: bool,
+}
+
 pub(super) struct Lines<'a, R> {
     reader: R,
     file: &'a str,
@@ -36,10 +45,10 @@ impl<'a, R: BufRead> Lines<'a, R> {
         }
     }
 
-    /// The next line with its number, without its end and without a comment that is not
-    /// UTF-8.
-    pub(super) fn next(&mut self) -> Result<Option<(u64, &str)>, ScanFileError> {
+    /// The next line, without its end and without a comment that is not UTF-8.
+    pub(super) fn next(&mut self) -> Result<Option<Line<'_>>, ScanFileError> {
         self.line.clear();
+        let mut ended = false;
         self.start = self.consumed;
         loop {
             let piece = self
@@ -77,11 +86,19 @@ impl<'a, R: BufRead> Lines<'a, R> {
                 });
             }
             if end.is_some() {
+                ended = true;
                 break;
             }
         }
         self.number += 1;
-        self.decoded().map(|line| Some((self.number, line)))
+        let number = self.number;
+        self.decoded().map(|text| {
+            Some(Line {
+                number,
+                text,
+                ended,
+            })
+        })
     }
 
     fn decoded(&self) -> Result<&str, ScanFileError> {

@@ -17,8 +17,9 @@ pub(crate) fn parse(reader: impl BufRead, gather: &mut Gather<'_>) -> Result<(),
     let mut lines = Lines::new(reader, gather.file);
     let mut layout: Option<Layout> = None;
     let mut surplus = 0_usize;
-    while let Some((number, line)) = lines.next()? {
-        let content = line.trim();
+    while let Some(line) = lines.next()? {
+        let number = line.number;
+        let content = line.text.trim();
         if content.is_empty() {
             continue;
         }
@@ -38,6 +39,13 @@ pub(crate) fn parse(reader: impl BufRead, gather: &mut Gather<'_>) -> Result<(),
             Ok(point) => {
                 surplus = surplus.max(point.surplus);
                 gather.push(point.xyz, point.intensity, units, Place::Line(number))?;
+            }
+            Err(Problem::TooFew(found)) if !line.ended && !gather.points.is_empty() => {
+                return Err(ScanFileError::CutOff {
+                    file: gather.file.to_owned(),
+                    line: number,
+                    found,
+                });
             }
             Err(problem) => return Err(problem.at(gather.file, number)),
         }

@@ -1,7 +1,6 @@
 //! `relief convert`.
 
 mod args;
-mod extent;
 mod places;
 mod run;
 

@@ -6,11 +6,10 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use deliverables::{Inputs, ManifestFile, Report, Stopwatch, write_atomically};
-use pipeline::{Observer, PipelineError, Stage};
+use pipeline::{Extent, Observer, PipelineError, Settings, Stage};
 use range_image::Monitor;
 use serde::Serialize;
 
-use super::extent::Extent;
 use super::{Args, places};
 use crate::failure::Failure;
 use crate::input::{self, Input};
@@ -26,6 +25,9 @@ struct Converted {
     output: PathBuf,
     file: ManifestFile,
     report: Report,
+    /// Remarks on the input, told on standard error.
+    #[serde(skip)]
+    notes: Vec<String>,
 }
 
 /// Shows the stages on standard error; ends them on Ctrl-C.
@@ -85,6 +87,9 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
         }
     };
     let converted = joined.map_err(|error| Failure::at("the conversion broke off", &error))??;
+    for note in &converted.notes {
+        eprintln!("relief: note: {note}");
+    }
     output::either(json, &converted, told)
 }
 
@@ -97,6 +102,10 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
         .as_deref()
         .map_or(Ok(()), places::check_directory)?;
     let input = input::read(&args.input, args.units())?;
+    let file = args.input.display();
+    if let Some(why) = pipeline::no_surface(&input.columns, input.column_pitch_mm) {
+        return Err(Failure::Failed(format!("{file}: {why}")));
+    }
     let settings = args
         .settings(input.settings())
         .map_err(|failure| match failure {
@@ -105,7 +114,7 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
             }
             other => other,
         })?;
-    check_extent(&args.input, &input, settings.regrid.pitch_mm)?;
+    check_extent(args, &input, &settings)?;
     let cad = args.cad(input.scan.operator.as_deref());
     let timestamp = args.timestamp(input.timestamp)?;
     let name = args.name(input.name.as_deref());
@@ -114,8 +123,13 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
     let processed = pipeline::process_columns(input.columns, &settings, &watch);
     let (image, outcome) = processed.map_err(|error| {
         shown.end("failed");
-        refused(&args.input, &error)
+        refused(&args.input, &error, input.units_suspected.as_deref())
     })?;
+    let mut notes = input.notes;
+    // Points of files have been remarked on in their own unit.
+    if input.scan.dropouts.is_some() {
+        notes.extend(pipeline::unusual_size(&image));
+    }
     let inputs = Inputs {
         name: &name,
         timestamp,
@@ -124,12 +138,12 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
         settings: &settings,
         cad: &cad,
         scan: input.scan,
-        warnings: input.notes,
+        warnings: notes.clone(),
         versions: std::collections::BTreeMap::default(),
     };
     watch.stage(Stage::Export);
     let model = &outcome.reconstruction.model;
-    let file = write_atomically::<deliverables::DeliverError>(&output, |sink| {
+    let written = write_atomically::<deliverables::DeliverError>(&output, |sink| {
         Ok(deliverables::write_iges(
             model, &name, timestamp, &cad, sink,
         )?)
@@ -152,32 +166,35 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
     }
     Ok(Converted {
         output,
-        file,
+        file: written,
         report,
+        notes: notes.iter().map(|note| format!("{file}: {note}")).collect(),
     })
 }
 
-/// Refuses samples without a surface, and grids that are absurdly fine for them.
-fn check_extent(file: &Path, input: &Input, pitch_mm: f64) -> Result<(), Failure> {
-    let Some(extent) = Extent::of(&input.columns) else {
+/// Refuses grids that are absurdly fine for the samples.
+fn check_extent(args: &Args, input: &Input, settings: &Settings) -> Result<(), Failure> {
+    let pitch_mm = settings.regrid.pitch_mm;
+    let Some(extent) = Extent::within(&input.columns, &settings.regrid.roi) else {
         return Ok(());
     };
-    if let Some(line) = extent.line(&input.columns, input.column_pitch_mm) {
-        return Err(Failure::Failed(format!(
-            "{}: all its samples lie {line}, so that there is no surface between them; x runs \
-             along the table, y up and z towards the camera",
-            file.display()
-        )));
-    }
     let finest_mm = extent.finest_pitch_mm();
-    if pitch_mm < finest_mm {
+    if pitch_mm >= finest_mm {
+        return Ok(());
+    }
+    let file = args.input.display();
+    if args.pitch_mm.is_some() {
         return Err(Failure::Usage(format!(
-            "a grid of {pitch_mm} mm is too fine for {}: --pitch-mm {finest_mm} is the least that \
-             its size and its number of samples allow",
-            file.display()
+            "a grid of {pitch_mm} mm is too fine for {file}: --pitch-mm {finest_mm} is the least \
+             that its size and its number of samples allow"
         )));
     }
-    Ok(())
+    let [width, height] = extent.sides_mm();
+    Err(Failure::Failed(format!(
+        "{file}: its samples ask for a grid of {pitch_mm} mm, but spread over {width:.1} x \
+         {height:.1} mm, too far for it; if single points lie far from the part, leave them out \
+         with --roi-x-mm and --roi-y-mm, else choose --pitch-mm {finest_mm} or more"
+    )))
 }
 
 fn too_dense(input: &Path, pitch_mm: f64) -> Failure {
@@ -197,17 +214,25 @@ fn write_report(path: &Path, report: &Report) -> Result<(), Failure> {
     .map_err(|error| Failure::at(format!("cannot write {}", path.display()), &error))
 }
 
-fn refused(input: &Path, error: &PipelineError) -> Failure {
-    match (error, error.hint()) {
-        (PipelineError::Cancelled, _) => Failure::Interrupted,
-        (_, Some(hint)) => Failure::Failed(format!("{}: {error}; {hint}", input.display())),
-        (_, None) => Failure::Failed(format!("{}: {error}", input.display())),
+fn refused(input: &Path, error: &PipelineError, suspicion: Option<&str>) -> Failure {
+    if matches!(error, PipelineError::Cancelled) {
+        return Failure::Interrupted;
     }
+    let message = format!("{}: {error}", input.display());
+    let more = suspicion.into_iter().chain(error.hint());
+    Failure::Failed(more.fold(message, |message, part| format!("{message}; {part}")))
 }
 
 fn told(converted: &Converted) -> String {
     let report = &converted.report;
     let mut lines = vec![converted.output.display().to_string()];
-    lines.extend(crate::summary::lines(report));
+    let mut report = report.clone();
+    report.warnings.retain(|warning| {
+        !converted
+            .notes
+            .iter()
+            .any(|note| note.ends_with(warning.as_str()))
+    });
+    lines.extend(crate::summary::lines(&report));
     lines.join("\n")
 }

@@ -76,11 +76,17 @@ pub enum ReadError {
         reason: String,
     },
     /// A sound file without what was asked for.
-    #[error("the IGES file holds no {wanted}, only {found}")]
+    #[error("the IGES file holds no {wanted}, {found}")]
     Nothing {
         /// What was looked for.
         wanted: &'static str,
-        /// Types of the entities that are there.
+        /// Types of the entities that are there, and what that means.
         found: String,
+    },
+    /// More points than are read into memory.
+    #[error("the IGES file holds more than {limit} points, the most that are read")]
+    TooManyPoints {
+        /// The limit.
+        limit: usize,
     },
 }

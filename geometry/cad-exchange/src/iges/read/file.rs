@@ -12,6 +12,8 @@ use super::values::{Value, next_value, parse_real};
 const PARAMETER_COLUMNS: usize = 64;
 /// Columns of a field of a directory entry.
 const FIELD_COLUMNS: usize = 8;
+/// Types of entities that a message lists one by one.
+const LISTED_TYPES: usize = 5;
 
 /// A directory entry.
 #[derive(Debug, Clone, PartialEq)]
@@ -125,22 +127,28 @@ impl File {
         }
     }
 
-    /// The types of entities present and how many of each, for messages.
+    /// The most frequent types of entities and how many there are of each, for messages.
     pub(super) fn census(&self) -> String {
         let mut types: Vec<u32> = self.entities.iter().map(|entity| entity.entity).collect();
         types.sort_unstable();
-        let groups: Vec<String> = types
+        let mut groups: Vec<(usize, u32)> = types
             .chunk_by(|a, b| a == b)
-            .map(|group| match group.first() {
-                Some(entity) => format!("{} of type {entity}", group.len()),
-                None => String::new(),
-            })
+            .filter_map(|group| Some((group.len(), *group.first()?)))
             .collect();
-        if groups.is_empty() {
-            "no entities at all".to_owned()
-        } else {
-            groups.join(", ")
+        groups.sort_by_key(|&(count, entity)| (std::cmp::Reverse(count), entity));
+        let mut told: Vec<String> = groups
+            .iter()
+            .take(LISTED_TYPES)
+            .map(|(count, entity)| format!("{count} of type {entity}"))
+            .collect();
+        let others: usize = groups.iter().skip(LISTED_TYPES).map(|group| group.0).sum();
+        if others > 0 {
+            told.push(format!("{others} of other types"));
         }
+        if told.is_empty() {
+            return "no entities at all".to_owned();
+        }
+        told.join(", ")
     }
 }
 

@@ -5,8 +5,9 @@ use std::ops::Range;
 
 use super::error::ReadError;
 
-/// Largest file that is read, bytes; it is held in memory as a whole.
-pub const MAX_FILE_BYTES: u64 = 1 << 29;
+/// Largest file that is read, bytes; it is held in memory as a whole. Some four million
+/// points fit.
+pub const MAX_FILE_BYTES: u64 = 1 << 27;
 
 /// Columns of a line.
 const COLUMNS: usize = 80;
@@ -203,6 +204,9 @@ fn section_of(
         }
     }
     let found = match letter {
+        None if number > 1 && record.end == bytes.len() => {
+            "ends before it, and the file with it: the file was cut off".to_owned()
+        }
         None => "ends before it".to_owned(),
         Some(letter) => format!("has {:?} there", char::from(letter)),
     };
@@ -288,6 +292,9 @@ mod tests {
         check("", "is empty");
         check(" \n\n", "is empty");
         check("solid part\n", "line 1: an IGES line has 80 columns");
+        let cut = [line("", 'S', 1), line(",,;", 'G', 1)].join("\n");
+        check(&cut[..120], "line 2: an IGES line has 80 columns");
+        check(&cut[..120], "the file was cut off");
         check(&line("", 'C', 1), "compressed form");
         check(&line("", 'B', 1), "binary form");
         check(&line("", 'S', 1), "no Global section");

@@ -112,7 +112,7 @@ pub fn read_model(source: impl Read) -> Result<TrimmedModel, ReadError> {
     if faces.is_empty() {
         return Err(ReadError::Nothing {
             wanted: "trimmed surfaces (entity 144)",
-            found: file.census(),
+            found: format!("but {}", file.census()),
         });
     }
     let global = file.global;

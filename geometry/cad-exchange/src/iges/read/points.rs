@@ -6,6 +6,9 @@ use super::error::ReadError;
 use super::file::{Entity, File};
 use super::transform;
 
+/// Most points that are read: with the file beside them they stay below 1 GB.
+const MOST_POINTS: usize = 1 << 24;
+
 /// Reads the measured points of anybody's IGES file, in the order of the file.
 ///
 /// Taken are the coordinates of entities 116 and of 106 in all its forms, with their
@@ -43,11 +46,25 @@ pub fn read_points(source: impl Read) -> Result<Vec<[f64; 3]>, ReadError> {
     }
     if points.is_empty() {
         return Err(ReadError::Nothing {
-            wanted: "measured points (entities 106 and 116)",
-            found: file.census(),
+            wanted: "measured points (entities 106 or 116)",
+            found: without_points(&file),
         });
     }
     Ok(points)
+}
+
+/// What the file is, if not a scan.
+fn without_points(file: &File) -> String {
+    if file.entities.is_empty() {
+        return "and no other entities".to_owned();
+    }
+    let census = file.census();
+    let there = |entity: u32| file.entities.iter().any(|e| e.entity == entity);
+    if there(106) || there(116) {
+        // They belong to other entities, or are annotations.
+        return format!("only such as other entities are made of, among {census}");
+    }
+    format!("but {census}; it is a CAD model, not a scan")
 }
 
 fn is_measured(entity: &Entity) -> bool {
@@ -79,6 +96,9 @@ fn copious_data(file: &File, entity: &Entity, points: &mut Vec<[f64; 3]>) -> Res
             }
         };
         points.push(point);
+        if points.len() > MOST_POINTS {
+            return Err(ReadError::TooManyPoints { limit: MOST_POINTS });
+        }
     }
     Ok(())
 }

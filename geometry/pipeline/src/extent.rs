@@ -1,6 +1,8 @@
 //! Whether samples and grid go together: a surface to find, and a grid of a sensible size.
+//! Asked before the work, or after it has come to nothing.
 
-use range_image::{Column, Sample};
+use range_image::{Column, RangeImage, Sample};
+use regrid::Roi;
 
 /// Nodes that every scan may have, however few its samples: some minutes of work.
 const NODES_ALWAYS: f64 = (1_u32 << 24) as f64;
@@ -8,13 +10,17 @@ const NODES_ALWAYS: f64 = (1_u32 << 24) as f64;
 const NODES_PER_SAMPLE: f64 = 4.0;
 /// Points this near to a line are on it: coordinates in files are rounded.
 const LINE_MM: f64 = 1e-4;
+/// Fewer samples than this show no surface, whatever the grid.
+const LEAST_SAMPLES: usize = 16;
+/// Parts larger or smaller than this are rather a matter of wrong units or calibration.
+const UNUSUAL_MM: (f64, f64) = (1.0, 10_000.0);
 /// Samples this share of the column pitch from a line may have been moved there; less than
 /// what parts the corners of the smallest square of samples from its diagonal.
 const MOVED_SHARE: f64 = 0.6;
 
 /// What the samples cover, as the camera sees them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Extent {
+pub struct Extent {
     samples: usize,
     first: [f64; 2],
     low: [f64; 2],
@@ -23,8 +29,17 @@ pub(super) struct Extent {
 
 impl Extent {
     /// `None` where there is no sample.
-    pub(super) fn of(columns: &[Column]) -> Option<Self> {
-        let mut points = points(columns);
+    #[must_use]
+    pub fn of(columns: &[Column]) -> Option<Self> {
+        Self::within(columns, &Roi::default())
+    }
+
+    /// Of the samples in a region of interest.
+    #[must_use]
+    pub fn within(columns: &[Column], roi: &Roi) -> Option<Self> {
+        let inside = |[low, high]: [f64; 2], value: f64| low <= value && value <= high;
+        let mut points = points(columns)
+            .filter(|&[x, y]| inside(roi.x_mm.into(), x) && inside(roi.y_mm.into(), y));
         let first = points.next()?;
         let start = Self {
             samples: 1,
@@ -40,13 +55,21 @@ impl Extent {
         }))
     }
 
-    fn sides_mm(&self) -> [f64; 2] {
+    /// Number of samples.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// Width and height, millimetres.
+    #[must_use]
+    pub fn sides_mm(&self) -> [f64; 2] {
         [self.high[0] - self.low[0], self.high[1] - self.low[1]]
     }
 
     /// Why there is no surface between the samples, if so. A cloud's samples have been
     /// moved into columns of this pitch.
-    pub(super) fn line(&self, columns: &[Column], pitch_mm: f64) -> Option<&'static str> {
+    fn line(&self, columns: &[Column], pitch_mm: f64) -> Option<&'static str> {
         let [width, height] = self.sides_mm();
         if width <= LINE_MM && height <= LINE_MM {
             return Some("at one point in x and y");
@@ -62,23 +85,64 @@ impl Extent {
         let [x0, y0] = self.first;
         let ux = if x0 == self.low[0] { width } else { -width };
         let uy = if y0 == self.low[1] { height } else { -height };
-        let near = LINE_MM.max(pitch_mm * MOVED_SHARE) * ux.hypot(uy);
+        let near = libm::hypot(ux, uy) * LINE_MM.max(pitch_mm * MOVED_SHARE);
         points(columns)
             .all(|[x, y]| ((x - x0) * uy - (y - y0) * ux).abs() <= near)
             .then_some("on one slanted line in x and y")
     }
 
     /// The finest grid for these samples, millimetres between its nodes.
-    pub(super) fn finest_pitch_mm(&self) -> f64 {
+    #[must_use]
+    pub fn finest_pitch_mm(&self) -> f64 {
         let [width, height] = self.sides_mm();
         let nodes = NODES_ALWAYS.max(self.samples as f64 * NODES_PER_SAMPLE);
         let pitch_mm = (width * height / nodes).sqrt();
         // Two digits, not finer than what is allowed.
-        let digit = 10_f64.powf(pitch_mm.log10().floor() - 1.0);
+        let digit = libm::pow(10.0, libm::log10(pitch_mm).floor() - 1.0);
         format!("{:.1e}", (pitch_mm / digit).ceil() * digit)
             .parse()
             .unwrap_or(pitch_mm)
     }
+}
+
+/// Why no surface can lie between these samples, whatever the settings, in words that
+/// follow the name of the scan; `None` where there may be one. A cloud's samples have been
+/// moved into columns of this pitch.
+#[must_use]
+pub fn no_surface(columns: &[Column], column_pitch_mm: f64) -> Option<String> {
+    let Some(extent) = Extent::of(columns) else {
+        return Some(match columns.len() {
+            0 => "holds no columns: nothing was measured".into(),
+            columns => format!("holds no samples: none of its {columns} columns has any"),
+        });
+    };
+    if let Some(line) = extent.line(columns, column_pitch_mm) {
+        return Some(format!(
+            "all its samples lie {line}, so that there is no surface between them; x runs along \
+             the table, y up and z towards the camera"
+        ));
+    }
+    (extent.samples < LEAST_SAMPLES).then(|| {
+        format!(
+            "holds {} samples only, too few for a surface; a scan has thousands",
+            extent.samples
+        )
+    })
+}
+
+/// What is suspicious about the size of a part, if anything.
+#[must_use]
+pub fn unusual_size(image: &RangeImage) -> Option<String> {
+    let side_mm = |nodes: usize| nodes as f64 * image.pitch_mm();
+    let size_mm = side_mm(image.columns()).max(side_mm(image.rows()));
+    let (least_mm, greatest_mm) = UNUSUAL_MM;
+    if image.valid_nodes() == 0 || (least_mm..=greatest_mm).contains(&size_mm) {
+        return None;
+    }
+    Some(format!(
+        "what was measured is {size_mm:.3} mm across, which is unusual: check the scanner's \
+         calibration, or the units of the file"
+    ))
 }
 
 fn points(columns: &[Column]) -> impl Iterator<Item = [f64; 2]> {

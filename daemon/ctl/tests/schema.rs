@@ -1,0 +1,277 @@
+//! What is published about the JSON documents in `docs/schema` holds for real ones, and
+//! leaves out nothing that they hold.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on says where"
+)]
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use common::{relief, roof, text};
+use jsonschema::{Retrieve, Uri, Validator};
+use reliefd::{Config, Daemon};
+use serde_json::{Value, json};
+use sim_scanner::config::SimConfig;
+use sim_scanner::preset::Overrides;
+
+const FILES: [&str; 3] = [
+    "report.schema.json",
+    "manifest.schema.json",
+    "commands.schema.json",
+];
+
+fn published(name: &str) -> Value {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/schema");
+    let text = fs::read_to_string(folder.join(name)).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+/// The schemas as published, or, strictly, with every key forbidden that they do not name.
+struct Published {
+    strict: bool,
+}
+
+impl Retrieve for Published {
+    fn retrieve(
+        &self,
+        uri: &Uri<String>,
+    ) -> Result<Value, Box<dyn std::error::Error + Send + Sync>> {
+        let name = uri.path().as_str().trim_start_matches('/');
+        let mut schema = published(name);
+        if self.strict {
+            close(&mut schema);
+        }
+        Ok(schema)
+    }
+}
+
+/// Forbids keys without a description.
+fn close(schema: &mut Value) {
+    match schema {
+        Value::Object(keys) => {
+            // The keys of an event depend on its kind, which `properties` does not tell.
+            if keys.contains_key("properties")
+                && keys.contains_key("required")
+                && !keys.contains_key("allOf")
+            {
+                keys.insert("additionalProperties".into(), false.into());
+            }
+            keys.values_mut().for_each(close);
+        }
+        Value::Array(items) => items.iter_mut().for_each(close),
+        _ => {}
+    }
+}
+
+fn validator(reference: &str, strict: bool) -> Validator {
+    jsonschema::options()
+        .with_base_uri("json-schema:///")
+        .with_retriever(Published { strict })
+        .build(&json!({ "$ref": reference }))
+        .unwrap()
+}
+
+#[track_caller]
+fn check(reference: &str, document: &Value) {
+    // What an event holds beside its kind is told by the kind.
+    let modes: &[bool] = if reference.ends_with("/watch") {
+        &[false]
+    } else {
+        &[false, true]
+    };
+    for &strict in modes {
+        let schema = validator(reference, strict);
+        let problems: Vec<String> = schema
+            .iter_errors(document)
+            .map(|error| format!("{}: {error}", error.instance_path()))
+            .collect();
+        assert!(
+            problems.is_empty(),
+            "{reference}, strict {strict}: {problems:#?}\n{document:#}"
+        );
+    }
+}
+
+fn document(output: &Output) -> Value {
+    let told = String::from_utf8_lossy(&output.stderr);
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {told}"))
+}
+
+fn file(path: PathBuf) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+#[test]
+fn the_schemas_are_schemas() {
+    for name in FILES {
+        let schema = published(name);
+        assert!(jsonschema::meta::is_valid(&schema), "{name}");
+        assert_eq!(schema["$id"], name);
+        assert!(schema["$schema"].as_str().unwrap().contains("2020-12"));
+    }
+    for command in [
+        "convert", "demo", "scan", "abort", "status", "scans", "jobs", "retry", "cancel", "rerun",
+        "watch", "fetch", "doctor",
+    ] {
+        let reference = format!("commands.schema.json#/$defs/{command}");
+        assert!(
+            !validator(&reference, false).is_valid(&json!(7)),
+            "{command}"
+        );
+    }
+}
+
+#[test]
+fn the_report_of_a_conversion() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    fs::write(at.join("roof.xyz"), text(&roof())).unwrap();
+    let options = ["convert", "roof.xyz", "--json", "--report", "r.json"];
+    for more in [
+        &[][..],
+        &["--method", "shim-lee", "--entities", "128"],
+        &[
+            "--roi-z-mm=,19",
+            "--keep-background",
+            "--minimum-area-mm2",
+            "5",
+        ],
+    ] {
+        let told = document(&relief(at, &[&options[..], more].concat()));
+        check("commands.schema.json#/$defs/convert", &told);
+        check("report.schema.json", &file(at.join("r.json")));
+        // Newer programs may say more, but not less.
+        let mut newer = told["report"].clone();
+        newer["news"] = json!({ "of": 1 });
+        newer["scan"]["news"] = json!(true);
+        let schema = validator("report.schema.json", false);
+        assert!(schema.is_valid(&newer));
+        for key in ["snr_db", "warnings", "regions"] {
+            let mut less = newer.clone();
+            less.as_object_mut().unwrap().remove(key);
+            assert!(!schema.is_valid(&less), "{key}");
+        }
+        newer["regions"]["count"] = json!("two");
+        assert!(!schema.is_valid(&newer));
+    }
+}
+
+#[test]
+fn what_the_demo_tells_with_a_table_left_out() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let told = document(&relief(
+        at,
+        &[
+            "demo",
+            "--json",
+            "--object",
+            "house-on-table",
+            "--out",
+            "there",
+        ],
+    ));
+    check("commands.schema.json#/$defs/demo", &told);
+    assert_ne!(told["report"]["background"]["count"], 0);
+    check("report.schema.json", &file(at.join("there/report.json")));
+    check(
+        "manifest.schema.json",
+        &file(at.join("there/manifest.json")),
+    );
+}
+
+#[test]
+fn what_the_doctor_tells() {
+    let directory = tempfile::tempdir().unwrap();
+    let told = relief(
+        directory.path(),
+        &["doctor", "--json", "--socket", "none.sock"],
+    );
+    check("commands.schema.json#/$defs/doctor", &document(&told));
+}
+
+/// A client of a service; the service needs the test's threads meanwhile.
+async fn ask(at: &Path, socket: &Path, arguments: &[&str]) -> Value {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_relief"));
+    command.current_dir(at).arg("--json").args(arguments);
+    command.arg("--socket").arg(socket);
+    let output = tokio::task::spawn_blocking(move || command.output());
+    document(&output.await.unwrap().unwrap())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_the_clients_of_the_service_tell() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let scanner = SimConfig {
+        overrides: Overrides {
+            columns: Some(60),
+            samples: Some(64),
+            ..Overrides::default()
+        },
+        ..SimConfig::default()
+    };
+    let scanner = scanner.serve_pty(None).unwrap();
+    let mut config = Config::default();
+    config.service.socket = at.join("s");
+    config.service.state_dir = at.join("state");
+    config.service.spool_dir = at.join("spool");
+    config.scanner.port = scanner.port().to_owned();
+    let daemon = Daemon::start(config).await.unwrap();
+    let socket = daemon.socket().to_owned();
+    let told = |arguments: &'static [&'static str]| {
+        let socket = socket.clone();
+        async move {
+            let told = ask(at, &socket, arguments).await;
+            check(
+                &format!("commands.schema.json#/$defs/{}", arguments[0]),
+                &told,
+            );
+            told
+        }
+    };
+    // As many events as the scan's beginning has for sure.
+    let watched = tokio::spawn({
+        let (at, socket) = (at.to_owned(), socket.clone());
+        async move { ask(&at, &socket, &["watch", "--count", "12"]).await }
+    });
+    let scanned = told(&["scan", "--name", "house", "--operator", "A", "--wait"]).await;
+    assert_eq!(scanned["job"]["state"], "done");
+    check("commands.schema.json#/$defs/watch", &watched.await.unwrap());
+    let status = told(&["status"]).await;
+    assert_eq!(status["scanner"]["link"], "ready");
+    told(&["fetch", "latest", "-o", "out"]).await;
+    check("manifest.schema.json", &file(at.join("out/manifest.json")));
+    check("report.schema.json", &file(at.join("out/report.json")));
+    // A job that fails, so that its error is there, and that is taken up again.
+    let few = &["rerun", "latest", "--set", "regrid.roi_x_mm=[900,901]"];
+    let failing = told(few).await;
+    assert_eq!(failing["settings"]["regrid.roi_x_mm"], json!([900, 901]));
+    let jobs = loop {
+        let jobs = told(&["jobs"]).await;
+        if jobs["jobs"][0]["state"] == "failed" {
+            break jobs;
+        }
+    };
+    assert!(jobs["jobs"][0]["hint"].is_string());
+    told(&["retry", "2"]).await;
+    let cancelled = ask(
+        at,
+        &socket,
+        &["rerun", "latest", "--set", "regrid.draws=100000"],
+    )
+    .await;
+    assert_eq!(cancelled["id"], 3);
+    told(&["cancel", "3"]).await;
+    let second = told(&["scan", "--name", "second"]).await;
+    assert!(second.get("job").is_none());
+    told(&["abort"]).await;
+    told(&["scans"]).await;
+    daemon.shutdown().await;
+}

@@ -1,0 +1,189 @@
+//! Compression taken off a file, told by content, with words for what is wrong with it.
+
+use std::io::{self, BufRead, BufReader, Cursor, Read};
+
+use flate2::bufread::MultiGzDecoder;
+
+use crate::error::ScanFileError;
+
+const BUFFER_BYTES: usize = 256 * 1024;
+const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+/// Enough to tell all formats apart: the mark of a tar archive is the last to come.
+const HEAD_BYTES: u64 = 512;
+/// Files that were packed twice by mistake are read; what is packed more often is no
+/// accident, and each layer multiplies by a thousand what a small file can unfold to.
+const MOST_LAYERS: u32 = 2;
+/// How much is still unpacked to find out whether damage explains what could not be read.
+const SEARCHED_BYTES: u64 = 1 << 28;
+
+/// A byte source without its compression.
+///
+/// Reading fails with [`io::ErrorKind::InvalidData`] and plain words where the compressed
+/// data are damaged or cut off.
+pub struct Unpacked<'a> {
+    head: Vec<u8>,
+    reader: Box<dyn BufRead + 'a>,
+    layers: u32,
+    name: String,
+}
+
+impl<'a> Unpacked<'a> {
+    /// Takes off the compression, if there is any; `name` stands for the file in errors.
+    ///
+    /// # Errors
+    /// [`ScanFileError::Read`] when the first bytes cannot be read or unpacked,
+    /// [`ScanFileError::PackedTooOften`], [`ScanFileError::Empty`].
+    pub fn new(source: impl Read + 'a, name: &str) -> Result<Self, ScanFileError> {
+        let mut reader: Box<dyn BufRead + 'a> =
+            Box::new(BufReader::with_capacity(BUFFER_BYTES, source));
+        let mut layers = 0;
+        loop {
+            let mut head = Vec::new();
+            reader
+                .by_ref()
+                .take(HEAD_BYTES)
+                .read_to_end(&mut head)
+                .map_err(|source| ScanFileError::Read {
+                    file: name.to_owned(),
+                    after: "0 bytes".to_owned(),
+                    source,
+                })?;
+            let packed = head.starts_with(&GZIP_MAGIC);
+            if head.is_empty() {
+                return Err(ScanFileError::Empty {
+                    file: name.to_owned(),
+                    packed: layers > 0,
+                });
+            }
+            let whole = Cursor::new(head.clone()).chain(reader);
+            if !packed {
+                return Ok(Self {
+                    head,
+                    reader: Box::new(whole),
+                    layers,
+                    name: name.to_owned(),
+                });
+            }
+            if layers == MOST_LAYERS {
+                return Err(ScanFileError::PackedTooOften {
+                    file: name.to_owned(),
+                    limit: MOST_LAYERS,
+                });
+            }
+            layers += 1;
+            reader = Box::new(BufReader::with_capacity(
+                BUFFER_BYTES,
+                Gunzip {
+                    decoder: MultiGzDecoder::new(whole),
+                    unpacked: 0,
+                },
+            ));
+        }
+    }
+
+    /// The first bytes, 512 or as many as there are.
+    #[must_use]
+    pub fn head(&self) -> &[u8] {
+        &self.head
+    }
+
+    /// How often the file was compressed.
+    #[must_use]
+    pub fn layers(&self) -> u32 {
+        self.layers
+    }
+
+    /// After content that made no sense: whether the compressed data are damaged, which
+    /// often shows by their checksum only, at their end. Takes some seconds at most.
+    #[must_use]
+    pub fn damage(&mut self) -> Option<ScanFileError> {
+        if self.layers == 0 {
+            return None;
+        }
+        let rest = self.reader.by_ref().take(SEARCHED_BYTES);
+        let source = io::copy(&mut { rest }, &mut io::sink()).err()?;
+        Some(ScanFileError::Damaged {
+            file: self.name.clone(),
+            source,
+        })
+    }
+}
+
+impl std::fmt::Debug for Unpacked<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Unpacked")
+            .field("name", &self.name)
+            .field("layers", &self.layers)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Read for Unpacked<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.reader.read(buffer)
+    }
+}
+
+impl BufRead for Unpacked<'_> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        self.reader.fill_buf()
+    }
+
+    fn consume(&mut self, amount: usize) {
+        self.reader.consume(amount);
+    }
+}
+
+/// A decoder whose errors are told in the user's words.
+struct Gunzip<R> {
+    decoder: MultiGzDecoder<R>,
+    unpacked: u64,
+}
+
+impl<R: BufRead> Read for Gunzip<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self
+            .decoder
+            .read(buffer)
+            .map_err(|error| self.told(&error))?;
+        self.unpacked += read as u64;
+        Ok(read)
+    }
+}
+
+impl<R> Gunzip<R> {
+    fn told(&self, error: &io::Error) -> io::Error {
+        let cause = error.to_string();
+        // What the decoder says of a stream that just ends depends on where it ends.
+        let cut = error.kind() == io::ErrorKind::UnexpectedEof || cause.contains("incomplete");
+        let text = if matches!(error.kind(), io::ErrorKind::InvalidData) && cause.contains("gzip (")
+        {
+            // An outer layer has told it already.
+            cause
+        } else if cut {
+            format!(
+                "the compressed data (gzip) end too early, after {} unpacked bytes: the file was \
+                 cut off, copy it again",
+                self.unpacked
+            )
+        } else if self.unpacked > 0 && cause.contains("header") {
+            format!(
+                "something that is not gzip follows the compressed data, after {} unpacked \
+                 bytes: compress the file anew",
+                self.unpacked
+            )
+        } else if matches!(
+            error.kind(),
+            io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput
+        ) {
+            format!(
+                "the compressed data (gzip) are damaged, after {} unpacked bytes ({cause}): copy \
+                 the file again",
+                self.unpacked
+            )
+        } else {
+            return io::Error::new(error.kind(), cause);
+        };
+        io::Error::new(io::ErrorKind::InvalidData, text)
+    }
+}

@@ -1,0 +1,53 @@
+//! The short form of `cargo xtask study mutations`.
+
+use peak_alloc::PeakAlloc;
+use relief_tests::mutations::{self, MOST_BYTES, Meter, Wanted};
+
+#[global_allocator]
+static ALLOCATOR: PeakAlloc = PeakAlloc;
+
+struct Memory;
+
+impl Meter for Memory {
+    fn begin(&self) -> usize {
+        ALLOCATOR.reset_peak_usage();
+        ALLOCATOR.current_usage()
+    }
+
+    fn peak(&self) -> usize {
+        ALLOCATOR.peak_usage()
+    }
+}
+
+/// One test, since memory is measured for the whole process.
+#[test]
+fn damaged_files_end_no_reader_and_take_no_memory() {
+    let seeds = mutations::seeds().unwrap();
+    let one = mutations::mutant(&seeds, 7).unwrap();
+    assert_eq!(one.bytes, mutations::mutant(&seeds, 7).unwrap().bytes);
+    let wanted = Wanted {
+        // Others than those of the long form.
+        first: 1_000_000,
+        files: 400,
+        through_every: 20,
+    };
+    let figures = mutations::run(&wanted, &Memory, |_| {}).unwrap();
+    assert!(figures.panics.is_empty(), "{:?}", figures.panics);
+    assert!(
+        figures.most_bytes.0 < MOST_BYTES,
+        "{:?}",
+        figures.most_bytes
+    );
+    assert_eq!(figures.formats.len(), seeds.len());
+    // Damage that nobody survives, or everybody, shows nothing.
+    let (files, taken) = figures
+        .formats
+        .values()
+        .fold((0, 0), |sum, format| (sum.0 + format.0, sum.1 + format.1));
+    assert_eq!(files, wanted.files);
+    assert!(
+        (files / 10..files * 9 / 10).contains(&taken),
+        "{taken} of {files}"
+    );
+    assert!(figures.through.1 > 0, "{:?}", figures.through);
+}
