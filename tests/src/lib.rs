@@ -15,3 +15,4 @@ pub mod outline;
 pub mod rig;
 pub mod scenes;
 pub mod score;
+pub mod trimming;
