@@ -74,8 +74,8 @@ pub(crate) struct Figures {
     pub(crate) pitch_mm: f64,
     /// One for each of the subject's regions.
     pub(crate) regions: Vec<Option<RegionFigures>>,
-    /// Regions and faces that were found.
-    pub(crate) found: (usize, usize),
+    /// Faces of the model.
+    pub(crate) faces: usize,
     /// The restored image against the range image and against the truth.
     pub(crate) whole: [Metrics; 2],
     /// The range image against the truth.
@@ -121,7 +121,7 @@ pub(crate) fn run(scan: &Scan, method: Method, threads: usize) -> Result<Run> {
     let figures = Figures {
         pitch_mm: scan.pitch_mm,
         regions,
-        found: (usize::from(outcome.regions.regions()), model.faces.len()),
+        faces: model.faces.len(),
         whole: [
             compare(&image, &outcome.reconstruction.restored),
             compare(&truth.image, &restored),
@@ -165,7 +165,9 @@ fn labels(
     // Of equals the first counts, which is the last of the reversed.
     let most = |chosen: &dyn Fn(&(usize, u16)) -> bool| {
         let among = shared.iter().rev().filter(|(pair, _)| chosen(pair));
-        among.max_by_key(|(_, nodes)| **nodes).map(|(pair, _)| *pair)
+        among
+            .max_by_key(|(_, nodes)| **nodes)
+            .map(|(pair, _)| *pair)
     };
     subject
         .regions()

@@ -16,10 +16,6 @@ pub(crate) enum Reference {
     Truth,
 }
 
-impl Reference {
-    pub(crate) const ALL: [Self; 2] = [Self::RangeImage, Self::Truth];
-}
-
 /// Peak signal-to-noise ratios of one region, decibels; by [`Reference`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RegionFigures {

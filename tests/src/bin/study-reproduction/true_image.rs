@@ -77,10 +77,7 @@ impl TrueImage {
         let index = |k: usize, here: i64, there: i64| {
             usize::try_from(k as i64 + there - here).unwrap_or(usize::MAX)
         };
-        (
-            index(column, here.0, there.0),
-            index(row, here.1, there.1),
-        )
+        (index(column, here.0, there.0), index(row, here.1, there.1))
     }
 }
 
