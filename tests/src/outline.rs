@@ -204,14 +204,31 @@ impl Polygon {
     /// Distance of a point from the nearest side.
     #[must_use]
     pub fn distance(&self, p: [f64; 2]) -> f64 {
-        let mut least = f64::INFINITY;
+        self.nearest(p).0
+    }
+
+    /// The same, positive on the left of that side: inside, where the polygon runs
+    /// counter-clockwise. Uncertain where two sides are equally near.
+    #[must_use]
+    pub fn signed_distance(&self, p: [f64; 2]) -> f64 {
+        let (distance, (a, b)) = self.nearest(p);
+        let left = (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+        distance.copysign(left)
+    }
+
+    fn nearest(&self, p: [f64; 2]) -> (f64, Side) {
+        let mut nearest = (f64::INFINITY, (p, p));
         for bundle in &self.bundles {
-            if apart(p, bundle.point) - bundle.reach < least {
-                let off = bundle.sides.iter().map(|&(c, d)| to_side(p, c, d));
-                least = off.fold(least, f64::min);
+            if apart(p, bundle.point) - bundle.reach < nearest.0 {
+                for &(c, d) in &bundle.sides {
+                    let off = to_side(p, c, d);
+                    if off < nearest.0 {
+                        nearest = (off, (c, d));
+                    }
+                }
             }
         }
-        least
+        nearest
     }
 }
 

@@ -15,17 +15,25 @@ pub const OBLIQUE_DEG: f64 = 1.0;
 /// arc differ by less, faces that merely pass each other by more.
 const SHARED_MM: f64 = 0.01;
 
-/// Squared distances, summed.
+/// Distances, summed: positive where the loop lies outside of the true outline.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Squares {
+pub struct Sums {
+    sum_mm: f64,
     sum_mm2: f64,
     count: usize,
 }
 
-impl Squares {
+impl Sums {
     fn add(&mut self, distance_mm: f64) {
+        self.sum_mm += distance_mm;
         self.sum_mm2 += distance_mm * distance_mm;
         self.count += 1;
+    }
+
+    /// Mean, millimetres; NaN without any.
+    #[must_use]
+    pub fn mean_mm(&self) -> f64 {
+        self.sum_mm / self.count as f64
     }
 
     /// Root mean square, millimetres; NaN without any.
@@ -41,20 +49,21 @@ pub struct Trimming {
     /// The greatest, either way, millimetres.
     pub most_mm: f64,
     /// From the points of the true outlines.
-    pub all: Squares,
+    pub all: Sums,
     /// The same for silhouettes [`OBLIQUE_DEG`] and more off both axes.
-    pub oblique_silhouettes: Squares,
+    pub oblique_silhouettes: Sums,
 }
 
 impl Trimming {
-    /// Takes in the loop drawn around one face. `faces` are all that are seen.
+    /// Takes in the loop drawn around one face, counter-clockwise. `faces` are all that are
+    /// seen.
     pub fn add(&mut self, drawn: &[[f64; 2]], face: &VisibleFace, faces: &[VisibleFace]) {
         let looped = Polygon::new(drawn);
         for (from, to) in sides(&face.outline_mm) {
             let oblique = is_oblique(from, to) && is_silhouette((from + to) / 2.0, face, faces);
             for point in along([from.x, from.y], [to.x, to.y]) {
-                let off = looped.distance(point);
-                self.most_mm = self.most_mm.max(off);
+                let off = looped.signed_distance(point);
+                self.most_mm = self.most_mm.max(off.abs());
                 self.all.add(off);
                 if oblique {
                     self.oblique_silhouettes.add(off);
@@ -132,6 +141,35 @@ mod tests {
             assert!(trimming.most_mm <= 0.3 + 1e-9 && trimming.most_mm > 0.15);
             assert!(trimming.all.rms_mm() < trimming.most_mm);
         }
+    }
+
+    #[test]
+    fn a_loop_that_is_too_wide_lies_outside() {
+        let faces = faces("cylinder");
+        let top = &faces[1];
+        let middle = top.outline_mm.iter().sum::<Vec3>() / top.outline_mm.len() as f64;
+        let mut wide: Vec<[f64; 2]> = top
+            .outline_mm
+            .iter()
+            .map(|p| middle + (p - middle) * 1.01)
+            .map(|p| [p.x, p.y])
+            .collect();
+        if area(&wide) < 0.0 {
+            wide.reverse();
+        }
+        let mut trimming = Trimming::default();
+        trimming.add(&wide, top, &faces);
+        let mean = trimming.all.mean_mm();
+        assert!(
+            mean > 0.2 && mean <= trimming.all.rms_mm() + 1e-12,
+            "{mean}"
+        );
+    }
+
+    fn area(polygon: &[[f64; 2]]) -> f64 {
+        let next = polygon.iter().cycle().skip(1);
+        let pairs = polygon.iter().zip(next);
+        pairs.map(|(a, b)| (a[0] * b[1] - a[1] * b[0]) / 2.0).sum()
     }
 
     #[test]

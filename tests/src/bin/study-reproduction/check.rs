@@ -14,11 +14,14 @@ pub(crate) const TOLERANCES: [(&str, f64); 4] = [
 pub(crate) fn differences(committed: &str, fresh: &str) -> Vec<String> {
     let (old, new): (Vec<&str>, Vec<&str>) = (committed.lines().collect(), fresh.lines().collect());
     let mut found = Vec::new();
-    let (mut section, mut heads): (&str, Vec<&str>) = ("", Vec::new());
+    let (mut section, mut lead, mut heads) = ("", "", Vec::new());
     for (k, (was, is)) in old.iter().zip(&new).enumerate() {
         let (cells_was, cells_is) = (cells(was), cells(is));
         if let Some(title) = is.strip_prefix('#') {
             section = title.trim_start_matches('#').trim();
+            lead = "";
+        } else if cells_is.is_none() && !is.is_empty() {
+            lead = is.strip_suffix(':').unwrap_or_default();
         }
         match (cells_was, cells_is) {
             (Some(was), Some(is)) if was.len() == is.len() => {
@@ -26,10 +29,12 @@ pub(crate) fn differences(committed: &str, fresh: &str) -> Vec<String> {
                     heads = is.clone();
                 }
                 let row = row_name(&is);
+                let about = [section, lead, &row].map(str::to_owned);
+                let about: Vec<String> = about.into_iter().filter(|a| !a.is_empty()).collect();
                 for (column, (was, is)) in was.iter().zip(&is).enumerate() {
                     let head = heads.get(column).copied().unwrap_or_default();
                     if let Some(difference) = difference(was, is, head) {
-                        found.push(format!("{section}: {row}: {head}: {difference}"));
+                        found.push(format!("{}: {head}: {difference}", about.join(": ")));
                     }
                 }
             }
@@ -121,7 +126,7 @@ fn difference(was: &str, is: &str, head: &str) -> Option<String> {
 mod tests {
     use super::*;
 
-    const PAGE: &str = "# Title\n\nText.\n\n## Table 1\n\n| region | way, dB | lost, nodes | t, s |\n\
+    const PAGE: &str = "# Title\n\nText.\n\n## Table 1\n\nMeasured:\n\n| region | way, dB | lost, nodes | t, s |\n\
                         | --- | --- | --- | --- |\n| top | 81.20 / 82.00 | 31 | 1.2 |\n";
 
     fn changed(from: &str, to: &str) -> Vec<String> {
@@ -141,7 +146,7 @@ mod tests {
         assert_eq!(
             changed("82.00", "82.51"),
             [
-                "Table 1: top: way, dB: 81.20 / 82.00 on the page, 81.20 / 82.51 now, more than \
+                "Table 1: Measured: top: way, dB: 81.20 / 82.00 on the page, 81.20 / 82.51 now, more than \
                  0.5 apart"
             ]
         );
@@ -156,7 +161,7 @@ mod tests {
         assert_eq!(changed("lost", "found").len(), 1);
         assert_eq!(
             differences(PAGE, &format!("{PAGE}More.\n")),
-            ["9 lines on the page, 10 expected"]
+            ["11 lines on the page, 12 expected"]
         );
     }
 

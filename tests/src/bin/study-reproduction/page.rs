@@ -43,8 +43,16 @@ pub(crate) fn page(results: &Results) -> Result<String> {
             regions_over_seeds(results, Reference::Truth),
         ),
         ("nodes", nodes(results)),
-        ("images", wholes(results, Kind::Images, false)),
-        ("images over seeds", wholes(results, Kind::Images, true)),
+        ("images", wholes(results, Kind::AgainstImage, false)),
+        (
+            "images over seeds",
+            wholes(results, Kind::AgainstImage, true),
+        ),
+        ("truth", wholes(results, Kind::AgainstTruth, false)),
+        (
+            "truth over seeds",
+            wholes(results, Kind::AgainstTruth, true),
+        ),
         ("borders", wholes(results, Kind::Borders, false)),
         ("borders over seeds", wholes(results, Kind::Borders, true)),
         ("seconds", seconds(results)),

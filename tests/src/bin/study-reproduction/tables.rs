@@ -131,37 +131,36 @@ pub(crate) fn nodes(results: &Results) -> String {
 /// A figure of a whole run: head of its column, decimals, which end is bad, and its value.
 type Whole = (&'static str, usize, Worst, fn(&Figures) -> f64);
 
-const WHOLE: [Whole; 9] = [
-    ("SNR against range image, dB", 2, Worst::Least, |f| {
-        f.whole[0].snr_db
-    }),
+const AGAINST_IMAGE: [Whole; 3] = [
+    ("SNR, dB", 2, Worst::Least, |f| f.whole[0].snr_db),
     ("lost, nodes", 0, Worst::Most, |f| {
         f.whole[0].lost_nodes as f64
     }),
     ("invented, nodes", 0, Worst::Most, |f| {
         f.whole[0].invented_nodes as f64
     }),
-    ("SNR against truth, dB", 2, Worst::Least, |f| {
-        f.whole[1].snr_db
-    }),
-    ("lost, nodes", 0, Worst::Most, |f| {
+];
+
+const AGAINST_TRUTH: [Whole; 6] = [
+    ("restored: SNR, dB", 2, Worst::Least, |f| f.whole[1].snr_db),
+    ("restored: lost, nodes", 0, Worst::Most, |f| {
         f.whole[1].lost_nodes as f64
     }),
-    ("invented, nodes", 0, Worst::Most, |f| {
+    ("restored: invented, nodes", 0, Worst::Most, |f| {
         f.whole[1].invented_nodes as f64
     }),
-    ("range image against truth: SNR, dB", 2, Worst::Least, |f| {
+    ("range image: SNR, dB", 2, Worst::Least, |f| {
         f.regridded.snr_db
     }),
-    ("lost, nodes", 0, Worst::Most, |f| {
+    ("range image: lost, nodes", 0, Worst::Most, |f| {
         f.regridded.lost_nodes as f64
     }),
-    ("invented, nodes", 0, Worst::Most, |f| {
+    ("range image: invented, nodes", 0, Worst::Most, |f| {
         f.regridded.invented_nodes as f64
     }),
 ];
 
-const BORDERS: [Whole; 6] = [
+const BORDERS: [Whole; 7] = [
     ("faces, number", 0, Worst::Most, |f| f.faces as f64),
     ("farthest, pitches", 2, Worst::Most, |f| {
         f.trimming.most_mm / f.pitch_mm
@@ -174,6 +173,12 @@ const BORDERS: [Whole; 6] = [
         3,
         Worst::Most,
         oblique_rms_pitches,
+    ),
+    (
+        "oblique silhouettes: mean outward, pitches",
+        3,
+        Worst::Most,
+        |f| f.trimming.oblique_silhouettes.mean_mm() / f.pitch_mm,
     ),
     ("vertices, number", 0, Worst::Most, |f| f.vertices as f64),
     ("corners of the truth, number", 0, Worst::Most, |f| {
@@ -189,8 +194,10 @@ pub(crate) fn oblique_rms_pitches(figures: &Figures) -> f64 {
 /// Which figures of whole runs stand in a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// Section VI.
-    Images,
+    /// Section VI: restored images against the range images.
+    AgainstImage,
+    /// Restored and range images against the truth.
+    AgainstTruth,
     /// How far trim curves are off.
     Borders,
 }
@@ -198,7 +205,8 @@ pub(crate) enum Kind {
 /// One row for each object and road: the first seed, or the worst and the median of all.
 pub(crate) fn wholes(results: &Results, kind: Kind, all_seeds: bool) -> String {
     let (columns, with_paper): (&[Whole], bool) = match kind {
-        Kind::Images => (&WHOLE, !all_seeds),
+        Kind::AgainstImage => (&AGAINST_IMAGE, !all_seeds),
+        Kind::AgainstTruth => (&AGAINST_TRUTH, false),
         Kind::Borders => (&BORDERS, false),
     };
     let mut heads = vec!["object", "road"];
