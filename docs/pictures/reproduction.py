@@ -172,25 +172,37 @@ def save(figure, folder, number):
 
 
 def keep(figure, folder, number, palette=None):
-    """Writes the figure with the colours of an image that has a palette, or with the best 128."""
+    """Writes the figure in the colours of a palette, or in the best 128."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=100)
     plt.close(figure)
     picture = Image.open(buffer).convert("RGB")
-    picture = picture.quantize(128, palette=palette, dither=Image.Dither.NONE)
+    if palette is None:
+        picture = picture.quantize(128, dither=Image.Dither.NONE)
+    else:
+        picture = in_colours(picture, palette)
     picture.save(folder / f"figure-{number:02}.png", optimize=True)
 
 
+def in_colours(picture, palette):
+    """Each pixel in the nearest colour; pillow's own search is coarse, and white not white."""
+    pixels = np.asarray(picture, dtype=np.int32)
+    seen, which = np.unique(pixels.reshape(-1, 3), axis=0, return_inverse=True)
+    off = ((seen[:, None, :] - palette[None]) ** 2).sum(axis=2)
+    nearest = off.argmin(axis=1).astype(np.uint8)[which.reshape(-1)]
+    drawn = Image.fromarray(nearest.reshape(pixels.shape[:2]), "P")
+    drawn.putpalette(palette.astype(np.uint8).tobytes())
+    return drawn
+
+
 def greys_and_accents():
-    """An image whose palette has greys, and each accent pure and mixed with black and white."""
+    """Greys, and each accent pure and mixed with black and white."""
     colours = [(k * 255 // (GREYS - 1),) * 3 for k in range(GREYS)]
     for accent in ACCENTS:
         accent = np.array(matplotlib.colors.to_rgb(accent)) * 255
         for share, other in ((1.0, 0), (0.5, 0), (0.5, 255)):
             colours.append(tuple(int(c) for c in share * accent + (1 - share) * other))
-    picture = Image.new("P", (1, 1))
-    picture.putpalette([part for colour in colours for part in colour])
-    return picture
+    return np.array(colours)
 
 
 def figure_3(roads, folder):
