@@ -4,7 +4,8 @@
 #   docs/pictures/make.sh [PYTHON]
 #
 # PYTHON has cadquery-ocp, matplotlib and pillow. Recorded scans are drawn where they are to
-# be had (../shared/data beside the repository), with their table in docs/studies.
+# be had (../shared/data beside the repository), with their table in docs/studies. Those of
+# docs/reproduction.md are made by `cargo xtask reproduce`.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 python=${1:-python3}

@@ -65,19 +65,9 @@ def turned(points):
     return points[..., [0, 2, 1]] * np.array([1.0, -1.0, 1.0])
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("iges")
-    parser.add_argument("out")
-    parser.add_argument("--elevation", type=float, default=25.0)
-    parser.add_argument("--azimuth", type=float, default=-65.0)
-    parser.add_argument("--title", default="")
-    options = parser.parse_args()
-
-    shape = load(options.iges)
+def draw(axes, shape, labels=True, colours=COLOURS):
+    """Faces shaded in colours of their own, edges in black, on axes in 3D."""
     BRepMesh_IncrementalMesh(shape, 0.05, False, 0.2, True)
-    figure = plt.figure(figsize=(7, 6), dpi=110)
-    axes = figure.add_subplot(projection="3d", proj_type="ortho")
     extent = []
     for number, face in enumerate(explore(shape, TopAbs_FACE)):
         mesh = turned(triangles(face))
@@ -87,9 +77,10 @@ def main():
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         normals = normals / np.where(lengths > 0, lengths, 1)
         shade = 0.45 + 0.55 * np.abs(normals @ (LIGHT / np.linalg.norm(LIGHT)))
-        colour = np.array(COLOURS[number % len(COLOURS)])
+        colour = np.array(matplotlib.colors.to_rgb(colours[number % len(colours)]))
         faces = np.clip(shade[:, None] * colour, 0, 1)
-        axes.add_collection3d(Poly3DCollection(mesh, facecolors=faces, edgecolors=faces, linewidths=0.2))
+        # Edges of the triangles' own colour, wide enough that no seam shines through.
+        axes.add_collection3d(Poly3DCollection(mesh, facecolors=faces, edgecolors=faces, linewidths=0.8))
         extent.append(mesh.reshape(-1, 3))
     lines = [turned(edge_line(edge)) for edge in explore(shape, TopAbs_EDGE)]
     axes.add_collection3d(Line3DCollection(lines, colors="black", linewidths=0.8))
@@ -97,7 +88,23 @@ def main():
     low, high = extent.min(axis=0), extent.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_box_aspect(high - low)
-    axes.set(xlabel="x (mm)", ylabel="-z (mm)", zlabel="y (mm)", title=options.title)
+    if labels:
+        axes.set(xlabel="x (mm)", ylabel="-z (mm)", zlabel="y (mm)")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("iges")
+    parser.add_argument("out")
+    parser.add_argument("--elevation", type=float, default=25.0)
+    parser.add_argument("--azimuth", type=float, default=-65.0)
+    parser.add_argument("--title", default="")
+    options = parser.parse_args()
+
+    figure = plt.figure(figsize=(7, 6), dpi=110)
+    axes = figure.add_subplot(projection="3d", proj_type="ortho")
+    draw(axes, load(options.iges))
+    axes.set(title=options.title)
     axes.view_init(elev=options.elevation, azim=options.azimuth)
     figure.savefig(options.out, bbox_inches="tight")
 

@@ -9,6 +9,8 @@
 //!
 //! The program `study-segmentation` judges the segmentation: [`scenes`] draws objects from
 //! seeds, scans them and knows the face over each node; [`score`] compares labels with it.
+//! `study-reproduction` repeats the experiments of Shim & Lee 1995; [`outline`] and
+//! [`trimming`] say how far trim loops lie from true outlines.
 
 pub mod columns;
 pub mod direct;
@@ -18,3 +20,4 @@ pub mod outline;
 pub mod rig;
 pub mod scenes;
 pub mod score;
+pub mod trimming;

@@ -4,7 +4,7 @@
 use anyhow::{Context, Result, anyhow, bail};
 use pipeline::Settings;
 use range_image::{Column, Unmonitored};
-use reconstruct::model::{Face, Model};
+use reconstruct::model::{Face, Loop, Model};
 use scan_files::recommended_pitch_mm;
 use sim_scanner::config::SimConfig;
 use sim_scanner::scanner::Scanner;
@@ -83,7 +83,10 @@ pub fn measure(config: &SimConfig) -> Result<Outlines> {
 }
 
 /// The columns of the scan that the scanner proposes, and the pitch of their grid.
-fn scan(source: &Source, scanner: &Scanner) -> Result<(Vec<Column>, f64)> {
+///
+/// # Errors
+/// When the scanner refuses its own proposal.
+pub fn scan(source: &Source, scanner: &Scanner) -> Result<(Vec<Column>, f64)> {
     let plan = source.proposed();
     let accepted = source
         .accept(&plan)
@@ -133,8 +136,14 @@ fn compare(
 
 /// The outer loop of a face as a closed polygon.
 fn outer(model: &Model, face: &Face) -> Vec<[f64; 2]> {
+    polygon(model, &face.outer)
+}
+
+/// A loop as a closed polygon, millimetres.
+#[must_use]
+pub fn polygon(model: &Model, around: &Loop) -> Vec<[f64; 2]> {
     let mut polygon = Vec::new();
-    for coedge in &face.outer.coedges {
+    for coedge in &around.coedges {
         let path = &model.edges[coedge.edge.0].path;
         // Pieces may differ in length; [`farthest`] fills in on straight stretches.
         let steps = path.arc_length() / SPACING_MM / path.pieces.len() as f64;
@@ -160,6 +169,7 @@ fn middle(polygon: &[[f64; 2]]) -> [f64; 2] {
 const BUNDLE: usize = 32;
 
 /// Neighbouring sides of a polygon, a point of them, and how far they reach from it.
+#[derive(Debug, Clone)]
 struct Bundle {
     sides: Vec<Side>,
     point: [f64; 2],
@@ -168,45 +178,87 @@ struct Bundle {
 
 type Side = ([f64; 2], [f64; 2]);
 
+/// A closed polygon that distances are asked of.
+#[derive(Debug, Clone)]
+pub struct Polygon {
+    bundles: Vec<Bundle>,
+}
+
+impl Polygon {
+    /// Through these points and back to the first.
+    #[must_use]
+    pub fn new(points: &[[f64; 2]]) -> Self {
+        let bundle = |sides: &[Side]| Bundle {
+            point: sides[0].0,
+            reach: sides
+                .iter()
+                .map(|side| apart(side.1, sides[0].0))
+                .fold(0.0, f64::max),
+            sides: sides.to_vec(),
+        };
+        Self {
+            bundles: sides(points).chunks(BUNDLE).map(bundle).collect(),
+        }
+    }
+
+    /// Distance of a point from the nearest side.
+    #[must_use]
+    pub fn distance(&self, p: [f64; 2]) -> f64 {
+        self.nearest(p).0
+    }
+
+    /// The same, positive on the left of that side: inside, where the polygon runs
+    /// counter-clockwise. Uncertain where two sides are equally near.
+    #[must_use]
+    pub fn signed_distance(&self, p: [f64; 2]) -> f64 {
+        let (distance, (a, b)) = self.nearest(p);
+        let left = (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+        distance.copysign(left)
+    }
+
+    fn nearest(&self, p: [f64; 2]) -> (f64, Side) {
+        let mut nearest = (f64::INFINITY, (p, p));
+        for bundle in &self.bundles {
+            if apart(p, bundle.point) - bundle.reach < nearest.0 {
+                for &(c, d) in &bundle.sides {
+                    let off = to_side(p, c, d);
+                    if off < nearest.0 {
+                        nearest = (off, (c, d));
+                    }
+                }
+            }
+        }
+        nearest
+    }
+}
+
+fn sides(polygon: &[[f64; 2]]) -> Vec<Side> {
+    let next = polygon.iter().cycle().skip(1);
+    polygon.iter().copied().zip(next.copied()).collect()
+}
+
+/// Points of the side from `a` to `b`, `a` included and `b` not, at most [`SPACING_MM`] apart.
+pub fn along(a: [f64; 2], b: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
+    let steps = (apart(a, b) / SPACING_MM).ceil().max(1.0) as usize;
+    (0..steps).map(move |k| {
+        let t = k as f64 / steps as f64;
+        [0, 1].map(|d| a[d] + t * (b[d] - a[d]))
+    })
+}
+
 /// Greatest distance of one closed polygon from another, and where it is.
 fn farthest(these: &[[f64; 2]], those: &[[f64; 2]]) -> (f64, [f64; 2]) {
-    let sides = |polygon: &[[f64; 2]]| -> Vec<Side> {
-        let next = polygon.iter().cycle().skip(1);
-        polygon.iter().copied().zip(next.copied()).collect()
-    };
-    let bundle = |sides: &[Side]| Bundle {
-        point: sides[0].0,
-        reach: sides
-            .iter()
-            .map(|side| apart(side.1, sides[0].0))
-            .fold(0.0, f64::max),
-        sides: sides.to_vec(),
-    };
-    let those: Vec<Bundle> = sides(those).chunks(BUNDLE).map(bundle).collect();
+    let those = Polygon::new(those);
     let mut worst = (0.0, [0.0; 2]);
     for (a, b) in sides(these) {
-        let steps = (apart(a, b) / SPACING_MM).ceil().max(1.0) as usize;
-        for k in 0..steps {
-            let t = k as f64 / steps as f64;
-            let p = [0, 1].map(|d| a[d] + t * (b[d] - a[d]));
-            let off = distance(p, &those);
+        for p in along(a, b) {
+            let off = those.distance(p);
             if off > worst.0 {
                 worst = (off, p);
             }
         }
     }
     worst
-}
-
-fn distance(p: [f64; 2], those: &[Bundle]) -> f64 {
-    let mut least = f64::INFINITY;
-    for bundle in those {
-        if apart(p, bundle.point) - bundle.reach < least {
-            let off = bundle.sides.iter().map(|&(c, d)| to_side(p, c, d));
-            least = off.fold(least, f64::min);
-        }
-    }
-    least
 }
 
 fn to_side(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {

@@ -181,7 +181,7 @@ fn cadmpeg(place: &Path) -> Result<String> {
 }
 
 /// A Python with the judge's packages, made once.
-fn python(place: &Path) -> Result<String> {
+pub(crate) fn python(place: &Path) -> Result<String> {
     let home = place.join("python");
     let python = home.join("bin/python").display().to_string();
     let ready = home.join("ready");

@@ -1,6 +1,7 @@
 //! The project's chores. `cargo xtask --help` lists them.
 
 mod judge;
+mod reproduce;
 mod rules;
 mod shell;
 mod study;
@@ -23,6 +24,11 @@ enum Chore {
     ///
     /// Needs Python 3; installs the judge's packages into `target/judges`.
     Judge(judge::Options),
+    /// Repeat the experiments of Shim & Lee 1995 and write `docs/reproduction.md`.
+    ///
+    /// For the figures' pictures it needs Python 3, as `judge` does; `--check` and `--print`
+    /// do without.
+    Reproduce(reproduce::Options),
     /// Measure one part of the product at length.
     #[command(subcommand)]
     Study(study::Study),
@@ -34,6 +40,7 @@ fn main() -> anyhow::Result<()> {
     match Arguments::parse().chore {
         Chore::Rules => rules::check(),
         Chore::Judge(options) => judge::run(&options),
+        Chore::Reproduce(options) => reproduce::run(&options),
         Chore::Study(study) => study::run(&study),
         Chore::Full => full(),
     }

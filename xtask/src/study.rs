@@ -57,7 +57,7 @@ pub(crate) fn run(study: &Study) -> Result<()> {
 }
 
 /// Runs a program of the tests' crate, built for speed.
-fn program(name: &str, options: &[OsString]) -> Result<()> {
+pub(crate) fn program(name: &str, options: &[OsString]) -> Result<()> {
     let mut words: Vec<String> = [
         "run",
         "--release",

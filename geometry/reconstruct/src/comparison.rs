@@ -1,6 +1,7 @@
 //! The comparison of section III (Table 1): a region's spline over its rectangle with
 //! the background in it, as Naik & Jain 1988 fit it, and over its extension.
 
+use nurbs::TensorSpline;
 use range_image::{RangeImage, RegionMap};
 
 use crate::extension::{ExtendedRegion, bounding_rectangle, extend};
@@ -23,11 +24,33 @@ pub struct Comparison {
     pub extended_psnr_db: f64,
 }
 
+/// One region made into a full rectangle, and the spline fitted over it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedRectangle {
+    /// What the spline was fitted to.
+    pub region: ExtendedRegion,
+    /// Bi-quadratic, with [`TABLE_1_KNOTS`] knots a side.
+    pub spline: TensorSpline,
+}
+
+/// Both ways of making a region into a rectangle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BothWays {
+    /// With the background around the region, as Naik & Jain 1988.
+    pub background: FittedRectangle,
+    /// With the region extended.
+    pub extended: FittedRectangle,
+}
+
 /// Fits one region both ways, bi-quadratic splines with [`TABLE_1_KNOTS`] knots a side.
 ///
 /// # Errors
 /// [`FitError`] when the region has no node, or fewer than three along a side.
-pub fn compare(image: &RangeImage, map: &RegionMap, label: u16) -> Result<Comparison, FitError> {
+pub fn fit_both_ways(
+    image: &RangeImage,
+    map: &RegionMap,
+    label: u16,
+) -> Result<BothWays, FitError> {
     let member = |column: usize, row: usize| map.label(column, row) == label;
     let rectangle = bounding_rectangle(image, member).ok_or(FitError::Empty)?;
     let extended = extend(image, member, rectangle).ok_or(FitError::Empty)?;
@@ -35,38 +58,47 @@ pub fn compare(image: &RangeImage, map: &RegionMap, label: u16) -> Result<Compar
         .ok_or(FitError::Empty)?
         .background_mm();
     let mut flat = extended.clone();
-    let nodes: Vec<(usize, usize)> = (0..rectangle.columns)
-        .flat_map(|c| (0..rectangle.rows).map(move |r| (c, r)))
-        .collect();
-    let address = |(c, r): (usize, usize)| {
-        (
-            c + rectangle.column_first as usize,
-            r + rectangle.row_first as usize,
-        )
-    };
-    for (z, &node) in flat.z_mm.iter_mut().zip(&nodes) {
-        let (column, row) = address(node);
+    for (k, z) in flat.z_mm.iter_mut().enumerate() {
+        let column = k / rectangle.rows + rectangle.column_first as usize;
+        let row = k % rectangle.rows + rectangle.row_first as usize;
         if !member(column, row) {
             *z = background;
         }
     }
-    let ratio = |region: &ExtendedRegion| -> Result<f64, FitError> {
-        let spline = rectangle_spline(image, region, TABLE_1_KNOTS)?;
+    let fitted = |region: ExtendedRegion| -> Result<FittedRectangle, FitError> {
+        let spline = rectangle_spline(image, &region, TABLE_1_KNOTS)?;
+        Ok(FittedRectangle { region, spline })
+    };
+    Ok(BothWays {
+        background: fitted(flat)?,
+        extended: fitted(extended)?,
+    })
+}
+
+/// Fits one region both ways, and holds the splines against the range image at the region's
+/// nodes.
+///
+/// # Errors
+/// As [`fit_both_ways`].
+pub fn compare(image: &RangeImage, map: &RegionMap, label: u16) -> Result<Comparison, FitError> {
+    let both = fit_both_ways(image, map, label)?;
+    let ratio = |fitted: &FittedRectangle| {
         let (mut sum, mut count) = (0.0, 0.0);
-        for &node in &nodes {
-            let (column, row) = address(node);
-            if let (true, Some(z)) = (member(column, row), image.z_mm(column, row)) {
-                let off = spline.value(image.x_mm(column), image.y_mm(row)) - z;
-                sum += off * off;
-                count += 1.0;
+        for column in 0..image.columns() {
+            for row in (0..image.rows()).filter(|&row| map.label(column, row) == label) {
+                if let Some(z) = image.z_mm(column, row) {
+                    let off = fitted.spline.value(image.x_mm(column), image.y_mm(row)) - z;
+                    sum += off * off;
+                    count += 1.0;
+                }
             }
         }
-        Ok(psnr_db(f64::sqrt(sum / count)))
+        psnr_db(f64::sqrt(sum / count))
     };
     Ok(Comparison {
         label,
-        background_psnr_db: ratio(&flat)?,
-        extended_psnr_db: ratio(&extended)?,
+        background_psnr_db: ratio(&both.background),
+        extended_psnr_db: ratio(&both.extended),
     })
 }
 
