@@ -133,17 +133,18 @@ impl GridWorker {
         let dense = nearest.len() == neighbours;
         let support = &settings.support;
         // Inliers are some of the samples: where those do not suffice, inliers will not.
-        let any = SupportSettings {
-            margin: match settings.estimator {
-                Estimator::Consensus => BESIDE,
-                _ => support.margin,
-            },
-            ..*support
+        let all = self.surroundings.place(nearest, spacing, support, |_| true);
+        // How far outside of all samples the node lies.
+        let outside = match all {
+            Place::Among => 0.0,
+            Place::Beside { distance } => distance,
+            Place::Alone => return None,
         };
-        if !self
-            .surroundings
-            .supported(nearest, spacing, &any, |_| true)
-        {
+        let allowed = match settings.estimator {
+            Estimator::Consensus => BESIDE,
+            _ => support.margin,
+        };
+        if outside > allowed {
             return None;
         }
         if settings.estimator == Estimator::LeastSquares {
@@ -206,8 +207,12 @@ impl GridWorker {
                     .surroundings
                     .place(&self.samples, spacing, &support, agrees);
                 let supported = match place {
-                    Place::Among => true,
-                    Place::Beside { distance } => {
+                    Place::Among if outside <= support.margin => true,
+                    Place::Among | Place::Beside { .. } => {
+                        let distance = match place {
+                            Place::Beside { distance } => distance.max(outside),
+                            _ => outside,
+                        };
                         distance <= BESIDE
                             && self
                                 .silhouette
@@ -262,7 +267,7 @@ impl GridWorker {
 const SIDE_KNOWN: f64 = 1.18;
 /// How far outside of the hull of its surface's samples a node may lie, in local spacings,
 /// if the line of the silhouette has it inside.
-const BESIDE: f64 = 1.0;
+const BESIDE: f64 = 0.7;
 /// Columns on either side that tell of the noise.
 const NOISE_COLUMNS: usize = 8;
 /// Least noise believed, in spacings: scans without any are computed ones.

@@ -73,10 +73,9 @@ pub(crate) fn part(borders: &mut [Drawn<'_>], junctions: &mut [[f64; 2]]) {
     let mut corners: Vec<(Vertex, [usize; 2])> = Vec::new();
     let mut first = 0;
     for group in arrivals.chunk_by(|a, b| a.vertex == b.vertex) {
-        let may_move = |a: &Arrival| borders[a.border].paths.is_some();
         if let [a, b] = group
             && cross(a.normal, b.normal).abs() > CROSSED
-            && group.iter().all(may_move)
+            && !is_held(borders, a.vertex)
         {
             corners.push((a.vertex, [first, first + 1]));
         }
@@ -142,6 +141,17 @@ fn vertices(
     [start, end]
 }
 
+/// Whether a border ends here that may not be touched.
+fn is_held(borders: &[Drawn<'_>], vertex: Vertex) -> bool {
+    let Vertex::Junction(junction) = vertex else {
+        return false;
+    };
+    borders.iter().any(|border| {
+        let ends = border.chain.ends;
+        border.paths.is_none() && ends.is_some_and(|(a, b)| a == junction || b == junction)
+    })
+}
+
 fn is_outline(chain: &Chain) -> bool {
     chain.left == 0 || chain.right == 0
 }
@@ -154,16 +164,6 @@ fn arrivals(borders: &[Drawn<'_>]) -> Vec<Arrival> {
             continue;
         }
         let Some(paths) = drawn.paths.as_deref() else {
-            // It may not move, nor may what ends where it does.
-            for end in drawn.chain.ends.iter().flat_map(|&(a, b)| [a, b]) {
-                arrivals.push(Arrival {
-                    vertex: Vertex::Junction(end),
-                    border,
-                    path: 0,
-                    at_end: false,
-                    normal: [0.0; 2],
-                });
-            }
             continue;
         };
         for (path, curve) in paths.iter().enumerate() {

@@ -62,6 +62,9 @@ impl TrueImage {
     /// z and face at a node of an image of the same lattice; `None` where nothing is seen.
     pub(crate) fn at(&self, image: &RangeImage, column: usize, row: usize) -> Option<(f64, usize)> {
         let (c, r) = self.node(image, column, row);
+        if c >= self.image.columns() || r >= self.image.rows() {
+            return None;
+        }
         let face = *self.faces.get(c * self.image.rows() + r)?;
         Some((self.image.z_mm(c, r)?, face?))
     }
