@@ -210,7 +210,13 @@ impl Consensus {
                     spacing,
                     &mut self.labelled,
                 );
-                let longer = lengthen(&line, &mut self.labelled, &mut self.kept, &mut self.between);
+                let longer = lengthen(
+                    &line,
+                    0.0,
+                    &mut self.labelled,
+                    &mut self.kept,
+                    &mut self.between,
+                );
                 if let Some(longer) = longer {
                     line = longer;
                     break;
