@@ -133,7 +133,9 @@ impl GridWorker {
         let dense = nearest.len() == neighbours;
         let support = &settings.support;
         // Inliers are some of the samples: where those do not suffice, inliers will not.
-        let all = self.surroundings.place(nearest, spacing, support, |_| true);
+        let all = self
+            .surroundings
+            .place(nearest, spacing, support, |_| true, |_| false);
         // How far outside of all samples the node lies.
         let outside = match all {
             Place::Among => 0.0,
@@ -203,9 +205,11 @@ impl GridWorker {
                     tolerance: surface.width_mm,
                 };
                 let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm, dense);
-                let place = self
-                    .surroundings
-                    .place(&self.samples, spacing, &support, agrees);
+                // Outliers beyond a silhouette close nothing.
+                let closes = |n: &Neighbour| surfaces.iter().any(|other| other.holds(n));
+                let place =
+                    self.surroundings
+                        .place(&self.samples, spacing, &support, agrees, closes);
                 let supported = match place {
                     Place::Among if outside <= support.margin => true,
                     Place::Among | Place::Beside { .. } => {

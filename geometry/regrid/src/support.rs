@@ -20,20 +20,22 @@ impl Surroundings {
         settings: &SupportSettings,
         agrees: impl Fn(&Neighbour) -> bool,
     ) -> bool {
-        match self.place(window, spacing, settings, agrees) {
+        match self.place(window, spacing, settings, agrees, |_| true) {
             Place::Among => true,
             Place::Beside { distance } => distance <= settings.margin,
             Place::Alone => false,
         }
     }
 
-    /// Where the node lies among the samples near it. `agrees` tells inliers.
+    /// Where the node lies among the samples near it. `agrees` tells inliers, `closes` those
+    /// of the other samples that may belong to another surface.
     pub(crate) fn place(
         &mut self,
         window: &[Neighbour],
         spacing: Spacing,
         settings: &SupportSettings,
         agrees: impl Fn(&Neighbour) -> bool,
+        closes: impl Fn(&Neighbour) -> bool,
     ) -> Place {
         self.points.clear();
         self.others.clear();
@@ -42,7 +44,7 @@ impl Surroundings {
             if u * u + v * v <= settings.radius * settings.radius {
                 if agrees(neighbour) {
                     self.points.push((u, v));
-                } else {
+                } else if closes(neighbour) {
                     self.others.push((u, v));
                 }
             }

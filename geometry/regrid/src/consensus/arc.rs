@@ -1,7 +1,7 @@
 //! Bent lines between two sets of samples.
 
-use super::between::Between;
 use super::logistic::logistic;
+use super::posterior::Posterior;
 use super::side::{BESIDE, LANE, Labelled, Line, STEEPNESS, STRAIGHT, TURNS, is_followed};
 
 /// A parabola between two sets of samples, along a straight line through the node's
@@ -59,20 +59,18 @@ impl Arc {
         })
     }
 
-    /// The mean of all parabolas with this bend that separate the samples; this one, if it
-    /// is none of them.
-    fn between(self, samples: &[Labelled], between: &mut Between) -> Self {
-        between.begin();
+    /// The mean of the parabolas near this one, as these samples have it.
+    fn mean(self, samples: &[Labelled], posterior: &mut Posterior) -> Self {
+        posterior.begin();
         for s in samples {
-            between.keep(self.place(s).0, self.at(s), s.label);
+            posterior.hear(self.place(s).0, self.at(s), s.label, s.trust);
         }
-        match between.mean() {
-            Some([offset, slope]) => Self {
-                offset: self.offset - offset,
-                slope: self.slope - slope,
-                ..self
-            },
-            None => self,
+        let [offset, slope, bend] = posterior.parabola();
+        Self {
+            offset: self.offset - offset,
+            slope: self.slope - slope,
+            bend: self.bend - bend,
+            ..self
         }
     }
 
@@ -83,7 +81,7 @@ impl Arc {
         doubtful: f64,
         samples: &[Labelled],
         lane: &mut Vec<Labelled>,
-        between: &mut Between,
+        posterior: &mut Posterior,
     ) -> Option<Self> {
         for _ in 0..TURNS {
             let mut wrong = 0;
@@ -105,12 +103,7 @@ impl Arc {
         if !is_followed(lane, doubtful, right) {
             return None;
         }
-        let before = lane.len();
-        lane.retain(right);
-        if lane.len() < before {
-            self = self.again(lane)?;
-        }
-        Some(self.between(lane, between))
+        Some(self.mean(lane, posterior))
     }
 }
 
@@ -127,13 +120,13 @@ mod tests {
             let samples = crate::consensus::side::tests::grid(11.0, edge);
             let line = Line::of([1.0, -0.2, -offset]).unwrap();
             let arc = Arc::of(&line)
-                .follow(0.0, &samples, &mut Vec::new(), &mut Between::default())
+                .follow(0.0, &samples, &mut Vec::new(), &mut Posterior::default())
                 .unwrap();
             let truth = -offset / libm::hypot(1.0, 0.2);
             squares += (arc.distance() - truth).powi(2);
             let mut samples = samples;
             let straight =
-                crate::consensus::side::separate(&mut samples, &mut Between::default()).unwrap();
+                crate::consensus::side::separate(&mut samples, &mut Posterior::default()).unwrap();
             squares_straight += (straight.distance() - truth).powi(2);
         }
         let rms = |squares: f64| (squares / 20.0).sqrt();

@@ -10,10 +10,10 @@
 
 mod arc;
 mod bend;
-mod between;
 mod logistic;
 mod node;
 mod noise;
+mod posterior;
 mod side;
 mod silhouette;
 mod surfaces;

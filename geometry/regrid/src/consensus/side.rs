@@ -1,7 +1,7 @@
 //! On which side of the line between two surfaces a node lies.
 
-use super::between::Between;
 use super::logistic::logistic;
+use super::posterior::Posterior;
 
 /// A sample of one of the two surfaces, as seen from the node, in local spacings.
 #[derive(Debug, Clone, Copy)]
@@ -10,10 +10,14 @@ pub(crate) struct Labelled {
     pub(crate) v: f64,
     /// 1 for a sample of the first surface, -1 for one of the second.
     pub(crate) label: f64,
+    /// Logarithm of the odds that it is.
+    pub(crate) trust: f64,
     /// The column it comes from.
     pub(crate) strip: usize,
 }
 
+/// Logarithm of the odds that a sample which agrees with one surface alone lies on it.
+pub(super) const SEEN: f64 = 6.0;
 /// Share of samples on the wrong side up to which the edge is taken for straight.
 pub(super) const STRAIGHT: f64 = 0.015;
 /// Share of either set on the wrong side beyond which no line separates them.
@@ -62,20 +66,17 @@ impl Line {
         Self::of(odds(samples, self.0.map(|value| STEEPNESS * value))?)
     }
 
-    /// The mean of all lines that separate these samples: of the line that is sought no more
-    /// is known. This line, if it is none of them.
-    fn between(self, samples: &[Labelled], between: &mut Between) -> Self {
+    /// The mean of the lines near this one, as these samples have it.
+    fn mean(self, samples: &[Labelled], posterior: &mut Posterior) -> Self {
         let [g, h, o] = self.0;
-        between.begin();
+        posterior.begin();
         for s in samples {
             let across = at(&self.0, s);
-            between.keep(h * s.u - g * s.v, across, s.label);
+            posterior.hear(h * s.u - g * s.v, across, s.label, s.trust);
         }
         // A point at (along, across) lies above where across - offset - slope * along > 0.
-        let mean = between
-            .mean()
-            .map(|[offset, slope]| [g - slope * h, h + slope * g, o - offset]);
-        mean.and_then(Self::of).unwrap_or(self)
+        let [offset, slope, _] = posterior.line();
+        Self::of([g - slope * h, h + slope * g, o - offset]).unwrap_or(self)
     }
 
     /// Signed distance of the node, in local spacings.
@@ -94,7 +95,7 @@ impl Line {
 /// many of them on the wrong side, as at a bent edge or a corner, over the nearer half, and
 /// so on. `None` where the two sets do not lie apart. Samples that no surface can have are
 /// taken out.
-pub(crate) fn separate(samples: &mut Vec<Labelled>, between: &mut Between) -> Option<Line> {
+pub(crate) fn separate(samples: &mut Vec<Labelled>, posterior: &mut Posterior) -> Option<Line> {
     // Far from the edge the nearer samples tell.
     let near = samples.get(..samples.len() / NEARER)?;
     if let Some(raw) = odds(near, [0.0; 3])
@@ -130,7 +131,7 @@ pub(crate) fn separate(samples: &mut Vec<Labelled>, between: &mut Between) -> Op
             break;
         }
     }
-    Some(Line::of(best?)?.between(samples, between))
+    Some(Line::of(best?)?.mean(samples, posterior))
 }
 
 /// Takes out the samples on the wrong side that samples of other columns, around them,
@@ -171,7 +172,7 @@ pub(crate) fn lengthen(
     doubtful: f64,
     samples: &mut Vec<Labelled>,
     lane: &mut Vec<Labelled>,
-    between: &mut Between,
+    posterior: &mut Posterior,
 ) -> Option<Line> {
     let mut line = *line;
     take_out_strays(samples, &line.0);
@@ -199,12 +200,7 @@ pub(crate) fn lengthen(
     if !is_followed(lane, doubtful, right) {
         return None;
     }
-    let before = lane.len();
-    lane.retain(right);
-    if lane.len() < before {
-        line = line.again(lane)?;
-    }
-    Some(line.between(lane, between))
+    Some(line.mean(lane, posterior))
 }
 
 /// Whether so few samples beside a long line are not on the right side of it that the edge
@@ -267,6 +263,7 @@ pub(super) mod tests {
                     u,
                     v,
                     label: if u > edge(v) { 1.0 } else { -1.0 },
+                    trust: SEEN,
                     strip: (column + reach) as usize,
                 });
             }
@@ -286,13 +283,13 @@ pub(super) mod tests {
         for k in 0..40 {
             let (slope, offset) = (0.02 * f64::from(k) + 0.3, 0.02 * f64::from(k) - 0.4);
             let edge = |v: f64| slope * v + offset;
-            let line = separate(&mut grid(8.0, edge), &mut Between::default()).unwrap();
+            let line = separate(&mut grid(8.0, edge), &mut Posterior::default()).unwrap();
             let long = lengthen(
                 &line,
                 0.0,
                 &mut grid(16.0, edge),
                 &mut Vec::new(),
-                &mut Between::default(),
+                &mut Posterior::default(),
             )
             .unwrap();
             let truth = distance_to(slope, offset);
@@ -314,7 +311,7 @@ pub(super) mod tests {
             ),
             (&|v: f64| 0.3 + 0.4 * v + 0.7 * v.max(0.0), "corner"),
         ] {
-            let line = separate(&mut grid(8.0, edge), &mut Between::default()).unwrap();
+            let line = separate(&mut grid(8.0, edge), &mut Posterior::default()).unwrap();
             assert!((line.distance() + 0.3).abs() < 0.4, "{name} {line:?}");
             assert!(
                 lengthen(
@@ -322,7 +319,7 @@ pub(super) mod tests {
                     0.0,
                     &mut grid(16.0, edge),
                     &mut Vec::new(),
-                    &mut Between::default()
+                    &mut Posterior::default()
                 )
                 .is_none()
             );
@@ -341,8 +338,8 @@ pub(super) mod tests {
             changed += 1;
         }
         assert!((4..=6).contains(&changed));
-        let clean = separate(&mut grid(9.0, edge), &mut Between::default()).unwrap();
-        let line = separate(&mut samples, &mut Between::default()).unwrap();
+        let clean = separate(&mut grid(9.0, edge), &mut Posterior::default()).unwrap();
+        let line = separate(&mut samples, &mut Posterior::default()).unwrap();
         assert!(
             (line.distance() - clean.distance()).abs() < 0.05,
             "{line:?}"
@@ -355,6 +352,6 @@ pub(super) mod tests {
         for (k, s) in samples.iter_mut().enumerate() {
             s.label = if k % 2 == 0 { 1.0 } else { -1.0 };
         }
-        assert!(separate(&mut samples, &mut Between::default()).is_none());
+        assert!(separate(&mut samples, &mut Posterior::default()).is_none());
     }
 }

@@ -5,9 +5,11 @@
 //! those places, and the line that separates the two is known better than any one column
 //! tells.
 
+use core::cmp::Ordering;
+
 use super::arc::Arc;
-use super::between::Between;
-use super::side::{Labelled, Line, lengthen, separate};
+use super::posterior::Posterior;
+use super::side::{Labelled, Line, SEEN, lengthen, separate};
 use super::surfaces::Surface;
 use crate::neighbours::Neighbour;
 use crate::strip::{Strip, lower_median};
@@ -21,15 +23,14 @@ const FAR: [usize; 2] = [25, 16];
 const BENT: [usize; 3] = [4, 8, 16];
 /// Missing samples noted after the last one of a column.
 const MISSING: usize = 3;
-/// Distance to the next sample of a column, in usual ones, from which more than a single
-/// one is missing.
-const ENDED: f64 = 2.5;
+/// Samples missing between two of a column that may have been lost: the surface goes on.
+const LOST: usize = 2;
 /// Distance from a place to the next sample of its column, in usual ones, within which the
 /// place is not empty: in line with a column's own samples, and level with those of the
 /// column beside it, where a single one may have dropped out.
 const EMPTY: f64 = 0.6;
 const EMPTY_BESIDE: f64 = 1.25;
-/// Share of the missing samples that may have dropped out, or been thrown off the surface.
+/// Share of samples lost, if so few are known that it cannot be told from them.
 const DROPPED: f64 = 0.05;
 /// Farther inside of the line, in spacings, a node beside the samples owes that to something
 /// else than the line, as where the scan ends.
@@ -39,11 +40,12 @@ const ELSEWHERE: f64 = 1.0;
 #[derive(Debug, Default)]
 pub(crate) struct Silhouette {
     samples: Vec<Neighbour>,
-    /// Strip, dx and dy of the samples of the surfaces.
-    present: Vec<(usize, f64, f64)>,
+    /// Where the surfaces have samples, and where they should if they went on.
+    present: Vec<Place>,
+    missing: Vec<Place>,
     labelled: Vec<Labelled>,
     kept: Vec<Labelled>,
-    between: Between,
+    posterior: Posterior,
     gaps: Vec<f64>,
 }
 
@@ -60,7 +62,7 @@ impl Silhouette {
         self.samples.clear();
         wider(&mut self.samples, WINDOWS);
         self.label(usize::MAX, window, surfaces, spacing, y_mm)?;
-        let line = separate(&mut self.labelled, &mut self.between)?;
+        let line = separate(&mut self.labelled, &mut self.posterior)?;
         let mut distance = line.distance();
         if line.is_near() {
             distance = self
@@ -90,7 +92,7 @@ impl Silhouette {
                 DROPPED,
                 &mut self.labelled,
                 &mut self.kept,
-                &mut self.between,
+                &mut self.posterior,
             )?;
             Some(longer.distance())
         })
@@ -109,7 +111,7 @@ impl Silhouette {
         for windows in BENT {
             let number = self.samples.len() * windows / FAR[0];
             self.label(number, window, surfaces, spacing, y_mm)?;
-            match next.follow(DROPPED, &self.labelled, &mut self.kept, &mut self.between) {
+            match next.follow(DROPPED, &self.labelled, &mut self.kept, &mut self.posterior) {
                 Some(longer) => {
                     next = longer;
                     arc = Some(longer);
@@ -133,84 +135,164 @@ impl Silhouette {
         let samples = &self.samples[..number.min(self.samples.len())];
         let held = |n: &&Neighbour| surfaces.iter().any(|surface| surface.holds(n));
         self.present.clear();
-        let places = samples.iter().filter(held).map(|n| (n.strip, n.dx, n.dy));
+        let places = samples.iter().filter(held).map(Place::of);
         self.present.extend(places);
-        self.present
-            .sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.2.total_cmp(&b.2)));
+        self.present.sort_unstable_by(Place::order);
         self.gaps.clear();
         let neighbours = self
             .present
             .windows(2)
-            .filter(|pair| pair[0].0 == pair[1].0);
-        let gaps = neighbours.map(|pair| pair[1].2 - pair[0].2);
+            .filter(|pair| pair[0].strip == pair[1].strip);
+        let gaps = neighbours.map(|pair| pair[1].dy - pair[0].dy);
         self.gaps.extend(gaps.filter(|gap| *gap > 0.0));
         let gap = lower_median(&mut self.gaps)?;
         // Of places farther away it is not known whether they are empty.
         let within = samples.last()?.distance2.sqrt() - gap;
-        let labelled = &mut self.labelled;
-        labelled.clear();
-        let mut add = |strip: usize, dx: f64, dy: f64, label: f64| {
-            labelled.push(Labelled {
-                u: dx / spacing.x_mm,
-                v: dy / spacing.y_mm,
-                label,
-                strip,
-            });
-        };
-        let empty = |strip: usize, dx: f64, dy: f64, clear: f64| {
-            dx * dx + dy * dy <= within * within
+        let empty = |place: &Place| {
+            place.dx * place.dx + place.dy * place.dy <= within * within
                 && window
                     .strips
-                    .get(strip)
-                    .is_some_and(|strip| is_clear(strip, y_mm + dy, clear * gap))
+                    .get(place.strip)
+                    .is_some_and(|strip| is_clear(strip, y_mm + place.dy, EMPTY * gap))
         };
-        let mut missing = 0;
-        for (k, &(strip, dx, dy)) in self.present.iter().enumerate() {
-            add(strip, dx, dy, 1.0);
-            let next = |k: Option<usize>| {
-                let next = self.present.get(k?).filter(|next| next.0 == strip);
-                next.map(|next| (next.2 - dy).abs())
-            };
-            for (direction, next) in [(-1.0, next(k.checked_sub(1))), (1.0, next(Some(k + 1)))] {
-                if next.is_some_and(|distance| distance < ENDED * gap) {
-                    continue;
-                }
-                for step in 1..=MISSING {
-                    let along = step as f64 * gap;
-                    if next.is_some_and(|distance| along > distance - gap) {
-                        break;
-                    }
-                    if empty(strip, dx, dy + direction * along, EMPTY) {
-                        add(strip, dx, dy + direction * along, -1.0);
-                        missing += 1;
-                    }
-                }
-            }
-            for beside in [strip.checked_sub(1), Some(strip + 1)]
-                .into_iter()
-                .flatten()
-            {
-                let (Some(here), Some(there)) =
-                    (window.strips.get(strip), window.strips.get(beside))
-                else {
-                    continue;
-                };
-                let dx = dx + (there.x_mm - here.x_mm);
-                if empty(beside, dx, dy, EMPTY_BESIDE) {
-                    add(beside, dx, dy, -1.0);
-                    missing += 1;
-                }
-            }
+        self.missing.clear();
+        let dropped = self.in_line(gap, empty);
+        self.level(gap, window, empty);
+        if self.missing.is_empty() {
+            return None;
+        }
+        let trust = [SEEN, -libm::log(dropped)];
+        self.labelled.clear();
+        for (places, label, trust) in [
+            (&self.present, 1.0, trust[0]),
+            (&self.missing, -1.0, trust[1]),
+        ] {
+            self.labelled.extend(places.iter().map(|place| Labelled {
+                u: place.dx / spacing.x_mm,
+                v: place.dy / spacing.y_mm,
+                label,
+                trust,
+                strip: place.strip,
+            }));
         }
         let distance2 = |s: &Labelled| s.u * s.u + s.v * s.v;
-        labelled.sort_unstable_by(|s, t| {
+        self.labelled.sort_unstable_by(|s, t| {
             distance2(s)
                 .total_cmp(&distance2(t))
                 .then(s.v.total_cmp(&t.v))
                 .then(s.u.total_cmp(&t.u))
                 .then(s.label.total_cmp(&t.label))
         });
-        (missing > 0).then_some(())
+        Some(())
+    }
+
+    /// Notes the missing samples in line with those of a column: after its ends, and in holes
+    /// of many. Returns the share of samples that are lost singly or nearly so.
+    fn in_line(&mut self, gap: f64, empty: impl Fn(&Place) -> bool) -> f64 {
+        let mut lost = 0;
+        for (k, place) in self.present.iter().enumerate() {
+            let next = |k: Option<usize>| {
+                let next = self
+                    .present
+                    .get(k?)
+                    .filter(|next| next.strip == place.strip);
+                next.map(|next| (next.dy - place.dy).abs() / gap)
+            };
+            for (direction, next) in [(-1.0, next(k.checked_sub(1))), (1.0, next(Some(k + 1)))] {
+                let mut last = MISSING;
+                if let Some(distance) = next {
+                    let between = (distance.round() as usize).saturating_sub(1);
+                    if between <= LOST {
+                        lost += between;
+                        continue;
+                    }
+                    // Both ends of a hole note the half of it.
+                    last = last.min(between / 2);
+                }
+                for step in 1..=last {
+                    let dy = place.dy + direction * step as f64 * gap;
+                    let place = Place { dy, ..*place };
+                    if empty(&place) {
+                        self.missing.push(place);
+                    }
+                }
+            }
+        }
+        // Each was counted from both of its sides.
+        let lost = 0.5 * lost as f64;
+        (lost + 1.0) / (lost + self.present.len() as f64 + 1.0 / DROPPED)
+    }
+
+    /// Notes the missing samples of columns level with those of the columns beside them,
+    /// where a surface ends along the columns.
+    fn level(&mut self, gap: f64, window: &Window<'_>, empty: impl Fn(&Place) -> bool) {
+        for place in &self.present {
+            for beside in [place.strip.checked_sub(1), Some(place.strip + 1)] {
+                let (Some(here), Some((strip, there))) = (
+                    window.strips.get(place.strip),
+                    beside.and_then(|strip| Some((strip, window.strips.get(strip)?))),
+                ) else {
+                    continue;
+                };
+                let place = Place {
+                    strip,
+                    dx: place.dx + (there.x_mm - here.x_mm),
+                    dy: place.dy,
+                };
+                let noted = |other: &Place| {
+                    other.strip == strip && (other.dy - place.dy).abs() <= EMPTY * gap
+                };
+                if !self.is_within_column(&place, gap)
+                    && empty(&place)
+                    && !self.missing.iter().any(noted)
+                {
+                    self.missing.push(place);
+                }
+            }
+        }
+    }
+
+    /// Whether the place lies beside a sample of its column, or between two of them.
+    fn is_within_column(&self, place: &Place, gap: f64) -> bool {
+        let above = self
+            .present
+            .partition_point(|other| other.order(place).is_lt());
+        let distance = |k: Option<usize>| {
+            let other = self.present.get(k?).filter(|o| o.strip == place.strip);
+            other.map(|other| (other.dy - place.dy).abs() / gap)
+        };
+        match (distance(above.checked_sub(1)), distance(Some(above))) {
+            (Some(below), Some(above)) => {
+                below.min(above) < EMPTY_BESIDE || below + above < LOST as f64 + 1.5
+            }
+            (Some(alone), None) | (None, Some(alone)) => alone < EMPTY_BESIDE,
+            (None, None) => false,
+        }
+    }
+}
+
+/// A place in a column, seen from the node.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    strip: usize,
+    dx: f64,
+    dy: f64,
+}
+
+impl Place {
+    fn of(n: &Neighbour) -> Self {
+        Self {
+            strip: n.strip,
+            dx: n.dx,
+            dy: n.dy,
+        }
+    }
+
+    /// By column, then along it.
+    fn order(&self, other: &Self) -> Ordering {
+        self.strip
+            .cmp(&other.strip)
+            .then(self.dy.total_cmp(&other.dy))
     }
 }
 
