@@ -21,6 +21,9 @@ const WINDOWS: usize = 8;
 const FAR: [usize; 2] = [25, 16];
 /// The same where it is bent, by and by.
 const BENT: [usize; 3] = [4, 8, 16];
+/// Distance from the node, in spacings, at which a sample may be twice as far from a surface
+/// as at the node: the plane is that of a few samples, and the surface may bend.
+const KNOWN: f64 = 4.0;
 /// Missing samples noted after the last one of a column.
 const MISSING: usize = 3;
 /// Samples missing between two of a column that may have been lost: the surface goes on.
@@ -133,7 +136,13 @@ impl Silhouette {
         y_mm: f64,
     ) -> Option<()> {
         let samples = &self.samples[..number.min(self.samples.len())];
-        let held = |n: &&Neighbour| surfaces.iter().any(|surface| surface.holds(n));
+        let known = (KNOWN * spacing.mean_mm).powi(2);
+        let held = |n: &&Neighbour| {
+            // Farther away it is not known as well where the surface is.
+            let wider = 1.0 + n.distance2 / known;
+            let off = |surface: &Surface| surface.plane.residual(n).abs() / surface.width_mm;
+            surfaces.iter().any(|surface| off(surface) <= wider)
+        };
         self.present.clear();
         let places = samples.iter().filter(held).map(Place::of);
         self.present.extend(places);
