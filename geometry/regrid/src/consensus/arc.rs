@@ -2,7 +2,7 @@
 
 use super::logistic::logistic;
 use super::posterior::Posterior;
-use super::side::{BESIDE, LANE, Labelled, Line, STEEPNESS, STRAIGHT, TURNS, is_followed};
+use super::side::{BESIDE, LANE, Labelled, Line, SLACK, STEEPNESS, STRAIGHT, TURNS, is_followed};
 
 /// A parabola between two sets of samples, along a straight line through the node's
 /// surroundings: a sample `across` that line and `along` it lies
@@ -99,11 +99,9 @@ impl Arc {
             }
             self = self.again(lane)?;
         }
-        let right = |s: &Labelled| s.label * self.at(s) > 0.0;
-        if !is_followed(lane, doubtful, right) {
-            return None;
-        }
-        Some(self.mean(lane, posterior))
+        let mean = self.mean(lane, posterior);
+        let right = |s: &Labelled| s.label * mean.at(s) > -SLACK;
+        is_followed(lane, doubtful, right).then_some(mean)
     }
 }
 

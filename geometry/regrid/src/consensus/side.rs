@@ -38,6 +38,8 @@ pub(super) const BESIDE: f64 = 1.0;
 pub(super) const LANE: f64 = 4.0;
 /// Steepness, per spacing, with which the search for a line begins at a known one.
 pub(super) const STEEPNESS: f64 = 1.0;
+/// Spacings beyond a line at which a sample is still not on its wrong side.
+pub(super) const SLACK: f64 = 0.05;
 /// Samples left on the wrong side beside a long line beyond which the edge is bent.
 const BENT: usize = 2;
 /// Spacings from a sample to those of other columns that may contradict it, and how many
@@ -196,11 +198,9 @@ pub(crate) fn lengthen(
             break;
         }
     }
-    let right = |s: &Labelled| s.label * at(&line.0, s) > 0.0;
-    if !is_followed(lane, doubtful, right) {
-        return None;
-    }
-    Some(line.mean(lane, posterior))
+    line = line.mean(lane, posterior);
+    let right = |s: &Labelled| s.label * at(&line.0, s) > -SLACK;
+    is_followed(lane, doubtful, right).then_some(line)
 }
 
 /// Whether so few samples beside a long line are not on the right side of it that the edge

@@ -235,27 +235,32 @@ impl Silhouette {
     /// Notes the missing samples of columns level with those of the columns beside them,
     /// where a surface ends along the columns.
     fn level(&mut self, gap: f64, window: &Window<'_>, empty: impl Fn(&Place) -> bool) {
-        for place in &self.present {
-            for beside in [place.strip.checked_sub(1), Some(place.strip + 1)] {
-                let (Some(here), Some((strip, there))) = (
-                    window.strips.get(place.strip),
-                    beside.and_then(|strip| Some((strip, window.strips.get(strip)?))),
-                ) else {
-                    continue;
-                };
-                let place = Place {
-                    strip,
-                    dx: place.dx + (there.x_mm - here.x_mm),
-                    dy: place.dy,
-                };
-                let noted = |other: &Place| {
-                    other.strip == strip && (other.dy - place.dy).abs() <= EMPTY * gap
-                };
-                if !self.is_within_column(&place, gap)
-                    && empty(&place)
-                    && !self.missing.iter().any(noted)
-                {
-                    self.missing.push(place);
+        for sample in &self.present {
+            let Some(own) = window.strips.get(sample.strip) else {
+                continue;
+            };
+            let before = (1..=MISSING).map_while(|step| sample.strip.checked_sub(step));
+            let after = (1..=MISSING).map(|step| sample.strip + step);
+            let sides: [&mut dyn Iterator<Item = usize>; 2] = [&mut { before }, &mut { after }];
+            for side in sides {
+                for strip in side {
+                    let Some(column) = window.strips.get(strip) else {
+                        break;
+                    };
+                    let place = Place {
+                        strip,
+                        dx: sample.dx + (column.x_mm - own.x_mm),
+                        dy: sample.dy,
+                    };
+                    if self.is_within_column(&place, gap) || !empty(&place) {
+                        break;
+                    }
+                    let noted = |other: &Place| {
+                        other.strip == strip && (other.dy - place.dy).abs() <= EMPTY * gap
+                    };
+                    if !self.missing.iter().any(noted) {
+                        self.missing.push(place);
+                    }
                 }
             }
         }
