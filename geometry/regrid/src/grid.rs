@@ -4,7 +4,9 @@ use core::f64::consts::PI;
 
 use range_image::{GridColumn, Lattice, NodeQuality};
 
-use crate::consensus::{Conditions, Consensus, Effort, Noise, Silhouette, Surface, WIDTH, noise};
+use crate::consensus::{
+    Around, Conditions, Consensus, Effort, Noise, Silhouette, Surface, WIDTH, noise,
+};
 use crate::draws::Draws;
 use crate::exhaustive;
 use crate::neighbours::{Neighbour, Search};
@@ -199,6 +201,12 @@ impl GridWorker {
                 ..*support
             };
             self.before = surfaces.first().map(|surface| (node.j, surface.plane));
+            let around = Around {
+                window,
+                surfaces,
+                spacing,
+                y_mm,
+            };
             return surfaces.iter().find_map(|surface| {
                 let fit = Fit {
                     plane: surface.plane,
@@ -220,7 +228,7 @@ impl GridWorker {
                         distance <= BESIDE
                             && self
                                 .silhouette
-                                .holds(window, surfaces, (spacing, y_mm), |wide, windows| {
+                                .holds(&around, |wide, windows| {
                                     let number = windows * neighbours;
                                     wide.extend_from_slice(
                                         self.search.wider(window, x_mm, y_mm, number),

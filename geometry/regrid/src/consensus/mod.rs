@@ -11,6 +11,7 @@
 mod arc;
 mod bend;
 mod logistic;
+mod missing;
 mod node;
 mod noise;
 mod posterior;
@@ -18,6 +19,7 @@ mod side;
 mod silhouette;
 mod surfaces;
 
+pub(crate) use missing::Around;
 pub(crate) use node::{Conditions, Consensus};
 pub(crate) use noise::{Noise, noise};
 pub(crate) use silhouette::Silhouette;

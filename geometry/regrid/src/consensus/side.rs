@@ -63,6 +63,11 @@ impl Line {
         self.0
     }
 
+    /// Signed distance of a sample, in local spacings.
+    pub(super) fn to(&self, s: &Labelled) -> f64 {
+        at(&self.0, s)
+    }
+
     /// The best line between these samples, sought from this one.
     fn again(&self, samples: &[Labelled]) -> Option<Self> {
         Self::of(odds(samples, self.0.map(|value| STEEPNESS * value))?)
