@@ -3,7 +3,7 @@
 use core::cmp::Ordering;
 
 use super::side::{LANE, Labelled, Line, SEEN};
-use super::surfaces::Surface;
+use super::surfaces::{STEEPEST_SEEN, Surface};
 use crate::neighbours::Neighbour;
 use crate::strip::{Strip, lower_median};
 use crate::window::{Spacing, Window};
@@ -11,6 +11,10 @@ use crate::window::{Spacing, Window};
 /// Distance from the node, in spacings, at which a sample may be twice as far from a surface
 /// as at the node: the plane is that of a few samples, and the surface may bend.
 const KNOWN: f64 = 4.0;
+/// Samples looked at above and below in each of the columns beside a sample, if they are not
+/// farther from it, in spacings.
+const AROUND: usize = 2;
+const NEAR: f64 = 2.5;
 /// Missing samples noted after the last one of a column, and columns beyond the last one.
 const MISSING: usize = 3;
 /// Samples missing between two of a column that may have been lost: the surface goes on.
@@ -60,7 +64,7 @@ impl Places {
             // Farther away it is not known as well where the surface is.
             let wider = 1.0 + n.distance2 / known;
             let off = |surface: &Surface| surface.plane.residual(n).abs() / surface.width_mm;
-            surfaces.iter().any(|surface| off(surface) <= wider)
+            surfaces.iter().any(|surface| off(surface) <= wider) || is_continued(n, window, spacing)
         };
         self.present.clear();
         self.present
@@ -235,6 +239,36 @@ impl Place {
             .cmp(&other.strip)
             .then(self.dy.total_cmp(&other.dy))
     }
+}
+
+/// Whether most samples around this one, in the columns beside it, may lie on one surface
+/// with it.
+fn is_continued(n: &Neighbour, window: &Window<'_>, spacing: Spacing) -> bool {
+    let Some(own) = window.strips.get(n.strip) else {
+        return false;
+    };
+    let Some(&(y_mm, z_mm)) = own.samples.get(n.index) else {
+        return false;
+    };
+    let (mut agree, mut all) = (0, 0);
+    for beside in [n.strip.checked_sub(1), Some(n.strip + 1)] {
+        let Some(column) = beside.and_then(|strip| window.strips.get(strip)) else {
+            continue;
+        };
+        let dx_mm = column.x_mm - own.x_mm;
+        let above = column.samples.partition_point(|s| s.0 < y_mm);
+        for k in above.saturating_sub(AROUND)..above + AROUND {
+            let Some(&(y, z)) = column.samples.get(k) else {
+                continue;
+            };
+            let distance_mm = (dx_mm * dx_mm + (y - y_mm) * (y - y_mm)).sqrt();
+            if distance_mm <= NEAR * spacing.mean_mm {
+                all += 1;
+                agree += usize::from((z - z_mm).abs() <= STEEPEST_SEEN * distance_mm);
+            }
+        }
+    }
+    agree >= AROUND && 2 * agree > all
 }
 
 /// Whether no sample of the strip lies as near to this height.
