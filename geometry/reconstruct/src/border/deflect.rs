@@ -15,12 +15,20 @@ use crate::polygon::{cross, dot, minus, norm};
 /// Distance that nodes keep from the outline, pitches.
 const MARGIN: f64 = 0.02;
 
-/// Nodes farther on the wrong side than this are mistakes of the labels, or missed by the
-/// outline for another reason than its mean; pitches.
+/// A node farther on the wrong side than this is a mistake of the labels, unless others near
+/// it lie there, too: then the outline is drawn wrong, but not by more than the second
+/// figure. Pitches.
 const MISTAKEN: f64 = 0.25;
+const MISDRAWN: f64 = 0.5;
+
+/// How many others lie on the wrong side by so much, along so much of the path, where it is
+/// the outline that is wrong; pitches.
+const OTHERS: usize = 2;
+const AS_WRONG: f64 = 0.1;
+const ALONG: f64 = 4.0;
 
 /// Farthest that an outline is deflected, and a corner moved, pitches.
-const FARTHEST: f64 = 0.3;
+const FARTHEST: f64 = 0.5;
 const CORNER_FARTHEST: f64 = 0.3;
 
 /// Nodes nearer to a path than this may come into its way, pitches.
@@ -262,7 +270,7 @@ fn pins(path: &PiecewiseCubic<2>, middles: &[[f64; 2]]) -> Vec<Pin> {
         let Some((at, place)) = course.place(path, node) else {
             continue;
         };
-        if at - first > END && last - at > END && side * place > -MISTAKEN {
+        if at - first > END && last - at > END && side * place > -MISDRAWN {
             pins.push(Pin {
                 along: at - first,
                 place,
@@ -275,7 +283,19 @@ fn pins(path: &PiecewiseCubic<2>, middles: &[[f64; 2]]) -> Vec<Pin> {
             .total_cmp(&b.along)
             .then(a.place.total_cmp(&b.place))
     });
-    pins
+    let is_mistaken = |pin: &Pin| {
+        let alike = |other: &&Pin| {
+            (other.along - pin.along).abs() <= ALONG
+                && other.side == pin.side
+                && other.side * other.place < -AS_WRONG
+        };
+        // The pin itself is one of them.
+        pin.side * pin.place <= -MISTAKEN && pins.iter().filter(alike).count() <= OTHERS
+    };
+    pins.iter()
+        .filter(|pin| !is_mistaken(pin))
+        .copied()
+        .collect()
 }
 
 /// How far a corner moves with its two outlines.
