@@ -18,6 +18,7 @@ mod posterior;
 mod side;
 mod silhouette;
 mod surfaces;
+mod wedge;
 
 pub(crate) use missing::Around;
 pub(crate) use node::{Conditions, Consensus};

@@ -63,18 +63,28 @@ impl Line {
         self.0
     }
 
+    /// How far along the line a sample lies, in local spacings.
+    pub(super) fn along(&self, s: &Labelled) -> f64 {
+        self.0[1] * s.u - self.0[0] * s.v
+    }
+
     /// Signed distance of a sample, in local spacings.
     pub(super) fn to(&self, s: &Labelled) -> f64 {
         at(&self.0, s)
     }
 
+    /// The best line between these samples.
+    pub(super) fn among(samples: &[Labelled]) -> Option<Self> {
+        Self::of(odds(samples, [0.0; 3])?)
+    }
+
     /// The best line between these samples, sought from this one.
-    fn again(&self, samples: &[Labelled]) -> Option<Self> {
+    pub(super) fn again(&self, samples: &[Labelled]) -> Option<Self> {
         Self::of(odds(samples, self.0.map(|value| STEEPNESS * value))?)
     }
 
     /// The mean of the lines near this one, as these samples have it.
-    fn mean(self, samples: &[Labelled], posterior: &mut Posterior) -> Self {
+    pub(super) fn mean(self, samples: &[Labelled], posterior: &mut Posterior) -> Self {
         let [g, h, o] = self.0;
         posterior.begin();
         for s in samples {

@@ -9,6 +9,7 @@ use super::arc::Arc;
 use super::missing::{Around, Places};
 use super::posterior::Posterior;
 use super::side::{Labelled, Line, lengthen, separate};
+use super::wedge::Wedge;
 use crate::neighbours::Neighbour;
 
 /// Windows in which samples and missing ones are looked at, first around the node and then
@@ -17,6 +18,8 @@ const WINDOWS: usize = 8;
 const FAR: [usize; 2] = [25, 16];
 /// The same where it is bent, by and by.
 const BENT: [usize; 3] = [4, 8, 16];
+/// The same beside a corner.
+const CORNER: usize = 16;
 /// Farther inside of the line, in spacings, a node beside the samples owes that to something
 /// else than the line, as where the scan ends.
 const ELSEWHERE: f64 = 1.0;
@@ -47,12 +50,35 @@ impl Silhouette {
         if line.is_near() {
             self.samples.clear();
             wider(&mut self.samples, FAR[0]);
-            distance = self
-                .straight(&line, around)
-                .or_else(|| self.bent(&line, around))
-                .unwrap_or(distance);
+            distance = self.lengthened(&line, around).unwrap_or(distance);
         }
         (distance <= ELSEWHERE).then_some(distance > 0.0)
+    }
+
+    /// The node's distance from the edge that this line is part of: straight as far as it goes
+    /// on so, else bent, else with a corner, else bent as far as an arc goes on.
+    fn lengthened(&mut self, line: &Line, around: &Around<'_>) -> Option<f64> {
+        if let Some(distance) = self.straight(line, around) {
+            return Some(distance);
+        }
+        let bent = self.bent(line, around);
+        match bent {
+            Some((distance, true)) => Some(distance),
+            _ => self.corner(line, around).or(bent.map(|bent| bent.0)),
+        }
+    }
+
+    /// The node's distance from the corner that the line leads to.
+    fn corner(&mut self, line: &Line, around: &Around<'_>) -> Option<f64> {
+        let dropped = self.label(CORNER, around, Some(line))?;
+        let wedge = Wedge::find(
+            line,
+            dropped,
+            &self.labelled,
+            &mut self.kept,
+            &mut self.posterior,
+        )?;
+        Some(wedge.distance())
     }
 
     /// The node's distance from the line as far as it goes on straight.
@@ -70,8 +96,9 @@ impl Silhouette {
         })
     }
 
-    /// The node's distance from the arc that the line is part of.
-    fn bent(&mut self, line: &Line, around: &Around<'_>) -> Option<f64> {
+    /// The node's distance from the arc that the line is part of, and whether it goes on as
+    /// far as was looked.
+    fn bent(&mut self, line: &Line, around: &Around<'_>) -> Option<(f64, bool)> {
         let mut arc = None;
         let mut next = Arc::of(line);
         for windows in BENT {
@@ -81,10 +108,10 @@ impl Silhouette {
                     next = longer;
                     arc = Some(longer);
                 }
-                None => break,
+                None => return arc.map(|arc: Arc| (arc.distance(), false)),
             }
         }
-        arc.map(|arc| arc.distance())
+        arc.map(|arc| (arc.distance(), true))
     }
 
     /// Labels the samples of so many of the `FAR` windows, and the places near them where
