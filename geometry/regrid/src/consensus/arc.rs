@@ -63,7 +63,7 @@ impl Arc {
     fn mean(self, samples: &[Labelled], posterior: &mut Posterior) -> Self {
         posterior.begin();
         for s in samples {
-            posterior.hear(self.place(s).0, self.at(s), s.label, s.trust);
+            posterior.weigh(s, self.place(s).0, self.at(s));
         }
         let [offset, slope, bend] = posterior.parabola();
         Self {

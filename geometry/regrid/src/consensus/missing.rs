@@ -27,6 +27,9 @@ const EMPTY_BESIDE: f64 = 1.25;
 /// Share of samples lost, if so few are known that it cannot be told from them.
 const DROPPED: f64 = 0.05;
 
+/// Logarithm of the odds against a sample from a spot whose middle misses the surface.
+const GRAZED: f64 = 3.0;
+
 /// A node and what is known around it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Around<'a> {
@@ -102,25 +105,34 @@ impl Places {
         line: Option<&Line>,
         labelled: &mut Vec<Labelled>,
     ) -> f64 {
-        let seen = |place: &Place, label: f64, trust: f64| Labelled {
+        let seen = |place: &Place, label: f64, trust: f64, trust_beside: f64| Labelled {
             u: place.dx / spacing.x_mm,
             v: place.dy / spacing.y_mm,
             label,
             trust,
+            trust_beside,
             strip: place.strip,
         };
         let beside = |places: &[Place]| {
             let near = |place: &&Place| {
-                line.is_none_or(|line| line.to(&seen(place, 1.0, SEEN)).abs() <= LANE)
+                line.is_none_or(|line| line.to(&seen(place, 1.0, SEEN, SEEN)).abs() <= LANE)
             };
             places.iter().filter(near).count() as f64
         };
         let (lost, present) = (beside(&self.lost), beside(&self.present));
         let dropped = (lost + 1.0) / (lost + present + 1.0 / DROPPED);
         labelled.clear();
-        labelled.extend(self.present.iter().map(|place| seen(place, 1.0, SEEN)));
+        labelled.extend(
+            self.present
+                .iter()
+                .map(|place| seen(place, 1.0, SEEN, GRAZED)),
+        );
         let trust = -libm::log(dropped);
-        labelled.extend(self.missing.iter().map(|place| seen(place, -1.0, trust)));
+        labelled.extend(
+            self.missing
+                .iter()
+                .map(|place| seen(place, -1.0, trust, trust)),
+        );
         let distance2 = |s: &Labelled| s.u * s.u + s.v * s.v;
         labelled.sort_unstable_by(|s, t| {
             distance2(s)

@@ -274,6 +274,7 @@ fn label(
             v: n.dy / spacing.y_mm,
             label,
             trust: SEEN,
+            trust_beside: SEEN,
             strip: n.strip,
         });
     }

@@ -3,6 +3,8 @@
 
 use core::ops::Range;
 
+use super::side::Labelled;
+
 /// How far from the line that is known others are looked at: offset, slope and bend, in
 /// spacings.
 const WITHIN: [f64; 3] = [2.0, 0.5, 0.02];
@@ -15,6 +17,10 @@ const SEARCHES: usize = 6;
 const UNLIKELY: f64 = 7.0;
 /// How well the edge is known, in spacings, when no further search is worth its time.
 const KNOWN: f64 = 0.005;
+
+/// Radius of the laser's spot, about, in spacings: part of it may be on a surface that its
+/// middle just misses.
+const SPOT: f64 = 0.25;
 
 /// A curve `across = offset + slope along + bend along^2`.
 pub(crate) type Curve = [f64; 3];
@@ -54,6 +60,20 @@ impl Posterior {
             side,
             trust,
         });
+    }
+
+    /// Takes a labelled sample.
+    pub(super) fn weigh(&mut self, sample: &Labelled, along: f64, across: f64) {
+        let (side, trust) = (sample.label, sample.trust);
+        self.hear(along, across, side, trust.min(sample.trust_beside));
+        if sample.trust_beside < trust {
+            self.hear(
+                along,
+                across + side * SPOT,
+                side,
+                trust - sample.trust_beside,
+            );
+        }
     }
 
     /// The mean of the straight lines near `across = 0`.

@@ -12,6 +12,8 @@ pub(crate) struct Labelled {
     pub(crate) label: f64,
     /// Logarithm of the odds that it is.
     pub(crate) trust: f64,
+    /// The same where a spot's width decides.
+    pub(crate) trust_beside: f64,
     /// The column it comes from.
     pub(crate) strip: usize,
 }
@@ -89,7 +91,7 @@ impl Line {
         posterior.begin();
         for s in samples {
             let across = at(&self.0, s);
-            posterior.hear(h * s.u - g * s.v, across, s.label, s.trust);
+            posterior.weigh(s, h * s.u - g * s.v, across);
         }
         // A point at (along, across) lies above where across - offset - slope * along > 0.
         let [offset, slope, _] = posterior.line();
@@ -279,6 +281,7 @@ pub(super) mod tests {
                     v,
                     label: if u > edge(v) { 1.0 } else { -1.0 },
                     trust: SEEN,
+                    trust_beside: SEEN,
                     strip: (column + reach) as usize,
                 });
             }
