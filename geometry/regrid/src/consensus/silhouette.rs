@@ -17,7 +17,7 @@ use crate::neighbours::Neighbour;
 const WINDOWS: usize = 8;
 const FAR: [usize; 2] = [25, 16];
 /// The same where it is bent, by and by.
-const BENT: [usize; 3] = [4, 8, 16];
+const BENT: [usize; 4] = [4, 8, 16, 25];
 /// The same beside a corner.
 const CORNER: usize = 16;
 /// Farther inside of the line, in spacings, a node beside the samples owes that to something
@@ -99,19 +99,16 @@ impl Silhouette {
     /// The node's distance from the arc that the line is part of, and whether it goes on as
     /// far as was looked.
     fn bent(&mut self, line: &Line, around: &Around<'_>) -> Option<(f64, bool)> {
-        let mut arc = None;
+        let mut followed = None;
         let mut next = Arc::of(line);
         for windows in BENT {
             let dropped = self.label(windows, around, Some(line))?;
-            match next.follow(dropped, &self.labelled, &mut self.kept, &mut self.posterior) {
-                Some(longer) => {
-                    next = longer;
-                    arc = Some(longer);
-                }
-                None => return arc.map(|arc: Arc| (arc.distance(), false)),
-            }
+            let longer = next.follow(dropped, &self.labelled, &mut self.kept, &mut self.posterior);
+            let Some(longer) = longer else { break };
+            next = longer;
+            followed = Some((longer.distance(), windows >= CORNER));
         }
-        arc.map(|arc| (arc.distance(), true))
+        followed
     }
 
     /// Labels the samples of so many of the `FAR` windows, and the places near them where
