@@ -4,14 +4,16 @@ use core::f64::consts::PI;
 
 use range_image::{GridColumn, Lattice, NodeQuality};
 
-use crate::consensus::{Conditions, Consensus, Effort, Noise, Surface, WIDTH, noise};
+use crate::consensus::{
+    Around, Conditions, Consensus, Effort, Noise, Silhouette, Surface, WIDTH, noise,
+};
 use crate::draws::Draws;
 use crate::exhaustive;
 use crate::neighbours::{Neighbour, Search};
 use crate::plane::{Fit, Plane, PlaneFinder};
 use crate::settings::{Estimator, LEAST_WINDOW, RegridSettings, SupportSettings};
 use crate::strip::{Strip, typical};
-use crate::support::Surroundings;
+use crate::support::{Place, Surroundings};
 use crate::window::{Spacing, Window};
 
 /// Computes grid columns; keeps its buffers from one to the next.
@@ -21,6 +23,7 @@ pub(crate) struct GridWorker {
     finder: PlaneFinder,
     surroundings: Surroundings,
     consensus: Consensus,
+    silhouette: Silhouette,
     /// The last node by consensus in the column, and its plane.
     before: Option<(i64, Plane)>,
     /// What is left of a node's window.
@@ -132,10 +135,20 @@ impl GridWorker {
         let dense = nearest.len() == neighbours;
         let support = &settings.support;
         // Inliers are some of the samples: where those do not suffice, inliers will not.
-        if !self
+        let all = self
             .surroundings
-            .supported(nearest, spacing, support, |_| true)
-        {
+            .place(nearest, spacing, support, |_| true, |_| false);
+        // How far outside of all samples the node lies.
+        let outside = match all {
+            Place::Among => 0.0,
+            Place::Beside { distance } => distance,
+            Place::Alone => return None,
+        };
+        let allowed = match settings.estimator {
+            Estimator::Consensus => BESIDE,
+            _ => support.margin,
+        };
+        if outside > allowed {
             return None;
         }
         if settings.estimator == Estimator::LeastSquares {
@@ -188,15 +201,43 @@ impl GridWorker {
                 ..*support
             };
             self.before = surfaces.first().map(|surface| (node.j, surface.plane));
+            let around = Around {
+                window,
+                surfaces,
+                spacing,
+                y_mm,
+            };
             return surfaces.iter().find_map(|surface| {
                 let fit = Fit {
                     plane: surface.plane,
                     tolerance: surface.width_mm,
                 };
                 let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm, dense);
-                let supported =
+                // Outliers beyond a silhouette close nothing.
+                let closes = |n: &Neighbour| surfaces.iter().any(|other| other.holds(n));
+                let place =
                     self.surroundings
-                        .supported(&self.samples, spacing, &support, agrees);
+                        .place(&self.samples, spacing, &support, agrees, closes);
+                let supported = match place {
+                    Place::Among if outside <= support.margin => true,
+                    Place::Among | Place::Beside { .. } => {
+                        let distance = match place {
+                            Place::Beside { distance } => distance.max(outside),
+                            _ => outside,
+                        };
+                        distance <= BESIDE
+                            && self
+                                .silhouette
+                                .holds(&around, |wide, windows| {
+                                    let number = windows * neighbours;
+                                    wide.extend_from_slice(
+                                        self.search.wider(window, x_mm, y_mm, number),
+                                    );
+                                })
+                                .unwrap_or(distance <= support.margin)
+                    }
+                    Place::Alone => false,
+                };
                 let quality = || quality(&self.samples, &fit.plane, |n| surface.holds(n));
                 supported.then(|| (fit.plane.c + surface.lift_mm, quality()))
             });
@@ -236,6 +277,9 @@ impl GridWorker {
 /// How many times farther from its surface's samples a node may lie where the line of the
 /// edge says on which side it is: half the diagonal of a square of samples.
 const SIDE_KNOWN: f64 = 1.18;
+/// How far outside of the hull of its surface's samples a node may lie, in local spacings,
+/// if the line of the silhouette has it inside.
+const BESIDE: f64 = 0.7;
 /// Columns on either side that tell of the noise.
 const NOISE_COLUMNS: usize = 8;
 /// Least noise believed, in spacings: scans without any are computed ones.

@@ -20,6 +20,23 @@ impl Surroundings {
         settings: &SupportSettings,
         agrees: impl Fn(&Neighbour) -> bool,
     ) -> bool {
+        match self.place(window, spacing, settings, agrees, |_| true) {
+            Place::Among => true,
+            Place::Beside { distance } => distance <= settings.margin,
+            Place::Alone => false,
+        }
+    }
+
+    /// Where the node lies among the samples near it. `agrees` tells inliers, `closes` those
+    /// of the other samples that may belong to another surface.
+    pub(crate) fn place(
+        &mut self,
+        window: &[Neighbour],
+        spacing: Spacing,
+        settings: &SupportSettings,
+        agrees: impl Fn(&Neighbour) -> bool,
+        closes: impl Fn(&Neighbour) -> bool,
+    ) -> Place {
         self.points.clear();
         self.others.clear();
         for neighbour in window {
@@ -27,27 +44,43 @@ impl Surroundings {
             if u * u + v * v <= settings.radius * settings.radius {
                 if agrees(neighbour) {
                     self.points.push((u, v));
-                } else {
+                } else if closes(neighbour) {
                     self.others.push((u, v));
                 }
             }
         }
         if self.points.len() < settings.least_samples {
-            return false;
+            return Place::Alone;
         }
         if hull_holds_origin(&self.points) {
-            return true;
+            return Place::Among;
         }
-        let distance2 = hull_distance2(&self.points);
-        if distance2 <= settings.margin * settings.margin {
-            return true;
-        }
+        let distance = hull_distance2(&self.points).sqrt();
         // At a step edge without a gap the node belongs to one surface or the other.
-        distance2 <= settings.step_margin * settings.step_margin && {
+        let closed = distance <= settings.step_margin && {
             self.points.append(&mut self.others);
             hull_holds_origin(&self.points)
+        };
+        if closed {
+            Place::Among
+        } else {
+            Place::Beside { distance }
         }
     }
+}
+
+/// Where a node lies among the samples near it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Place {
+    /// Inliers surround it, or they and samples of another surface close to them do.
+    Among,
+    /// Outside of the convex hull of the inliers.
+    Beside {
+        /// How far, in local spacings.
+        distance: f64,
+    },
+    /// Inliers are too few.
+    Alone,
 }
 
 fn cross(p: (f64, f64), q: (f64, f64)) -> f64 {

@@ -7,6 +7,7 @@ use range_image::{Cancelled, Monitor};
 
 use super::cracks::{Chain, CrackMap, Use};
 use super::crossing::{Strand, conflicts};
+use super::deflect::{Drawn, part};
 use super::path;
 use super::segments::{Price, Samples, Segment, sharpest};
 use super::smooth::smooth;
@@ -146,11 +147,22 @@ pub(crate) fn build(
         .collect();
     loop {
         monitor.check()?;
-        let junctions = place_junctions(cracks, &borders);
-        let drawn: Vec<Option<Vec<PiecewiseCubic<2>>>> = borders
+        let mut junctions = place_junctions(cracks, &borders);
+        let mut drawn: Vec<Option<Vec<PiecewiseCubic<2>>>> = borders
             .iter()
             .map(|b| b.draw(&junctions, settings))
             .collect();
+        if !settings.literal {
+            let mut drawn: Vec<Drawn<'_>> = borders
+                .iter()
+                .zip(&mut drawn)
+                .map(|(border, paths)| Drawn {
+                    chain: border.chain,
+                    paths: paths.as_mut().filter(|_| border.level < TRACED),
+                })
+                .collect();
+            part(&mut drawn, &mut junctions);
+        }
         let bad = faults(cracks, &borders, &drawn, &junctions);
         let mut raised = false;
         for k in bad {

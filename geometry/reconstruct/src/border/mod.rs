@@ -1,7 +1,9 @@
 //! Borders: from labels to a planar map of smooth paths (Shim & Lee 1995, section IV).
 
+pub(crate) mod beam;
 pub(crate) mod cracks;
 pub(crate) mod crossing;
+pub(crate) mod deflect;
 pub(crate) mod intersection;
 pub(crate) mod map;
 pub(crate) mod path;

@@ -304,7 +304,9 @@ impl Builder {
     }
 }
 
-fn hermite(
+/// The coefficients of the cubic with these derivatives at its ends over a parameter of this
+/// length.
+pub(super) fn hermite(
     from: [f64; 2],
     out: [f64; 2],
     to: [f64; 2],

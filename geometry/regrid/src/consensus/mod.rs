@@ -8,13 +8,20 @@
 //! samples that the best surface leaves over agree among themselves on another one, the
 //! places of both surfaces' samples tell on whose side of the edge the node lies.
 
+mod arc;
 mod bend;
-mod between;
+mod logistic;
+mod missing;
 mod node;
 mod noise;
+mod posterior;
 mod side;
+mod silhouette;
 mod surfaces;
+mod wedge;
 
+pub(crate) use missing::Around;
 pub(crate) use node::{Conditions, Consensus};
 pub(crate) use noise::{Noise, noise};
+pub(crate) use silhouette::Silhouette;
 pub(crate) use surfaces::{Effort, Surface, WIDTH};

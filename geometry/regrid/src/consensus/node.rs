@@ -1,8 +1,8 @@
 //! Which of the surfaces near a node is its own, and z there.
 
 use super::bend::lift_mm;
-use super::between::Between;
-use super::side::{Labelled, lengthen, separate};
+use super::posterior::Posterior;
+use super::side::{Labelled, SEEN, lengthen, separate};
 use super::surfaces::{Effort, PlaneSums, Surface, Surfaces};
 use crate::draws::Draws;
 use crate::neighbours::Neighbour;
@@ -55,7 +55,7 @@ pub(crate) struct Consensus {
     far: Vec<Neighbour>,
     labelled: Vec<Labelled>,
     kept: Vec<Labelled>,
-    between: Between,
+    posterior: Posterior,
     /// Numbers of samples, strip by strip.
     by_strip: Vec<u32>,
     /// What noise the last node was estimated with.
@@ -194,7 +194,7 @@ impl Consensus {
         let (first, other) = (self.found[0], self.found[other]);
         let meet = (first.plane.c - other.plane.c).abs() <= first.width_mm;
         label(&self.wide, &first, &other, spacing, &mut self.labelled);
-        let Some(mut line) = separate(&mut self.labelled, &mut self.between) else {
+        let Some(mut line) = separate(&mut self.labelled, &mut self.posterior) else {
             return if meet { Place::First } else { Place::Nowhere };
         };
         if line.is_near() {
@@ -210,7 +210,13 @@ impl Consensus {
                     spacing,
                     &mut self.labelled,
                 );
-                let longer = lengthen(&line, &mut self.labelled, &mut self.kept, &mut self.between);
+                let longer = lengthen(
+                    &line,
+                    0.0,
+                    &mut self.labelled,
+                    &mut self.kept,
+                    &mut self.posterior,
+                );
                 if let Some(longer) = longer {
                     line = longer;
                     break;
@@ -267,6 +273,8 @@ fn label(
             u: n.dx / spacing.x_mm,
             v: n.dy / spacing.y_mm,
             label,
+            trust: SEEN,
+            trust_beside: SEEN,
             strip: n.strip,
         });
     }

@@ -1,7 +1,7 @@
 //! On which side of the line between two surfaces a node lies.
 
-use super::between::Between;
-use crate::solve::solve;
+use super::logistic::logistic;
+use super::posterior::Posterior;
 
 /// A sample of one of the two surfaces, as seen from the node, in local spacings.
 #[derive(Debug, Clone, Copy)]
@@ -10,17 +10,18 @@ pub(crate) struct Labelled {
     pub(crate) v: f64,
     /// 1 for a sample of the first surface, -1 for one of the second.
     pub(crate) label: f64,
+    /// Logarithm of the odds that it is.
+    pub(crate) trust: f64,
+    /// The same where a spot's width decides.
+    pub(crate) trust_beside: f64,
     /// The column it comes from.
     pub(crate) strip: usize,
 }
 
-/// How much a steeper transition costs against samples on the wrong side: so little that
-/// between sets which a line separates the widest lane is found.
-const RIDGE: f64 = 1e-4;
-/// Newton's steps; each about doubles the steepness between separable sets.
-const STEPS: usize = 16;
+/// Logarithm of the odds that a sample which agrees with one surface alone lies on it.
+pub(super) const SEEN: f64 = 6.0;
 /// Share of samples on the wrong side up to which the edge is taken for straight.
-const STRAIGHT: f64 = 0.015;
+pub(super) const STRAIGHT: f64 = 0.015;
 /// Share of either set on the wrong side beyond which no line separates them.
 const MIXED: f64 = 0.4;
 /// The nearer samples are one in so many, nearest first. They suffice where they show the
@@ -32,13 +33,15 @@ const CLEAN: f64 = 0.1;
 /// Windows tried, each with half the samples of the one before.
 const WINDOWS: usize = 3;
 /// Turns of lengthening a line, each with the samples beside the line of the one before.
-const TURNS: usize = 2;
+pub(super) const TURNS: usize = 2;
 /// Spacings from a line within which samples on the wrong side may be the line's fault.
-const BESIDE: f64 = 1.0;
+pub(super) const BESIDE: f64 = 1.0;
 /// Spacings from a line within which samples have a say in where it goes.
-const LANE: f64 = 4.0;
+pub(super) const LANE: f64 = 4.0;
 /// Steepness, per spacing, with which the search for a line begins at a known one.
-const STEEPNESS: f64 = 1.0;
+pub(super) const STEEPNESS: f64 = 1.0;
+/// Spacings beyond a line at which a sample is still not on its wrong side.
+pub(super) const SLACK: f64 = 0.05;
 /// Samples left on the wrong side beside a long line beyond which the edge is bent.
 const BENT: usize = 2;
 /// Spacings from a sample to those of other columns that may contradict it, and how many
@@ -52,30 +55,47 @@ const OUTVOTED: usize = 3;
 pub(crate) struct Line([f64; 3]);
 
 impl Line {
-    fn of(raw: [f64; 3]) -> Option<Self> {
+    pub(super) fn of(raw: [f64; 3]) -> Option<Self> {
         let length = (raw[0] * raw[0] + raw[1] * raw[1]).sqrt();
         (length > 0.0).then(|| Self(raw.map(|value| value / length)))
     }
 
-    /// The best line between these samples, sought from this one.
-    fn again(&self, samples: &[Labelled]) -> Option<Self> {
-        Self::of(logistic(samples, self.0.map(|value| STEEPNESS * value))?)
+    /// `g, h, o`.
+    pub(super) fn coefficients(&self) -> [f64; 3] {
+        self.0
     }
 
-    /// The mean of all lines that separate these samples: of the line that is sought no more
-    /// is known. This line, if it is none of them.
-    fn between(self, samples: &[Labelled], between: &mut Between) -> Self {
+    /// How far along the line a sample lies, in local spacings.
+    pub(super) fn along(&self, s: &Labelled) -> f64 {
+        self.0[1] * s.u - self.0[0] * s.v
+    }
+
+    /// Signed distance of a sample, in local spacings.
+    pub(super) fn to(&self, s: &Labelled) -> f64 {
+        at(&self.0, s)
+    }
+
+    /// The best line between these samples.
+    pub(super) fn among(samples: &[Labelled]) -> Option<Self> {
+        Self::of(odds(samples, [0.0; 3])?)
+    }
+
+    /// The best line between these samples, sought from this one.
+    pub(super) fn again(&self, samples: &[Labelled]) -> Option<Self> {
+        Self::of(odds(samples, self.0.map(|value| STEEPNESS * value))?)
+    }
+
+    /// The mean of the lines near this one, as these samples have it.
+    pub(super) fn mean(self, samples: &[Labelled], posterior: &mut Posterior) -> Self {
         let [g, h, o] = self.0;
-        between.begin();
+        posterior.begin();
         for s in samples {
             let across = at(&self.0, s);
-            between.keep(h * s.u - g * s.v, across, s.label);
+            posterior.weigh(s, h * s.u - g * s.v, across);
         }
         // A point at (along, across) lies above where across - offset - slope * along > 0.
-        let mean = between
-            .mean()
-            .map(|[offset, slope]| [g - slope * h, h + slope * g, o - offset]);
-        mean.and_then(Self::of).unwrap_or(self)
+        let [offset, slope, _] = posterior.line();
+        Self::of([g - slope * h, h + slope * g, o - offset]).unwrap_or(self)
     }
 
     /// Signed distance of the node, in local spacings.
@@ -94,10 +114,10 @@ impl Line {
 /// many of them on the wrong side, as at a bent edge or a corner, over the nearer half, and
 /// so on. `None` where the two sets do not lie apart. Samples that no surface can have are
 /// taken out.
-pub(crate) fn separate(samples: &mut Vec<Labelled>, between: &mut Between) -> Option<Line> {
+pub(crate) fn separate(samples: &mut Vec<Labelled>, posterior: &mut Posterior) -> Option<Line> {
     // Far from the edge the nearer samples tell.
     let near = samples.get(..samples.len() / NEARER)?;
-    if let Some(raw) = logistic(near, [0.0; 3])
+    if let Some(raw) = odds(near, [0.0; 3])
         && let Some(line) = Line::of(raw)
         && !line.is_near()
         && wrong_side(near, &raw).1 <= CLEAN
@@ -107,13 +127,13 @@ pub(crate) fn separate(samples: &mut Vec<Labelled>, between: &mut Between) -> Op
     }
     let mut best = None;
     for window in 0..WINDOWS {
-        let mut line = logistic(samples, [0.0; 3])?;
+        let mut line = odds(samples, [0.0; 3])?;
         let (mut wrong, share) = wrong_side(samples, &line);
         if share > MIXED {
             break;
         }
         if wrong > 0 && take_out_strays(samples, &line) {
-            line = logistic(samples, [0.0; 3])?;
+            line = odds(samples, [0.0; 3])?;
             wrong = wrong_side(samples, &line).0;
         }
         best = Some(line);
@@ -121,7 +141,7 @@ pub(crate) fn separate(samples: &mut Vec<Labelled>, between: &mut Between) -> Op
             if wrong > 0 {
                 // Outliers that agree by chance; the line is better known without.
                 samples.retain(|s| s.label * at(&line, s) > 0.0);
-                best = logistic(samples, [0.0; 3]).or(best);
+                best = odds(samples, [0.0; 3]).or(best);
             }
             break;
         }
@@ -130,7 +150,7 @@ pub(crate) fn separate(samples: &mut Vec<Labelled>, between: &mut Between) -> Op
             break;
         }
     }
-    Some(Line::of(best?)?.between(samples, between))
+    Some(Line::of(best?)?.mean(samples, posterior))
 }
 
 /// Takes out the samples on the wrong side that samples of other columns, around them,
@@ -164,12 +184,14 @@ fn take_out_strays(samples: &mut Vec<Labelled>, line: &[f64; 3]) -> bool {
 }
 
 /// The line from samples of a wider window, where the edge goes on as straight there: it is
-/// the better known the more samples lie along it. `None` where it bends.
+/// the better known the more samples lie along it. `None` where it bends. Of the second set
+/// this share may be no evidence at all.
 pub(crate) fn lengthen(
     line: &Line,
+    doubtful: f64,
     samples: &mut Vec<Labelled>,
     lane: &mut Vec<Labelled>,
-    between: &mut Between,
+    posterior: &mut Posterior,
 ) -> Option<Line> {
     let mut line = *line;
     take_out_strays(samples, &line.0);
@@ -193,14 +215,30 @@ pub(crate) fn lengthen(
             break;
         }
     }
-    let before = lane.len();
-    lane.retain(|s| s.label * at(&line.0, s) > 0.0);
-    let line = match before - lane.len() {
-        0 => line,
-        1..=BENT => line.again(lane)?,
-        _ => return None,
-    };
-    Some(line.between(lane, between))
+    line = line.mean(lane, posterior);
+    let right = |s: &Labelled| s.label * at(&line.0, s) > -SLACK;
+    is_followed(lane, doubtful, right).then_some(line)
+}
+
+/// Whether so few samples beside a long line are not on the right side of it that the edge
+/// is not bent, with this share of the second set being no evidence.
+pub(super) fn is_followed(
+    lane: &[Labelled],
+    doubtful: f64,
+    right: impl Fn(&Labelled) -> bool,
+) -> bool {
+    let (mut first, mut second, mut all_second) = (0, 0, 0);
+    for s in lane {
+        let wrong = usize::from(!right(s));
+        if s.label > 0.0 {
+            first += wrong;
+        } else {
+            second += wrong;
+            all_second += 1;
+        }
+    }
+    let spared = (doubtful * f64::from(all_second)) as usize;
+    first + second.saturating_sub(spared) <= BENT
 }
 
 fn at(line: &[f64; 3], s: &Labelled) -> f64 {
@@ -221,45 +259,17 @@ fn wrong_side(samples: &[Labelled], line: &[f64; 3]) -> (usize, f64) {
 
 /// `g, h, o` so that `g u + h v + o` is the logarithm of the odds of the first surface,
 /// sought from the ones given.
-fn logistic(samples: &[Labelled], mut line: [f64; 3]) -> Option<[f64; 3]> {
-    for _ in 0..STEPS {
-        // The second ridge keeps the system regular where all samples have one label.
-        let mut hessian = [[RIDGE, 0.0, 0.0], [0.0, RIDGE, 0.0], [0.0, 0.0, 1e-9]];
-        let mut gradient = [RIDGE * line[0], RIDGE * line[1], 0.0];
-        for s in samples {
-            let odds = s.label * at(&line, s);
-            // Beyond this a sample's share in either sum is nothing.
-            if odds > 20.0 {
-                continue;
-            }
-            let wrong = 1.0 / (1.0 + libm::exp(odds));
-            let slope = -s.label * wrong;
-            let bend = wrong * (1.0 - wrong);
-            gradient[0] += slope * s.u;
-            gradient[1] += slope * s.v;
-            gradient[2] += slope;
-            hessian[0][0] += bend * s.u * s.u;
-            hessian[1][0] += bend * s.v * s.u;
-            hessian[1][1] += bend * s.v * s.v;
-            hessian[2][0] += bend * s.u;
-            hessian[2][1] += bend * s.v;
-            hessian[2][2] += bend;
-        }
-        let step = solve(hessian, gradient)?;
-        for (value, step) in line.iter_mut().zip(step) {
-            *value -= step;
-        }
-    }
-    line.iter().all(|v| v.is_finite()).then_some(line)
+fn odds(samples: &[Labelled], line: [f64; 3]) -> Option<[f64; 3]> {
+    logistic(samples, line, |s| [s.u, s.v, 1.0])
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// A grid of samples around the node, nearest first, within this many spacings; rows of
     /// each column start anywhere. Positive labels where `u` is above the edge's at `v`.
-    fn grid(radius: f64, edge: impl Fn(f64) -> f64) -> Vec<Labelled> {
+    pub(in crate::consensus) fn grid(radius: f64, edge: impl Fn(f64) -> f64) -> Vec<Labelled> {
         let reach = radius as i32;
         let mut samples = Vec::new();
         for column in -reach..=reach {
@@ -270,6 +280,8 @@ mod tests {
                     u,
                     v,
                     label: if u > edge(v) { 1.0 } else { -1.0 },
+                    trust: SEEN,
+                    trust_beside: SEEN,
                     strip: (column + reach) as usize,
                 });
             }
@@ -289,12 +301,13 @@ mod tests {
         for k in 0..40 {
             let (slope, offset) = (0.02 * f64::from(k) + 0.3, 0.02 * f64::from(k) - 0.4);
             let edge = |v: f64| slope * v + offset;
-            let line = separate(&mut grid(8.0, edge), &mut Between::default()).unwrap();
+            let line = separate(&mut grid(8.0, edge), &mut Posterior::default()).unwrap();
             let long = lengthen(
                 &line,
+                0.0,
                 &mut grid(16.0, edge),
                 &mut Vec::new(),
-                &mut Between::default(),
+                &mut Posterior::default(),
             )
             .unwrap();
             let truth = distance_to(slope, offset);
@@ -316,14 +329,15 @@ mod tests {
             ),
             (&|v: f64| 0.3 + 0.4 * v + 0.7 * v.max(0.0), "corner"),
         ] {
-            let line = separate(&mut grid(8.0, edge), &mut Between::default()).unwrap();
+            let line = separate(&mut grid(8.0, edge), &mut Posterior::default()).unwrap();
             assert!((line.distance() + 0.3).abs() < 0.4, "{name} {line:?}");
             assert!(
                 lengthen(
                     &line,
+                    0.0,
                     &mut grid(16.0, edge),
                     &mut Vec::new(),
-                    &mut Between::default()
+                    &mut Posterior::default()
                 )
                 .is_none()
             );
@@ -342,8 +356,8 @@ mod tests {
             changed += 1;
         }
         assert!((4..=6).contains(&changed));
-        let clean = separate(&mut grid(9.0, edge), &mut Between::default()).unwrap();
-        let line = separate(&mut samples, &mut Between::default()).unwrap();
+        let clean = separate(&mut grid(9.0, edge), &mut Posterior::default()).unwrap();
+        let line = separate(&mut samples, &mut Posterior::default()).unwrap();
         assert!(
             (line.distance() - clean.distance()).abs() < 0.05,
             "{line:?}"
@@ -356,6 +370,6 @@ mod tests {
         for (k, s) in samples.iter_mut().enumerate() {
             s.label = if k % 2 == 0 { 1.0 } else { -1.0 };
         }
-        assert!(separate(&mut samples, &mut Between::default()).is_none());
+        assert!(separate(&mut samples, &mut Posterior::default()).is_none());
     }
 }

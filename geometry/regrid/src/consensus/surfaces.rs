@@ -28,7 +28,7 @@ const LEAST_OTHERS: usize = 4;
 const MANY_OTHERS: usize = 10;
 /// Steepest slope that a camera sees anything of: beyond 80 degrees hardly any light comes
 /// back. What is steeper joins runs of outliers in different columns.
-const STEEPEST_SEEN: f64 = 6.0;
+pub(super) const STEEPEST_SEEN: f64 = 6.0;
 /// Steepest slope of one surface against another that is looked for among the samples which
 /// the first leaves over.
 const STEEPEST: f64 = 2.0;
