@@ -5,6 +5,7 @@ mod reproduce;
 mod rules;
 mod shell;
 mod study;
+mod vm;
 
 use clap::{Parser, Subcommand};
 
@@ -32,6 +33,9 @@ enum Chore {
     /// Measure one part of the product at length.
     #[command(subcommand)]
     Study(study::Study),
+    /// Check in a virtual machine what needs a kernel of its own.
+    #[command(subcommand)]
+    Vm(vm::Vm),
     /// Everything: tests, lints, rules, studies, judges with all seeds, FreeCAD.
     Full,
 }
@@ -42,6 +46,7 @@ fn main() -> anyhow::Result<()> {
         Chore::Judge(options) => judge::run(&options),
         Chore::Reproduce(options) => reproduce::run(&options),
         Chore::Study(study) => study::run(&study),
+        Chore::Vm(vm) => vm::run(&vm),
         Chore::Full => full(),
     }
 }

@@ -14,7 +14,11 @@ use super::function::Function;
 use super::vhci::{self, VhciError};
 use super::wire::{self, Import, Operation};
 use crate::control::{Running, Shared};
+use crate::device::Device;
 use crate::line::{BadLine, Direction, LineFaults};
+
+/// Bytes that end a burst: what a host fetches at a time.
+const BURST_BYTES: usize = 16 * 1024;
 
 /// Most connections that have not yet said what they want.
 const MAX_STRANGERS: usize = 16;
@@ -149,13 +153,13 @@ impl Worker {
             running.device.receive(&self.to_device.carry(&heard), now);
         }
         if self.function.has_spoken() {
-            let poll = running.device.poll(now);
-            self.speak(running, &poll.bytes, now);
-            if !poll.bytes.is_empty() && self.function.has_spoken() {
+            let (bytes, wake) = poll_burst(&mut running.device, now);
+            self.speak(running, &bytes, now);
+            if !bytes.is_empty() && self.function.has_spoken() {
                 // All of it has been fetched, and there may be more.
                 return Some(now);
             }
-            return poll.wake;
+            return wake;
         }
         // The host does not fetch: no more columns, but laser and table stay guarded.
         let due = running.device.safety_wake(now)?;
@@ -281,5 +285,18 @@ impl Worker {
         let mut sink = [0; 64];
         while matches!(io::Read::read(&mut self.woken, &mut sink), Ok(count) if count > 0) {}
         Ok(())
+    }
+}
+
+/// All that the device has to say now, up to a burst; and when to ask again.
+fn poll_burst(device: &mut Device, now: Duration) -> (Vec<u8>, Option<Duration>) {
+    let mut bytes = Vec::new();
+    loop {
+        let poll = device.poll(now);
+        let silent = poll.bytes.is_empty();
+        bytes.extend(poll.bytes);
+        if silent || bytes.len() >= BURST_BYTES || poll.wake.is_none_or(|wake| wake > now) {
+            return (bytes, poll.wake);
+        }
     }
 }
