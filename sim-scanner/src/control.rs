@@ -213,7 +213,12 @@ impl Control {
     /// What has gone over the line so far, and how long the device waited for the host.
     #[must_use]
     pub fn line_use(&self) -> LineUse {
-        self.shared.lock().line
+        let running = self.shared.lock();
+        let mut line = running.line;
+        if let Some(since) = running.waiting_since {
+            line.waited_for_host += self.shared.now().saturating_sub(since);
+        }
+        line
     }
 
     /// How the device is.

@@ -71,6 +71,7 @@ fn full() -> anyhow::Result<()> {
         freecad: true,
         out: None,
     })?;
+    vm::run(&vm::Vm::Usb(vm::Options::default()))?;
     study::run(&study::Study::Mutations {
         options: Vec::new(),
     })?;

@@ -29,14 +29,26 @@ pub(crate) enum Vm {
     Usb(Options),
 }
 
+/// Several times what it takes on a machine that has other work.
+const PATIENCE_S: u64 = 240;
+
 #[derive(Debug, Args)]
 pub(crate) struct Options {
     /// Let the processor run the machine: quicker, where nested virtualisation works.
     #[arg(long)]
     kvm: bool,
     /// Seconds after which the machine is ended.
-    #[arg(long, default_value_t = 240)]
+    #[arg(long, default_value_t = PATIENCE_S)]
     patience_s: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            kvm: false,
+            patience_s: PATIENCE_S,
+        }
+    }
 }
 
 const TARGET: &str = "x86_64-unknown-linux-musl";

@@ -248,3 +248,9 @@ pub fn list_ports() -> Result<Vec<PortInfo>, ScannerError> {
 pub fn port_holder(path: &str) -> Option<String> {
     holder(Path::new(path))
 }
+
+/// The group that may use this port, by name or number.
+#[must_use]
+pub fn port_group(path: &str) -> String {
+    group_of(Path::new(path))
+}

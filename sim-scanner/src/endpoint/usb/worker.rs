@@ -171,10 +171,9 @@ impl Worker {
 
     fn speak(&mut self, running: &mut Running, bytes: &[u8], now: Duration) {
         let carried = self.to_host.carry(bytes);
-        for stall in [self.to_host.take_stall(), self.to_device.take_stall()] {
-            if let Some(stall) = stall {
-                self.silent_until = now + stall;
-            }
+        let stalls = [self.to_host.take_stall(), self.to_device.take_stall()];
+        for stall in stalls.into_iter().flatten() {
+            self.silent_until = now + stall;
         }
         if self.host.is_some() {
             running.note_to_host(carried.len());
