@@ -105,6 +105,12 @@ fn is_installed(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok()
 }
 
+/// Asks nothing, as there may be nobody to answer.
+fn apt_get(words: &[&str]) -> Result<()> {
+    let silent = [("DEBIAN_FRONTEND", "noninteractive".to_owned())];
+    shell::run_with("apt-get", words, &silent)
+}
+
 /// Installs the emulator, where that is possible.
 fn install_emulator(home: &Path) -> Result<()> {
     let told = format!("{EMULATOR} is missing: `sudo apt-get install {EMULATOR_PACKAGE}`");
@@ -112,10 +118,10 @@ fn install_emulator(home: &Path) -> Result<()> {
         bail!(told);
     }
     let install = ["install", "--yes", "--no-install-recommends"];
-    shell::run("apt-get", &["update"]).context(told.clone())?;
+    apt_get(&["update"]).context(told.clone())?;
     let mut words = install.to_vec();
     words.push(EMULATOR_PACKAGE);
-    if shell::run("apt-get", &words).is_ok() {
+    if apt_get(&words).is_ok() {
         return Ok(());
     }
     // Where another part of the emulator comes from the backports, so must this one. Their
@@ -123,34 +129,52 @@ fn install_emulator(home: &Path) -> Result<()> {
     let lists = home.join("apt");
     fs::create_dir_all(lists.join("lists/partial"))?;
     let source = lists.join("backports.list");
-    fs::write(&source, backports()?)?;
+    let release = release()?;
+    fs::write(&source, with_backports(&release)?)?;
     let options = [
         format!("Dir::Etc::SourceList={}", source.display()),
         "Dir::Etc::SourceParts=/dev/null".to_owned(),
         format!("Dir::State::Lists={}", lists.join("lists").display()),
-        "APT::Default-Release=*-backports".to_owned(),
+        format!("APT::Default-Release={release}-backports"),
     ];
     let with = |words: &[&str]| {
         let mut all: Vec<&str> = options.iter().flat_map(|o| ["-o", o]).collect();
         all.extend(words);
-        shell::run("apt-get", &all)
+        apt_get(&all)
     };
     with(&["update"]).context(told.clone())?;
     with(&words).context(told)
 }
 
-/// A list of this Debian's packages and its backports, signed as its own are.
-fn backports() -> Result<String> {
-    let release = fs::read_to_string("/etc/os-release").context("which Debian is this?")?;
-    let name = release
+/// The name of this Debian's release, such as `bookworm`.
+fn release() -> Result<String> {
+    let release = fs::read_to_string("/etc/os-release").context("which system is this?")?;
+    release
         .lines()
         .find_map(|line| line.strip_prefix("VERSION_CODENAME="))
-        .context("this is no Debian: install the emulator by hand")?;
+        .map(str::to_owned)
+        .context("this is no Debian: install the emulator by hand")
+}
+
+/// A list of packages with the backports, from where this machine has its own, and signed as
+/// those are.
+fn with_backports(release: &str) -> Result<String> {
+    const FORMAT: &str = "$(CODENAME) $(REPO_URI)";
+    let sources = shell::output(
+        "apt-get",
+        &["indextargets", "--format", FORMAT, "Created-By: Packages"],
+    )?;
+    let place = sources
+        .lines()
+        .filter_map(|line| line.split_once(' '))
+        .find(|(name, _)| *name == release)
+        .map(|(_, place)| place)
+        .with_context(|| format!("this machine has no source of packages for {release}"))?;
     Ok(["", "-updates", "-backports"]
         .map(|suite| {
             format!(
                 "deb [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] \
-                 http://deb.debian.org/debian {name}{suite} main\n"
+                 {place} {release}{suite} main\n"
             )
         })
         .concat())
@@ -166,7 +190,7 @@ fn unpack(home: &Path, root: &Path) -> Result<()> {
     }
     if download(&downloads).is_err() {
         // The list of packages is missing, as in a fresh container, or older than they are.
-        shell::run("apt-get", &["update"])?;
+        apt_get(&["update"])?;
         download(&downloads)?;
     }
     for file in fs::read_dir(&downloads)? {

@@ -1,7 +1,8 @@
 //! From the kernel's hands to a usable system, and back.
 
+use std::ffi::CStr;
 use std::fs::{self, OpenOptions};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
@@ -33,8 +34,7 @@ pub(crate) fn boot() -> Result<()> {
         .collect();
     modules.sort();
     for module in modules {
-        let image = fs::read(&module)?;
-        init_module(&image, c"").with_context(|| format!("cannot load {}", module.display()))?;
+        load(&module, c"")?;
     }
     // Only there once the module is.
     mount("configfs", "/sys/kernel/config")?;
@@ -44,6 +44,12 @@ pub(crate) fn boot() -> Result<()> {
         .context("no busybox")?;
     anyhow::ensure!(up.success(), "the loopback network does not come up");
     Ok(())
+}
+
+/// Loads a module with these parameters.
+pub(crate) fn load(module: &Path, parameters: &CStr) -> Result<()> {
+    let image = fs::read(module)?;
+    init_module(&image, parameters).with_context(|| format!("cannot load {}", module.display()))
 }
 
 pub(crate) fn mount(kind: &str, place: &str) -> Result<()> {

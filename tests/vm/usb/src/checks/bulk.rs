@@ -1,20 +1,26 @@
 //! The driver of the vendor's interface, against the simulator plugged into this machine.
 
 use std::fs;
+use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use scanner_driver::{Scanner, ScannerError, UsbScanner, UsbSettings};
 use sim_scanner::endpoint::usb::{Attachment, Personality, UsbServer};
 
 use super::Check;
+use crate::boot::load;
 use crate::client::said_by_another;
 use crate::scan::{self, LIMIT, config, listed, scan_is_cut, scan_is_exact, usb, wait_for};
 
-pub(crate) const CHECKS: [Check; 8] = [
+pub(crate) const CHECKS: [Check; 9] = [
     ("bulk: a scan is that in memory", whole),
     (
         "bulk: a second program is told who has the device",
         second_claim,
+    ),
+    (
+        "bulk: a kernel driver that has the device is named",
+        kernel_driver,
     ),
     (
         "bulk: a user without the right is told of it",
@@ -69,6 +75,33 @@ fn second_claim() -> Result<()> {
         "{said}"
     );
     // The first has not been disturbed.
+    scan_is_exact(&scanner)
+}
+
+/// The kernel's driver of serial adapters takes whatever it is told to.
+fn kernel_driver() -> Result<()> {
+    const MODULE: &str = "/spare/usbserial.ko";
+    load(Path::new(MODULE), c"vendor=0x1209 product=0x0001")?;
+    let _server = serve()?;
+    let start = std::time::Instant::now();
+    loop {
+        let interface = listed()?.scanner_interface().cloned();
+        if interface.is_some_and(|interface| interface.driver.is_some()) {
+            break;
+        }
+        ensure!(start.elapsed() < LIMIT, "the driver does not take it");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let scanner = open()?;
+    let error = scanner.identify().err().context("it answers")?;
+    // Whatever comes of this, the checks that follow must have the device.
+    rustix::system::delete_module(c"usbserial", 0)?;
+    ensure!(
+        error
+            .to_string()
+            .ends_with("is in use by the kernel's driver usbserial_generic"),
+        "{error}"
+    );
     scan_is_exact(&scanner)
 }
 
