@@ -36,7 +36,8 @@ enum Chore {
     /// Check in a virtual machine what needs a kernel of its own.
     #[command(subcommand)]
     Vm(vm::Vm),
-    /// Everything: tests, lints, rules, studies, judges with all seeds, FreeCAD.
+    /// Everything: tests, lints, rules, studies, judges with all seeds, FreeCAD, the virtual
+    /// machine.
     Full,
 }
 

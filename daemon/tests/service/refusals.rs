@@ -294,3 +294,31 @@ async fn only_local_names_are_answered_on_loopback() {
     assert_eq!(reply.problem().kind, "not-local");
     rig.daemon.shutdown().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_service_for_a_scanner_on_usb_waits_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut config = config(folder.path());
+    // Numbers that no maker has.
+    config.scanner.transport = reliefd::config::Transport::Usb;
+    config.scanner.vendor_id = 0xffff;
+    config.scanner.product_id = 0xffff;
+    config.scanner.serial_number = Some("7".into());
+    let daemon = Daemon::start(config).await.unwrap();
+    let client = Client::new(daemon.socket());
+    let problem = refused(&client, "POST", path::SCANS, None).await;
+    assert_eq!(
+        (problem.status, problem.kind.as_str()),
+        (503, "no-such-usb-device")
+    );
+    assert!(
+        problem
+            .detail
+            .contains("no scanner ffff:ffff, serial 7 on USB"),
+        "{}",
+        problem.detail
+    );
+    let status: Status = client.get(path::STATUS).await;
+    assert_eq!(status.scanner.endpoint, "USB ffff:ffff, serial 7");
+    daemon.shutdown().await;
+}

@@ -14,6 +14,12 @@ use crate::memory::MemoryConnector;
 /// Longest wait for anything: the machine is emulated, and may have little of its host.
 pub(crate) const LIMIT: Duration = Duration::from_secs(30);
 
+/// Columns in flight.
+const CREDITS: u16 = 16;
+
+/// Columns that are taken before the plug is pulled: with those in flight, not all.
+const COLUMNS_BEFORE_CUT: usize = 10;
+
 /// Small enough for an emulated machine to trace in a second.
 pub(crate) const COLUMNS: u32 = 40;
 pub(crate) const SAMPLES: u32 = 96;
@@ -38,12 +44,13 @@ pub(crate) fn usb() -> UsbSettings {
     }
 }
 
-/// As patient as an emulated machine needs.
+/// As patient as an emulated machine needs, and with credit for a part of the scan only.
 pub(crate) fn link() -> LinkSettings {
     LinkSettings {
         request_timeout: Duration::from_secs(1),
         dead_man: Duration::from_secs(10),
         silence: Duration::from_secs(12),
+        credits: CREDITS,
         ..LinkSettings::default()
     }
 }
@@ -132,7 +139,7 @@ pub(crate) fn scan_is_cut(
             Ok(Some(column)) => {
                 ensure!(Some(&column) == reference.get(columns), "column {columns}");
                 columns += 1;
-                if columns < 10 {
+                if columns < COLUMNS_BEFORE_CUT {
                     acknowledger.acknowledge(column.index);
                 } else if let Some(unplug) = unplug.take() {
                     // Without credit for the rest, the scan cannot end before the plug is out.

@@ -73,6 +73,14 @@ fn pipes(device: &UsbDevice, interface: &Interface) -> Result<Pipes, ScannerErro
 }
 
 fn not_ours(device: &UsbDevice) -> ScannerError {
+    // So it is while a device comes and goes, or when the kernel may not set it up.
+    if device.interfaces.is_empty() {
+        return ScannerError::NotOnUsb {
+            wanted: device.to_string(),
+            present: "the device, but not set up by the kernel (if that lasts, dmesg tells why)"
+                .to_owned(),
+        };
+    }
     let classes: Vec<String> = device
         .interfaces
         .iter()
@@ -80,14 +88,10 @@ fn not_ours(device: &UsbDevice) -> ScannerError {
         .collect();
     ScannerError::NotAScannerOnUsb {
         device: device.to_string(),
-        why: if classes.is_empty() {
-            "it has no interface in its present configuration".to_owned()
-        } else {
-            format!(
-                "it has no interface of class {INTERFACE}, but {}",
-                classes.join(", ")
-            )
-        },
+        why: format!(
+            "it has no interface of class {INTERFACE}, but {}",
+            classes.join(", ")
+        ),
     }
 }
 
@@ -107,9 +111,10 @@ fn refused(device: &UsbDevice, error: &nusb::Error) -> ScannerError {
             node: device.node.display().to_string(),
             group: device.group(),
         },
-        ErrorKind::Disconnected => ScannerError::NotOnUsb {
+        // Its file is made a moment after it is listed, and goes with the plug.
+        ErrorKind::Disconnected | ErrorKind::NotFound => ScannerError::NotOnUsb {
             wanted: device.to_string(),
-            present: "it was unplugged at this moment".to_owned(),
+            present: "the device, plugged in or out at this moment".to_owned(),
         },
         ErrorKind::Busy => ScannerError::UsbBusy {
             device: device.to_string(),
