@@ -67,6 +67,7 @@ fn a_pulled_cable_stops_laser_and_table_at_once() {
     host.link.device().lose_line(now);
     let snapshot = host.link.device().snapshot(now);
     assert!(!snapshot.laser_on && snapshot.homed);
+    host.link.pass(Duration::ZERO);
     let told: Vec<_> = host.told().into_iter().map(|(_, m)| m).collect();
     let end = end(&told).expect("the scan has ended");
     assert_eq!(end.reason, ScanEndReason::DeadMan);

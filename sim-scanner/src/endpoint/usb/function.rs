@@ -271,6 +271,7 @@ mod tests {
     use super::super::wire::Inbox;
     use super::super::wire::tests::{submit, unlink};
     use super::*;
+    use crate::random::{Draws, Purpose};
 
     fn function(personality: Personality) -> Function {
         Function::new(Descriptors::new(personality, "Scanner", "SN"))
@@ -425,6 +426,58 @@ mod tests {
         let notification = submit(102, NOTIFY_IN & 0x0f, true, 16, [0; 8], &[]);
         assert_eq!(ask(&mut function, &notification), []);
         assert_eq!(ask(&mut function, &unlink(3, 102)), [(3, -104, vec![])]);
+    }
+
+    #[test]
+    fn whatever_comes_is_refused_or_answered_with_no_more_than_there_is() {
+        /// The longest descriptor.
+        const CONTROL_BYTES: usize = 255;
+        let mut draws = Draws::keyed(11, Purpose::Line, &[]);
+        let mut refused = 0;
+        for round in 0..300 {
+            let mut function = function(match round % 2 {
+                0 => Personality::Vendor,
+                _ => Personality::CdcAcm,
+            });
+            let mut inbox = Inbox::default();
+            let (mut allowed, mut answered) = (0, 0);
+            for _ in 0..40 {
+                let bits = draws.bits();
+                let words = draws.bits().to_le_bytes();
+                let (incoming, length) = (bits & 1 != 0, (bits >> 8) as u32 % 70);
+                let mut bytes = submit(
+                    (bits >> 16) as u32 % 50,
+                    (bits >> 1) as u8 % 4,
+                    incoming,
+                    length,
+                    // Small numbers are the ones that mean something.
+                    words.map(|byte| if byte & 0x10 == 0 { byte & 0x83 } else { byte }),
+                    &vec![0; if incoming { 0 } else { length as usize }],
+                );
+                if bits & 0xf000_0000 == 0 {
+                    let at = (bits >> 32) as usize % bytes.len();
+                    bytes[at] ^= (bits >> 40) as u8;
+                }
+                inbox.push(&bytes);
+                function.speak(&words);
+                allowed += words.len();
+                let command = inbox.command();
+                let outcome = command.and_then(|command| match command {
+                    Some(command) => {
+                        allowed += 48 + CONTROL_BYTES;
+                        function.command(command)
+                    }
+                    None => Ok(()),
+                });
+                answered += function.take_answers().len();
+                assert!(answered <= allowed, "{answered} bytes, {allowed} allowed");
+                if outcome.is_err() {
+                    refused += 1;
+                    break;
+                }
+            }
+        }
+        assert!((10..290).contains(&refused), "{refused}");
     }
 
     #[test]
