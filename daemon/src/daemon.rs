@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use axum::Router;
-use scanner_driver::{LinkSettings, Scanner, ScannerError, SerialScanner, SerialSettings};
+use scanner_driver::{Scanner, ScannerError, SerialScanner, UsbScanner};
 use tokio_util::sync::CancellationToken;
 
 use crate::acquisition::watch;
@@ -273,27 +273,8 @@ fn remove_grids(scans_dir: &Path) {
 }
 
 fn open_scanner(config: &ScannerConfig) -> Result<Arc<dyn Scanner>, StartError> {
-    let Transport::Serial = config.transport;
-    let mut link = LinkSettings::default();
-    let ms = |ms: Option<u32>, default: Duration| {
-        ms.map_or(default, |ms| Duration::from_millis(ms.into()))
-    };
-    link.request_timeout = ms(config.request_timeout_ms, link.request_timeout);
-    link.request_attempts = config.request_attempts.unwrap_or(link.request_attempts);
-    link.motion_timeout = ms(config.motion_timeout_ms, link.motion_timeout);
-    link.column_timeout = ms(config.column_timeout_ms, link.column_timeout);
-    link.dead_man = ms(config.dead_man_ms, link.dead_man);
-    // What follows from these, unless the user likes to count: several heartbeats fit into
-    // the dead-man time, and silence is longer than all attempts at one request.
-    link.heartbeat_interval = link.heartbeat_interval.min(link.dead_man / 4);
-    link.silence = link
-        .silence
-        .max(link.request_timeout * link.request_attempts * 2);
-    if let Some(credits) = config.credits {
-        link.credits = u16::try_from(credits).unwrap_or(u16::MAX);
-    }
-    let mut settings = SerialSettings::new(config.port.display().to_string());
-    settings.baud_rate = config.baud;
-    settings.link = link;
-    Ok(Arc::new(SerialScanner::open(settings)?))
+    Ok(match config.transport {
+        Transport::Serial => Arc::new(SerialScanner::open(config.serial())?),
+        Transport::Usb => Arc::new(UsbScanner::open(config.usb())?),
+    })
 }

@@ -57,7 +57,7 @@ impl Service {
         spool: Spool,
         scans_dir: PathBuf,
     ) -> Self {
-        let endpoint = config.scanner.port.display().to_string();
+        let endpoint = config.scanner.place();
         Self {
             scanner,
             store,

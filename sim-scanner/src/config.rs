@@ -10,6 +10,7 @@ use thiserror::Error;
 
 use crate::device::DeviceSettings;
 use crate::endpoint::pty::{self, PtyError, PtyServer};
+use crate::endpoint::usb::{self, Attachment, Personality, UsbError, UsbServer};
 use crate::line::LineFaults;
 use crate::preset::{self, Overrides, Preset, SetupError};
 use crate::replay::{Replay, ReplayError};
@@ -126,6 +127,9 @@ pub enum SimError {
     /// No pseudo-terminal.
     #[error(transparent)]
     Pty(#[from] PtyError),
+    /// No USB device.
+    #[error(transparent)]
+    Usb(#[from] UsbError),
 }
 
 impl SimConfig {
@@ -192,6 +196,27 @@ impl SimConfig {
     pub fn serve_with(&self, source: Source, link: Option<&Path>) -> Result<PtyServer, SimError> {
         let device = self.device.clone();
         Ok(pty::serve(source, device, self.seed, &self.line, link)?)
+    }
+
+    /// Offers a device with a source made before on USB, until the result is dropped.
+    ///
+    /// # Errors
+    /// [`SimError::Usb`] when it cannot be offered there.
+    pub fn serve_usb(
+        &self,
+        source: Source,
+        personality: Personality,
+        attachment: Attachment,
+    ) -> Result<UsbServer, SimError> {
+        let device = self.device.clone();
+        Ok(usb::serve(
+            source,
+            device,
+            self.seed,
+            &self.line,
+            personality,
+            attachment,
+        )?)
     }
 }
 

@@ -8,7 +8,7 @@ use std::os::unix::net::UnixStream;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use scanner_protocol::{Faults, ResetCause};
+use scanner_protocol::{Activity, Faults, ResetCause};
 use thiserror::Error;
 
 use crate::device::{Device, Event, Snapshot};
@@ -30,7 +30,45 @@ pub(crate) struct Running {
     pub(crate) stalled: bool,
     /// Whether a host has the port open; unknown for endpoints without one.
     pub(crate) host_connected: Option<bool>,
+    /// The plug is out; for endpoints that have one.
+    pub(crate) unplugged: bool,
+    /// The endpoint to the host is to be halted once; for endpoints on USB.
+    pub(crate) halt_endpoint: bool,
     pub(crate) ended: bool,
+    line: LineUse,
+    /// Since when the device waits for the host.
+    waiting_since: Option<Duration>,
+}
+
+/// What has gone over the line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LineUse {
+    /// Bytes sent to the host.
+    pub to_host_bytes: u64,
+    /// Bytes received from the host.
+    pub from_host_bytes: u64,
+    /// How long the device could not go on since the host did not fetch what was sent, or
+    /// had given no credit for more columns.
+    pub waited_for_host: Duration,
+}
+
+impl Running {
+    pub(crate) fn note_to_host(&mut self, bytes: usize) {
+        self.line.to_host_bytes += bytes as u64;
+    }
+
+    pub(crate) fn note_from_host(&mut self, bytes: usize) {
+        self.line.from_host_bytes += bytes as u64;
+    }
+
+    /// Keeps the account of waiting; `unfetched` says that the line holds bytes for the host.
+    pub(crate) fn note_line(&mut self, now: Duration, unfetched: bool) {
+        if let Some(since) = self.waiting_since.take() {
+            self.line.waited_for_host += now.saturating_sub(since);
+        }
+        let starved = self.device.snapshot(now).activity == Activity::Waiting;
+        self.waiting_since = (unfetched || starved).then_some(now);
+    }
 }
 
 impl Shared {
@@ -40,7 +78,11 @@ impl Shared {
                 device,
                 stalled: false,
                 host_connected: None,
+                unplugged: false,
+                halt_endpoint: false,
                 ended: false,
+                line: LineUse::default(),
+                waiting_since: None,
             }),
             changed: Condvar::new(),
             waker,
@@ -153,6 +195,32 @@ impl Control {
         self.act(|running, now| running.device.press_stop(now));
     }
 
+    /// Pulls the plug, with whatever is under way; for endpoints on USB.
+    pub fn unplug(&self) {
+        self.act(|running, _| running.unplugged = true);
+    }
+
+    /// Puts the plug back. On the network a host must attach the device anew.
+    pub fn replug(&self) {
+        self.act(|running, _| running.unplugged = false);
+    }
+
+    /// Halts the endpoint to the host once, as firmware in trouble does; for endpoints on USB.
+    pub fn halt_endpoint(&self) {
+        self.act(|running, _| running.halt_endpoint = true);
+    }
+
+    /// What has gone over the line so far, and how long the device waited for the host.
+    #[must_use]
+    pub fn line_use(&self) -> LineUse {
+        let running = self.shared.lock();
+        let mut line = running.line;
+        if let Some(since) = running.waiting_since {
+            line.waited_for_host += self.shared.now().saturating_sub(since);
+        }
+        line
+    }
+
     /// How the device is.
     #[must_use]
     pub fn snapshot(&self) -> Snapshot {
@@ -204,6 +272,16 @@ impl Control {
     ) -> Result<Snapshot, WaitError> {
         self.wait(limit, |running, now| {
             Some(running.device.snapshot(now)).filter(&wanted)
+        })
+    }
+
+    /// Waits until a host has the device, or has it no more.
+    ///
+    /// # Errors
+    /// [`WaitError`] when that has not come about within the limit.
+    pub fn wait_for_host(&self, limit: Duration, connected: bool) -> Result<(), WaitError> {
+        self.wait(limit, |running, _| {
+            (running.host_connected == Some(connected)).then_some(())
         })
     }
 

@@ -1,29 +1,40 @@
-//! The simulated scanner as a program: makes a pseudo-terminal and serves until ended.
+//! The simulated scanner as a program: offers itself on a pseudo-terminal or on USB, and serves
+//! until ended.
 
 use std::io::Write;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGUSR2};
 use signal_hook::iterator::Signals;
 
-use sim_scanner::config::{Object, SimConfig};
+use sim_scanner::config::{Object, SimConfig, SimError};
+use sim_scanner::control::Control;
 use sim_scanner::device::DeviceSettings;
+use sim_scanner::endpoint::pty::PtyServer;
+use sim_scanner::endpoint::usb::{Attachment, Personality, UsbServer};
 use sim_scanner::line::LineFaults;
 use sim_scanner::preset::{Overrides, Preset};
 use sim_scanner::source::Source;
 
-/// A simulated slide-table laser scanner on a pseudo-terminal.
+/// A simulated slide-table laser scanner on a pseudo-terminal or on USB.
 ///
-/// Makes a pseudo-terminal, links it at LINK, and behaves on it like a scanner on a serial
-/// port until it is ended (Ctrl-C, or the TERM signal), when it removes the link.
+/// With --pty it makes a pseudo-terminal, links it at LINK, and behaves on it like a scanner
+/// on a serial port. With --usbip it is a USB device that hosts attach over the network
+/// (`usbip attach -r HOST -b 1-1`), with --usb one of this machine. The signal USR1 pulls
+/// the plug of a USB device, USR2 puts it back. It serves until it is ended (Ctrl-C, or the
+/// TERM signal), when the link or device goes.
 #[derive(Debug, Parser)]
 #[command(name = "sim-scanner", version)]
 struct Cli {
-    /// Where to link the pseudo-terminal; a link that is there is replaced
-    #[arg(long, value_name = "LINK")]
-    pty: PathBuf,
+    #[command(flatten)]
+    place: Place,
+
+    /// How it shows itself on USB
+    #[arg(long, value_enum, default_value = "vendor", conflicts_with = "pty")]
+    usb_class: UsbClass,
 
     /// What stands on the table: house, cylinder, figure, groove; house-on-table,
     /// cylinder-on-table, house-before-plane, which have a background; or an STL file in mm,
@@ -130,6 +141,32 @@ struct Cli {
     faults: LineFaults,
 }
 
+/// Where the scanner is offered: exactly one.
+#[derive(Debug, Clone, clap::Args)]
+#[group(required = true, multiple = false)]
+struct Place {
+    /// Where to link a pseudo-terminal; a link that is there is replaced
+    #[arg(long, value_name = "LINK")]
+    pty: Option<PathBuf>,
+
+    /// Address at which to offer a USB device to USB/IP hosts, such as 127.0.0.1:3240; nobody
+    /// is asked for a password
+    #[arg(long, value_name = "ADDR")]
+    usbip: Option<SocketAddr>,
+
+    /// Plug a USB device into this machine; needs root and the kernel's module vhci-hcd
+    #[arg(long)]
+    usb: bool,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum UsbClass {
+    /// An interface of its own, with bulk endpoints
+    Vendor,
+    /// A serial port
+    CdcAcm,
+}
+
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum PresetName {
     /// 240 columns by 256 samples, 0.1 mm counts, from 750 mm
@@ -204,23 +241,86 @@ macro_rules! say {
     };
 }
 
+/// What serves, until it is dropped.
+enum Server {
+    Pty(PtyServer),
+    Usb(UsbServer),
+}
+
+impl Server {
+    fn control(&self) -> Control {
+        match self {
+            Self::Pty(server) => server.control(),
+            Self::Usb(server) => server.control(),
+        }
+    }
+}
+
+fn serve(
+    place: &Place,
+    class: UsbClass,
+    config: &SimConfig,
+    source: Source,
+) -> Result<Server, SimError> {
+    let personality = match class {
+        UsbClass::Vendor => Personality::Vendor,
+        UsbClass::CdcAcm => Personality::CdcAcm,
+    };
+    let usb = |attachment| {
+        config
+            .serve_usb(source.clone(), personality, attachment)
+            .map(Server::Usb)
+    };
+    match (&place.pty, place.usbip) {
+        (Some(link), _) => config.serve_with(source, Some(link)).map(Server::Pty),
+        (None, Some(address)) => usb(Attachment::Network(address)),
+        (None, None) => usb(Attachment::ThisMachine),
+    }
+}
+
 fn run(cli: Cli) -> Result<(), String> {
     // Before the link is made, so that a signal never leaves it behind.
-    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])
+    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP, SIGUSR1, SIGUSR2])
         .map_err(|error| format!("cannot wait for signals: {error}"))?;
-    let link = cli.pty.clone();
+    let (place, class) = (cli.place.clone(), cli.usb_class);
     let config = cli.config();
     let source = config.source().map_err(|error| error.to_string())?;
-    let server = config
-        .serve_with(source.clone(), Some(&link))
-        .map_err(|error| error.to_string())?;
+    let server =
+        serve(&place, class, &config, source.clone()).map_err(|error| error.to_string())?;
     describe(&config, &source);
-    say!("port    {} -> {}", link.display(), server.port().display());
+    describe_place(&place, &server);
     say!("serving until ended (Ctrl-C)");
-    signals.forever().next();
+    for signal in signals.forever() {
+        match signal {
+            SIGUSR1 => server.control().unplug(),
+            SIGUSR2 => server.control().replug(),
+            _ => break,
+        }
+    }
     drop(server);
     say!("ended");
     Ok(())
+}
+
+fn describe_place(place: &Place, server: &Server) {
+    match server {
+        Server::Pty(server) => {
+            let link = place.pty.as_deref().unwrap_or(server.port());
+            say!("port    {} -> {}", link.display(), server.port().display());
+        }
+        Server::Usb(server) => match server.address() {
+            Some(address) => {
+                say!(
+                    "usb     usbip attach -r {} -b 1-1 (port {})",
+                    address.ip(),
+                    address.port()
+                );
+            }
+            None => {
+                say!("usb     plugged into this machine");
+            }
+        },
+    }
 }
 
 fn describe(config: &SimConfig, source: &Source) {
@@ -310,9 +410,24 @@ mod tests {
     }
 
     #[test]
+    fn a_usb_device_is_offered_on_the_network_or_to_this_machine() {
+        let cli = |words: &[&str]| {
+            Cli::try_parse_from(["sim-scanner"].iter().chain(words)).expect("as in the contract")
+        };
+        let network = cli(&["--usbip", "127.0.0.1:3240", "--usb-class", "cdc-acm"]);
+        assert_eq!(network.place.usbip, "127.0.0.1:3240".parse().ok());
+        assert!(matches!(network.usb_class, UsbClass::CdcAcm));
+        let here = cli(&["--usb"]);
+        assert!(here.place.usb && matches!(here.usb_class, UsbClass::Vendor));
+    }
+
+    #[test]
     fn wrong_usage_is_refused() {
         for wrong in [
             &["sim-scanner"][..],
+            &["sim-scanner", "--pty", "l", "--usb"],
+            &["sim-scanner", "--pty", "l", "--usb-class", "cdc-acm"],
+            &["sim-scanner", "--usbip", "3240"],
             &["sim-scanner", "--pty", "l", "--line-rate", "fast"],
             &["sim-scanner", "--pty", "l", "--faults", "flip"],
             &[

@@ -5,6 +5,7 @@ mod reproduce;
 mod rules;
 mod shell;
 mod study;
+mod vm;
 
 use clap::{Parser, Subcommand};
 
@@ -32,7 +33,11 @@ enum Chore {
     /// Measure one part of the product at length.
     #[command(subcommand)]
     Study(study::Study),
-    /// Everything: tests, lints, rules, studies, judges with all seeds, FreeCAD.
+    /// Check in a virtual machine what needs a kernel of its own.
+    #[command(subcommand)]
+    Vm(vm::Vm),
+    /// Everything: tests, lints, rules, studies, judges with all seeds, FreeCAD, the virtual
+    /// machine.
     Full,
 }
 
@@ -42,6 +47,7 @@ fn main() -> anyhow::Result<()> {
         Chore::Judge(options) => judge::run(&options),
         Chore::Reproduce(options) => reproduce::run(&options),
         Chore::Study(study) => study::run(&study),
+        Chore::Vm(vm) => vm::run(&vm),
         Chore::Full => full(),
     }
 }
@@ -66,6 +72,7 @@ fn full() -> anyhow::Result<()> {
         freecad: true,
         out: None,
     })?;
+    vm::run(&vm::Vm::Usb(vm::Options::default()))?;
     study::run(&study::Study::Mutations {
         options: Vec::new(),
     })?;

@@ -36,6 +36,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("reliefd", &DAEMON),
     ("relief", &COMMAND_LINE),
     ("relief-tests", &EVERYTHING),
+    (
+        "relief-vm-usb",
+        &["scanner-driver", "scanner-protocol", "sim-scanner"],
+    ),
     ("xtask", &[]),
 ];
 

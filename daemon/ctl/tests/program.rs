@@ -315,6 +315,34 @@ fn the_doctor_names_every_trouble_and_its_remedy() {
 }
 
 #[test]
+fn the_doctor_looks_for_a_scanner_on_usb() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    // Numbers that no maker has.
+    let config = "[scanner]\ntransport = \"usb\"\nvendor_id = 0xffff\nproduct_id = 0xffff\n";
+    fs::write(at.join("reliefd.toml"), config).unwrap();
+    let arguments = [
+        "doctor",
+        "--config",
+        "reliefd.toml",
+        "--socket",
+        "none.sock",
+    ];
+    let output = relief(at, &arguments);
+    assert_eq!(output.status.code(), Some(1));
+    let told = String::from_utf8_lossy(&output.stdout).into_owned();
+    for line in [
+        concat!("ok        version: ", env!("CARGO_PKG_VERSION")),
+        "TROUBLE   scanner on USB: there is no ffff:ffff\n          -> ",
+        "doubtful  udev rules: ",
+        "ok        serial ports: ",
+        "ok        USB scanners: ",
+    ] {
+        assert!(told.contains(line), "no `{line}` in:\n{told}");
+    }
+}
+
+#[test]
 fn help_is_there_for_every_command() {
     let directory = tempfile::tempdir().unwrap();
     let help = relief(directory.path(), &["--help"]);

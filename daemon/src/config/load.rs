@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Config;
+use super::{Config, Transport};
 
 /// The configuration cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -75,16 +75,40 @@ impl Config {
                 message,
             }
         })?;
-        config
-            .processing()
-            .check()
-            .map_err(|(section, message)| ConfigError::Inconsistent {
-                path: path.to_owned(),
-                section,
-                message,
-            })?;
+        let inconsistent = |(section, message)| ConfigError::Inconsistent {
+            path: path.to_owned(),
+            section,
+            message,
+        };
+        other_transport(text, config.scanner.transport).map_err(inconsistent)?;
+        config.processing().check().map_err(inconsistent)?;
         Ok(config)
     }
+}
+
+/// Refuses keys that belong to the other way of attaching a scanner: they would do nothing.
+fn other_transport(text: &str, transport: Transport) -> Result<(), (&'static str, String)> {
+    const SERIAL: [&str; 2] = ["port", "baud"];
+    const USB: [&str; 3] = ["vendor_id", "product_id", "serial_number"];
+    let (of_the_other, other, own): (&[&str], _, _) = match transport {
+        Transport::Serial => (&USB, "usb", "serial"),
+        Transport::Usb => (&SERIAL, "serial", "usb"),
+    };
+    let given: Option<toml::Table> = toml::from_str(text).ok();
+    let section = given
+        .as_ref()
+        .and_then(|all| all.get("scanner")?.as_table());
+    let Some(key) = section.and_then(|s| of_the_other.iter().find(|key| s.contains_key(**key)))
+    else {
+        return Ok(());
+    };
+    Err((
+        "scanner",
+        format!(
+            "`{key}` is for transport = \"{other}\", but the transport is \"{own}\": \
+             remove it, or change the transport"
+        ),
+    ))
 }
 
 /// The section that a place in the file belongs to; `None` on a section's own line.

@@ -13,6 +13,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use relief_api::PlanRequest;
+use scanner_driver::{LinkSettings, SerialSettings, UsbSettings};
+use scanner_protocol::usb;
 use serde::{Deserialize, Serialize};
 
 pub use load::ConfigError;
@@ -82,9 +84,16 @@ pub struct ScannerConfig {
     pub transport: Transport,
     /// Device file of the serial port.
     pub port: PathBuf,
-    /// Bits per second.
+    /// Bits per second of the serial port.
     #[serde(deserialize_with = "value::baud")]
     pub baud: u32,
+    /// Vendor number on USB.
+    pub vendor_id: u16,
+    /// Product number on USB.
+    pub product_id: u16,
+    /// Serial number on USB; without one, the only scanner of those numbers.
+    #[serde(deserialize_with = "value::serial_number")]
+    pub serial_number: Option<String>,
     /// How long a reply to one request may take.
     #[serde(deserialize_with = "value::milliseconds")]
     pub request_timeout_ms: Option<u32>,
@@ -111,6 +120,8 @@ pub struct ScannerConfig {
 pub enum Transport {
     /// A serial port, or what looks like one.
     Serial,
+    /// A scanner's own interface on USB.
+    Usb,
 }
 
 impl Default for ScannerConfig {
@@ -119,6 +130,9 @@ impl Default for ScannerConfig {
             transport: Transport::Serial,
             port: "/dev/ttyUSB0".into(),
             baud: 921_600,
+            vendor_id: usb::VENDOR_ID,
+            product_id: usb::PRODUCT_ID_VENDOR,
+            serial_number: None,
             request_timeout_ms: None,
             request_attempts: None,
             motion_timeout_ms: None,
@@ -126,6 +140,59 @@ impl Default for ScannerConfig {
             dead_man_ms: None,
             credits: None,
         }
+    }
+}
+
+impl ScannerConfig {
+    /// Where the scanner is, for people.
+    #[must_use]
+    pub fn place(&self) -> String {
+        match self.transport {
+            Transport::Serial => self.port.display().to_string(),
+            Transport::Usb => format!("USB {}", self.usb().place()),
+        }
+    }
+
+    /// What the driver of serial ports is told.
+    #[must_use]
+    pub fn serial(&self) -> SerialSettings {
+        let mut settings = SerialSettings::new(self.port.display().to_string());
+        settings.baud_rate = self.baud;
+        settings.link = self.link();
+        settings
+    }
+
+    /// What the driver of USB devices is told.
+    #[must_use]
+    pub fn usb(&self) -> UsbSettings {
+        UsbSettings {
+            vendor_id: self.vendor_id,
+            product_id: self.product_id,
+            serial: self.serial_number.clone(),
+            link: self.link(),
+        }
+    }
+
+    fn link(&self) -> LinkSettings {
+        let mut link = LinkSettings::default();
+        let ms = |ms: Option<u32>, default: Duration| {
+            ms.map_or(default, |ms| Duration::from_millis(ms.into()))
+        };
+        link.request_timeout = ms(self.request_timeout_ms, link.request_timeout);
+        link.request_attempts = self.request_attempts.unwrap_or(link.request_attempts);
+        link.motion_timeout = ms(self.motion_timeout_ms, link.motion_timeout);
+        link.column_timeout = ms(self.column_timeout_ms, link.column_timeout);
+        link.dead_man = ms(self.dead_man_ms, link.dead_man);
+        // What follows from these, unless the user likes to count: several heartbeats fit into
+        // the dead-man time, and silence is longer than all attempts at one request.
+        link.heartbeat_interval = link.heartbeat_interval.min(link.dead_man / 4);
+        link.silence = link
+            .silence
+            .max(link.request_timeout * link.request_attempts * 2);
+        if let Some(credits) = self.credits {
+            link.credits = u16::try_from(credits).unwrap_or(u16::MAX);
+        }
+        link
     }
 }
 

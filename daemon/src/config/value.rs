@@ -26,6 +26,19 @@ pub(super) fn baud<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D:
     bounded(deserializer, 1_200, 12_000_000, " bits per second")
 }
 
+/// A serial number as USB devices have them; an empty one would mean any device, by mistake.
+pub(super) fn serial_number<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<String>, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    if text.trim().is_empty() {
+        return Err(D::Error::custom(
+            "the serial number is empty: leave the key out to take any scanner",
+        ));
+    }
+    Ok(Some(text))
+}
+
 pub(super) fn milliseconds<'de, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Option<u32>, D::Error> {

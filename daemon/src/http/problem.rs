@@ -129,7 +129,29 @@ fn scanner_problem(error: &ScannerError) -> (StatusCode, &'static str, Option<&'
             "port-busy",
             Some("end the other program, or set scanner.port to another port"),
         ),
-        ScannerError::Permission { .. } => (S::SERVICE_UNAVAILABLE, "no-permission", None),
+        ScannerError::NotOnUsb { .. } => (
+            S::SERVICE_UNAVAILABLE,
+            "no-such-usb-device",
+            Some("set scanner.vendor_id, product_id and serial_number to those of the scanner"),
+        ),
+        ScannerError::ManyOnUsb { .. } => (
+            S::SERVICE_UNAVAILABLE,
+            "several-usb-devices",
+            Some("set scanner.serial_number to that of the scanner that is meant"),
+        ),
+        ScannerError::UsbBusy { .. } => (
+            S::SERVICE_UNAVAILABLE,
+            "usb-device-busy",
+            Some("end the other program, or keep the driver from the scanner by a udev rule"),
+        ),
+        ScannerError::NotAScannerOnUsb { .. } => (
+            S::BAD_GATEWAY,
+            "wrong-device",
+            Some("set scanner.vendor_id and product_id to those of the scanner"),
+        ),
+        ScannerError::Permission { .. } | ScannerError::UsbPermission { .. } => {
+            (S::SERVICE_UNAVAILABLE, "no-permission", None)
+        }
         ScannerError::NotAPort { .. } | ScannerError::Port { .. } => (
             S::SERVICE_UNAVAILABLE,
             "port-unusable",

@@ -30,6 +30,27 @@ fn faults_are_told_with_their_line_and_a_way_out() {
             "relief.toml, line 2, column 13: unknown value `seriel`; did you mean `serial`?",
         ),
         (
+            "[scanner]\ntransport = \"usb\"\nport = \"/dev/ttyUSB0\"\n",
+            "relief.toml, section [scanner]: `port` is for transport = \"serial\", but the \
+             transport is \"usb\": remove it, or change the transport",
+        ),
+        (
+            "[scanner]\nvendor_id = 0x1209\n",
+            "relief.toml, section [scanner]: `vendor_id` is for transport = \"usb\", but the \
+             transport is \"serial\": remove it, or change the transport",
+        ),
+        (
+            "[scanner]\ntransport = \"usb\"\nserial_number = \"\"\n",
+            "relief.toml, line 3, column 17: the serial number is empty: leave the key out to \
+             take any scanner",
+        ),
+        (
+            "[scanner]\ntransport = \"usb\"\nserial = \"1\"\n",
+            "relief.toml, line 3, column 1: in [scanner] unknown key `serial`; known are: \
+             transport, port, baud, vendor_id, product_id, serial_number, request_timeout_ms, \
+             request_attempts, motion_timeout_ms, column_timeout_ms, dead_man_ms, credits",
+        ),
+        (
             "[service]\nlisten = \"0.0.0.0:80\"\n",
             "relief.toml, line 2, column 10: 0.0.0.0:80 can be reached from other machines, and \
              the API asks for no password: use a loopback address such as \"127.0.0.1:80\"",
@@ -74,16 +95,9 @@ fn faults_are_told_with_their_line_and_a_way_out() {
     );
 }
 
-#[test]
-fn the_examples_are_sound_and_show_the_defaults() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
-    let serial = Config::load(&folder.join("serial.toml")).unwrap();
-    assert_eq!(serial, Config::default());
-    let simulator = Config::load(&folder.join("simulator.toml")).unwrap();
-    assert_eq!(simulator.scanner.port, Path::new("relief-demo/scanner"));
-
-    // With every key that is commented out put in force, nothing is refused.
-    let text = std::fs::read_to_string(folder.join("serial.toml")).unwrap();
+/// An example with every key that is commented out put in force: nothing is refused.
+fn in_force(path: &Path) -> Config {
+    let text = std::fs::read_to_string(path).unwrap();
     let all: String = text
         .lines()
         .map(|line| match line.strip_prefix("# ") {
@@ -93,7 +107,27 @@ fn the_examples_are_sound_and_show_the_defaults() {
         .flat_map(|line| [line, "\n"])
         .collect();
     assert_ne!(all, text);
-    let all = Config::parse(&all, Path::new("serial.toml")).unwrap();
+    Config::parse(&all, path).unwrap()
+}
+
+#[test]
+fn the_examples_are_sound_and_show_the_defaults() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
+    let serial = Config::load(&folder.join("serial.toml")).unwrap();
+    assert_eq!(serial, Config::default());
+    let simulator = Config::load(&folder.join("simulator.toml")).unwrap();
+    assert_eq!(simulator.scanner.port, Path::new("relief-demo/scanner"));
+
+    let usb = Config::load(&folder.join("usb.toml")).unwrap();
+    assert_eq!(usb.scanner.place(), "USB 1209:0001");
+    let named = in_force(&folder.join("usb.toml"));
+    assert_eq!(named.scanner.place(), "USB 1209:0001, serial 000123");
+    assert_eq!(
+        named.scanner.usb().link,
+        Config::default().scanner.usb().link
+    );
+
+    let all = in_force(&folder.join("serial.toml"));
     assert_eq!(all.regrid.neighbours, Some(49));
     assert_eq!(all.journal, Config::default().journal);
     assert_eq!(all.queue, Config::default().queue);

@@ -131,12 +131,13 @@ async fn one_scan_at_a_time() {
 async fn trouble_with_the_scanner_is_told_in_its_own_words() {
     let rig = Rig::new().await;
     let port = || "/dev/ttyUSB7".to_owned();
-    for (trouble, status, kind, text) in [
+    for (trouble, status, kind, text, key) in [
         (
             ScannerError::NoSuchPort { port: port() },
             503,
             "no-such-port",
             "there is no port /dev/ttyUSB7",
+            "scanner.port",
         ),
         (
             ScannerError::PortBusy {
@@ -146,6 +147,7 @@ async fn trouble_with_the_scanner_is_told_in_its_own_words() {
             503,
             "port-busy",
             "in use by minicom (4711)",
+            "scanner.port",
         ),
         (
             ScannerError::WrongDevice {
@@ -155,13 +157,54 @@ async fn trouble_with_the_scanner_is_told_in_its_own_words() {
             502,
             "wrong-device",
             "not as a scanner: $GPGGA",
+            "scanner.port",
+        ),
+        (
+            ScannerError::NotOnUsb {
+                wanted: "1209:0001".into(),
+                present: "no USB device at all".into(),
+            },
+            503,
+            "no-such-usb-device",
+            "There is: no USB device at all",
+            "scanner.vendor_id",
+        ),
+        (
+            ScannerError::ManyOnUsb {
+                wanted: "1209:0001".into(),
+                serials: "A, B".into(),
+            },
+            503,
+            "several-usb-devices",
+            "with the serial numbers A, B",
+            "scanner.serial_number",
+        ),
+        (
+            ScannerError::UsbBusy {
+                device: "1209:0001".into(),
+                holder: Some("the kernel's driver usbtest".into()),
+            },
+            503,
+            "usb-device-busy",
+            "in use by the kernel's driver usbtest",
+            "udev rule",
+        ),
+        (
+            ScannerError::NotAScannerOnUsb {
+                device: "1209:0001".into(),
+                why: "it has no interface of class ff/53/01, but 03/00/00".into(),
+            },
+            502,
+            "wrong-device",
+            "is no scanner of ours: it has no interface",
+            "scanner.vendor_id",
         ),
     ] {
         rig.scanner.fail_with(Some(trouble));
         let problem = refused(&rig.client, "POST", path::SCANS, None).await;
         assert_eq!((problem.status, problem.kind.as_str()), (status, kind));
         assert!(problem.detail.contains(text), "{}", problem.detail);
-        assert!(problem.hint.unwrap().contains("scanner.port"));
+        assert!(problem.hint.unwrap().contains(key));
         let status: Status = rig.client.get(path::STATUS).await;
         assert_eq!(status.scanner.link, ScannerLink::Trouble);
         assert!(status.scanner.problem.unwrap().contains(text));
@@ -250,4 +293,32 @@ async fn only_local_names_are_answered_on_loopback() {
     let reply = exchange(stream, host, "POST", path::ABORT, None).await;
     assert_eq!(reply.problem().kind, "not-local");
     rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_service_for_a_scanner_on_usb_waits_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut config = config(folder.path());
+    // Numbers that no maker has.
+    config.scanner.transport = reliefd::config::Transport::Usb;
+    config.scanner.vendor_id = 0xffff;
+    config.scanner.product_id = 0xffff;
+    config.scanner.serial_number = Some("7".into());
+    let daemon = Daemon::start(config).await.unwrap();
+    let client = Client::new(daemon.socket());
+    let problem = refused(&client, "POST", path::SCANS, None).await;
+    assert_eq!(
+        (problem.status, problem.kind.as_str()),
+        (503, "no-such-usb-device")
+    );
+    assert!(
+        problem
+            .detail
+            .contains("no scanner ffff:ffff, serial 7 on USB"),
+        "{}",
+        problem.detail
+    );
+    let status: Status = client.get(path::STATUS).await;
+    assert_eq!(status.scanner.endpoint, "USB ffff:ffff, serial 7");
+    daemon.shutdown().await;
 }

@@ -22,6 +22,7 @@
 
 pub mod commands;
 pub mod events;
+pub mod usb;
 
 mod decoder;
 mod faults;

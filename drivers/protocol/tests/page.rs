@@ -92,3 +92,21 @@ fn every_message_has_an_example_and_a_line_in_the_table() {
         assert!(page.contains(&row), "no line `{row}`");
     }
 }
+
+#[test]
+fn the_numbers_of_usb_are_those_of_the_code() {
+    use scanner_protocol::usb::{INTERFACE, PRODUCT_ID_CDC_ACM, PRODUCT_ID_VENDOR, VENDOR_ID};
+    let page = page();
+    for row in [
+        format!(
+            "| vendor and product number | 0x{VENDOR_ID:04x}:0x{PRODUCT_ID_VENDOR:04x} | \
+             0x{VENDOR_ID:04x}:0x{PRODUCT_ID_CDC_ACM:04x} |"
+        ),
+        format!(
+            "| interface class, subclass, protocol | 0x{:02x}, 0x{:02x}, 0x{:02x} |",
+            INTERFACE.class, INTERFACE.subclass, INTERFACE.protocol
+        ),
+    ] {
+        assert!(page.contains(&row), "no line `{row}`");
+    }
+}

@@ -16,6 +16,59 @@ pub enum ScannerError {
         /// The port's path.
         port: String,
     },
+    /// The scanner is not among the USB devices.
+    #[error(
+        "there is no scanner {wanted} on USB: is it plugged in and switched on? \
+         There is: {present}"
+    )]
+    NotOnUsb {
+        /// Numbers, and serial number if one is asked for.
+        wanted: String,
+        /// What is there instead.
+        present: String,
+    },
+    /// Several USB devices fit.
+    #[error(
+        "several scanners {wanted} are on USB, with the serial numbers {serials}: \
+         say which is meant by its serial number"
+    )]
+    ManyOnUsb {
+        /// Numbers asked for.
+        wanted: String,
+        /// The serial numbers that are there.
+        serials: String,
+    },
+    /// The USB device has the right numbers, but is no scanner.
+    #[error("the USB device {device} is no scanner of ours: {why}")]
+    NotAScannerOnUsb {
+        /// The device.
+        device: String,
+        /// What is missing.
+        why: String,
+    },
+    /// A driver or another program has the scanner's interface.
+    #[error("the USB scanner {device} is in use by {}", .holder.as_deref().unwrap_or("another program"))]
+    UsbBusy {
+        /// The device.
+        device: String,
+        /// The kernel's driver, or name and process id of the program, where it could be
+        /// found out.
+        holder: Option<String>,
+    },
+    /// The USB device may not be used.
+    #[error(
+        "no permission to use the USB scanner {device}: its file {node} belongs to the group \
+         `{group}`; install the udev rules for scanners, plug it in anew, and add the user of \
+         this program to the group that they name"
+    )]
+    UsbPermission {
+        /// The device.
+        device: String,
+        /// Its device file.
+        node: String,
+        /// The group that may use it, by name or number.
+        group: String,
+    },
     /// Another program has the port.
     #[error("the port {port} is in use by {}", .holder.as_deref().unwrap_or("another program"))]
     PortBusy {

@@ -1,7 +1,7 @@
 //! The driver of the slide-table scanner: session, retries, column stream, transports.
 //!
 //! [`Scanner`] is what the rest of the program sees. [`SerialScanner`] is a scanner on a
-//! serial line: a thread of its own owns the port, and [`session::Session`] decides what
+//! serial line, [`UsbScanner`] one with a USB interface of its own: a thread owns it, and [`session::Session`] decides what
 //! goes over it; the session knows neither ports nor clocks. [`LinkScanner`] does the same
 //! over any [`transport::Transport`].
 
@@ -15,12 +15,13 @@ mod scanner;
 mod settings;
 
 pub use error::ScannerError;
-pub use link::{LinkScanner, SerialScanner};
+pub use link::{LinkScanner, SerialScanner, UsbScanner};
 pub use scanner::{
     Acknowledger, DeviceStatus, LineCounts, RawColumn, RawSample, ScanInfo, ScanStream, Scanner,
     StreamControl, StreamItem,
 };
 pub use settings::LinkSettings;
 pub use transport::serial::SerialSettings;
+pub use transport::usb::UsbSettings;
 
 pub use scanner_protocol as protocol;

@@ -171,6 +171,15 @@ impl Device {
         self.advance(now);
     }
 
+    /// The line to the host is gone, and the device can tell: there is no need to wait for the
+    /// dead-man time.
+    pub fn lose_line(&mut self, now: Duration) {
+        self.advance(now);
+        if self.session.is_some() && self.at_work(now) {
+            self.stop_by_itself(now);
+        }
+    }
+
     /// When [`Device::guard`] has something to do.
     #[must_use]
     pub fn safety_wake(&self, now: Duration) -> Option<Duration> {
@@ -227,11 +236,7 @@ impl Device {
             && self.at_work(now)
             && now.saturating_sub(self.heard) >= dead_man
         {
-            self.log.push(Event::DeadMan);
-            self.faults = self.faults.union(Faults::DEAD_MAN);
-            self.log.push(Event::Faults(self.faults));
-            self.halt(ScanEndReason::DeadMan, now);
-            self.tell_status(now);
+            self.stop_by_itself(now);
         }
         if self.task != Task::None && !self.drive.moves(now) {
             if self.task == Task::Homing {
@@ -241,6 +246,15 @@ impl Device {
             self.task = Task::None;
             self.log.push(Event::Table { moving: false });
         }
+    }
+
+    /// What a silent host leads to.
+    fn stop_by_itself(&mut self, now: Duration) {
+        self.log.push(Event::DeadMan);
+        self.faults = self.faults.union(Faults::DEAD_MAN);
+        self.log.push(Event::Faults(self.faults));
+        self.halt(ScanEndReason::DeadMan, now);
+        self.tell_status(now);
     }
 
     /// Whether something moves or shines that a silent host must not leave behind.

@@ -2,3 +2,4 @@
 
 pub mod memory;
 pub mod pty;
+pub mod usb;

@@ -236,6 +236,7 @@ impl Worker {
                 Ok(0) | Err(_) => break,
                 Ok(count) => {
                     let bytes = buffer.get(..count).unwrap_or_default();
+                    running.note_from_host(count);
                     running.device.receive(&self.to_device.carry(bytes), now);
                 }
             }
@@ -244,6 +245,7 @@ impl Worker {
         let mut wake = None;
         if self.pending.is_empty() {
             let poll = running.device.poll(now);
+            running.note_to_host(poll.bytes.len());
             self.queue(&poll.bytes);
             wake = poll.wake;
         } else if let Some(due) = running.device.safety_wake(now) {
@@ -253,6 +255,8 @@ impl Worker {
             }
             wake = Some(due);
         }
+        // What has just been queued has not yet had its chance.
+        running.note_line(now, was_busy);
         drop(running);
         shared.notify();
         self.write_out();

@@ -1,7 +1,10 @@
 //! A scanner behind a transport: a thread that owns the transport, and its handle.
 
+mod attached;
 mod backoff;
 mod worker;
+
+pub use attached::{SerialScanner, UsbScanner};
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -14,7 +17,6 @@ use crate::scanner::{DeviceStatus, ScanInfo, ScanStream, Scanner, StreamControl,
 use crate::session::{Answer, Command};
 use crate::settings::LinkSettings;
 use crate::transport::Connector;
-use crate::transport::serial::{SerialConnector, SerialSettings};
 
 /// Calls that may wait for the device's thread. It takes them every few milliseconds.
 const WAITING_CALLS: usize = 64;
@@ -182,51 +184,6 @@ impl StreamControl for StreamEnd {
 
     fn close(&self) {
         let _ = self.calls.send(Call::CloseScan(self.number));
-    }
-}
-
-/// A scanner on a serial line.
-#[derive(Debug)]
-pub struct SerialScanner {
-    link: LinkScanner,
-}
-
-impl SerialScanner {
-    /// Starts to talk to the scanner on a port, which may appear later.
-    ///
-    /// # Errors
-    /// As [`LinkScanner::start`]; what is wrong with the port shows with the first call.
-    pub fn open(settings: SerialSettings) -> Result<Self, ScannerError> {
-        let connector = SerialConnector::new(&settings);
-        LinkScanner::start(connector, settings.link).map(|link| Self { link })
-    }
-
-    /// The link, for what only this kind of scanner can do.
-    #[must_use]
-    pub fn link(&self) -> &LinkScanner {
-        &self.link
-    }
-}
-
-impl Scanner for SerialScanner {
-    fn identify(&self) -> Result<Identity, ScannerError> {
-        self.link.identify()
-    }
-
-    fn home(&self) -> Result<(), ScannerError> {
-        self.link.home()
-    }
-
-    fn status(&self) -> Result<DeviceStatus, ScannerError> {
-        self.link.status()
-    }
-
-    fn start_scan(&self, plan: &ScanPlan) -> Result<ScanStream, ScannerError> {
-        self.link.start_scan(plan)
-    }
-
-    fn abort(&self) -> Result<(), ScannerError> {
-        self.link.abort()
     }
 }
 

@@ -34,6 +34,9 @@ const WRITE_SLICE: Duration = Duration::from_millis(20);
 /// time has done the same.
 const FAREWELL: Duration = Duration::from_secs(2);
 
+/// How often it is looked whether the device has come, while there is none.
+const ARRIVAL_LOOK: Duration = Duration::from_millis(200);
+
 type Reply = SyncSender<Result<Outcome, ScannerError>>;
 
 /// The device's thread.
@@ -121,13 +124,13 @@ impl Worker {
     fn take_calls(&mut self) -> bool {
         if self.line.is_none() {
             let pause = self.retry_at.saturating_sub(self.now());
-            match self.calls.recv_timeout(pause) {
+            match self.calls.recv_timeout(pause.min(ARRIVAL_LOOK)) {
                 Ok(call) => {
                     if !self.take_call(call) {
                         return false;
                     }
                 }
-                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Timeout) => self.look_for_arrival(),
                 Err(RecvTimeoutError::Disconnected) => return false,
             }
         }
@@ -192,6 +195,15 @@ impl Worker {
         self.stream
             .as_ref()
             .is_some_and(|stream| stream.number == number)
+    }
+
+    /// A device that has just been plugged in is tried at once, and then, since it may need a
+    /// moment, with the shortest pauses.
+    fn look_for_arrival(&mut self) {
+        if self.connector.appeared() {
+            self.backoff.reset();
+            self.retry_at = self.now();
+        }
     }
 
     /// Somebody waits: tries to connect now, unless it has only just been tried.

@@ -1,10 +1,11 @@
 //! The seam between the driver and the bytes' way to the device.
 //!
-//! [`serial`] is a serial port, [`memory`] a pair of pipes for tests. A USB transport will
-//! stand beside them as `usb`: it needs the two traits here and nothing else.
+//! [`serial`] is a serial port, [`usb`] a scanner's own interface on USB, [`memory`] a pair
+//! of pipes for tests.
 
 pub mod memory;
 pub mod serial;
+pub mod usb;
 
 mod holder;
 
@@ -39,6 +40,13 @@ pub trait Connector: Send {
     /// # Errors
     /// Why it cannot be opened now. It will be tried again later.
     fn connect(&mut self) -> Result<Box<dyn Transport>, ScannerError>;
+
+    /// Whether the device may have come since this or [`Connector::connect`] was last called,
+    /// so that there is no need to wait for the next attempt. Asked several times a second
+    /// while there is no connection.
+    fn appeared(&mut self) -> bool {
+        false
+    }
 }
 
 impl<F> Connector for (String, F)

@@ -44,6 +44,8 @@ impl SerialSettings {
 pub struct SerialConnector {
     path: String,
     baud_rate: u32,
+    /// Whether the path was there at the last look.
+    there: bool,
 }
 
 impl SerialConnector {
@@ -53,6 +55,7 @@ impl SerialConnector {
         Self {
             path: settings.path.clone(),
             baud_rate: settings.baud_rate,
+            there: false,
         }
     }
 
@@ -107,6 +110,7 @@ impl Connector for SerialConnector {
     }
 
     fn connect(&mut self) -> Result<Box<dyn Transport>, ScannerError> {
+        self.there = Path::new(&self.path).exists();
         let direct = self.prepare().map_err(|errno| self.refused(errno))?;
         let port = serialport::new(&self.path, self.baud_rate)
             .preserve_dtr_on_open()
@@ -123,6 +127,11 @@ impl Connector for SerialConnector {
         // late frames are told apart by their request ids.
         let _ = port.clear(ClearBuffer::All);
         Ok(Box::new(SerialTransport { port, direct }))
+    }
+
+    fn appeared(&mut self) -> bool {
+        let before = std::mem::replace(&mut self.there, Path::new(&self.path).exists());
+        self.there && !before
     }
 }
 
@@ -238,4 +247,10 @@ pub fn list_ports() -> Result<Vec<PortInfo>, ScannerError> {
 #[must_use]
 pub fn port_holder(path: &str) -> Option<String> {
     holder(Path::new(path))
+}
+
+/// The group that may use this port, by name or number.
+#[must_use]
+pub fn port_group(path: &str) -> String {
+    group_of(Path::new(path))
 }

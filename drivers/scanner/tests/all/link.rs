@@ -251,3 +251,53 @@ fn contradictory_settings_are_refused_at_once() {
         Err(ScannerError::Settings(_))
     ));
 }
+
+/// Knows that a device has come when the test says so.
+struct Watching<C> {
+    connector: C,
+    came: Arc<AtomicBool>,
+}
+
+impl<C: Connector> Connector for Watching<C> {
+    fn name(&self) -> String {
+        self.connector.name()
+    }
+
+    fn connect(&mut self) -> Result<Box<dyn Transport>, ScannerError> {
+        self.connector.connect()
+    }
+
+    fn appeared(&mut self) -> bool {
+        self.came.swap(false, Ordering::Relaxed)
+    }
+}
+
+#[test]
+fn a_device_that_comes_is_not_kept_waiting_for_the_next_attempt() {
+    const FOREVER: Duration = Duration::from_secs(1_000_000);
+    let (sockets, connector) = plug();
+    let came = Arc::new(AtomicBool::new(false));
+    let connector = Watching {
+        connector,
+        came: Arc::clone(&came),
+    };
+    let settings = LinkSettings {
+        reconnect_first: FOREVER,
+        reconnect_longest: FOREVER,
+        ..unhurried()
+    };
+    let scanner = LinkScanner::start(connector, settings).unwrap();
+    assert!(matches!(
+        scanner.identify(),
+        Err(ScannerError::NoSuchPort { .. })
+    ));
+    let device = Device {
+        dead_man_limit_ms: 60_000,
+        ..Device::new()
+    };
+    let (ours, theirs) = memory::pair();
+    let _running = Running::serve(Arc::new(Mutex::new(device)), theirs);
+    sockets.send(ours).unwrap();
+    came.store(true, Ordering::Relaxed);
+    assert!(scanner.identify().is_ok());
+}

@@ -12,3 +12,4 @@ mod link;
 mod opening;
 mod pty;
 mod scans;
+mod usb;

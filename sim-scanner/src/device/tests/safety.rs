@@ -56,6 +56,29 @@ fn a_moving_table_stops_when_the_host_falls_silent() {
 }
 
 #[test]
+fn a_pulled_cable_stops_laser_and_table_at_once() {
+    let mut host = Host::ready();
+    host.link.device().step_columns(Some(2));
+    host.scan(64);
+    host.link.device().step_columns(Some(1));
+    host.send(&Heartbeat {});
+    host.told();
+    let now = host.link.now();
+    host.link.device().lose_line(now);
+    let snapshot = host.link.device().snapshot(now);
+    assert!(!snapshot.laser_on && snapshot.homed);
+    host.link.pass(Duration::ZERO);
+    let told: Vec<_> = host.told().into_iter().map(|(_, m)| m).collect();
+    let end = end(&told).expect("the scan has ended");
+    assert_eq!(end.reason, ScanEndReason::DeadMan);
+    // At rest there is nothing to stop.
+    let mut idle = Host::ready();
+    let now = idle.link.now();
+    idle.link.device().lose_line(now);
+    assert!(!idle.link.device().events().contains(&Event::DeadMan));
+}
+
+#[test]
 fn an_idle_device_does_not_mind_silence() {
     let mut host = Host::ready();
     host.link.pass(3600 * SECOND);

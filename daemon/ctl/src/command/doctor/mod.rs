@@ -5,10 +5,13 @@ mod finding;
 mod machine;
 mod port;
 mod reach;
+mod rules;
+mod usb;
 
 use std::path::{Path, PathBuf};
 
 use reliefd::Config;
+use reliefd::config::{ScannerConfig, Transport};
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -18,9 +21,10 @@ use finding::{Finding, Grade};
 
 /// Look for the usual troubles and say how to mend each
 ///
-/// Checks the configuration, the scanner's port (there, permitted, not held by somebody
-/// else), programs that disturb serial ports, the folders and their disk, the clock, and
-/// whether the service answers. Changes nothing.
+/// Checks the configuration, the scanner's port or USB device (there, permitted, not held by
+/// somebody else), the udev rules, programs that disturb serial ports, the folders and their
+/// disk, the clock, and whether the service answers; lists the serial ports and USB scanners
+/// that are there. Changes nothing.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The service's configuration [default: /etc/relief/reliefd.toml]
@@ -33,15 +37,18 @@ pub(crate) struct Args {
 /// Where the package keeps the configuration.
 const PACKAGED: &str = "/etc/relief/reliefd.toml";
 
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Told {
+    version: &'static str,
     healthy: bool,
     findings: Vec<Finding>,
 }
 
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
-    let mut findings = Vec::new();
+    let mut findings = vec![Finding::good("version", VERSION)];
     let path = args.config.as_deref().unwrap_or(Path::new(PACKAGED));
     let config = match Config::load(path) {
         Ok(config) => {
@@ -68,7 +75,9 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
             Config::default()
         }
     };
-    findings.extend(port::check(&config.scanner.port));
+    findings.extend(scanner(&config.scanner));
+    findings.push(port::present());
+    findings.push(usb::present());
     findings.extend(machine::disturbers());
     findings.push(disk::check(
         "kept scans",
@@ -88,6 +97,7 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
         .filter(|finding| finding.grade == Grade::Bad)
         .count();
     let told = Told {
+        version: VERSION,
         healthy: bad == 0,
         findings,
     };
@@ -105,5 +115,23 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
             "{} found; each says how to mend it",
             counted(bad, "trouble")
         )))
+    }
+}
+
+/// The way to the scanner, by its kind.
+fn scanner(config: &ScannerConfig) -> Vec<Finding> {
+    match config.transport {
+        Transport::Serial => {
+            let mut findings = port::check(&config.port);
+            if let Some((vendor_id, product_id)) = port::usb_numbers(&config.port) {
+                findings.push(rules::check(vendor_id, product_id));
+            }
+            findings
+        }
+        Transport::Usb => {
+            let mut findings = usb::check(&config.usb());
+            findings.push(rules::check(config.vendor_id, config.product_id));
+            findings
+        }
     }
 }

@@ -5,6 +5,7 @@ use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::Path;
 
 use rustix::fs::{Access, access};
+use scanner_driver::transport::serial::{self, PortInfo};
 
 use super::finding::Finding;
 
@@ -32,14 +33,17 @@ pub(super) fn check(port: &Path) -> Vec<Finding> {
             CHECK,
             format!(
                 "{shown} may not be used by this user (group {}, mode {:o})",
-                file.gid(),
+                serial::port_group(&shown.to_string()),
                 file.mode() & 0o777
             ),
-            "add the service's user to the port's group (often dialout): \
-             usermod --append --groups dialout relief, then start the service anew",
+            format!(
+                "add the service's user to the port's group: usermod --append --groups {} relief, \
+                 then start the service anew",
+                serial::port_group(&shown.to_string())
+            ),
         )];
     }
-    let holder = scanner_driver::transport::serial::port_holder(&shown.to_string());
+    let holder = serial::port_holder(&shown.to_string());
     vec![match holder {
         Some(holder) if holder.contains("reliefd") => {
             Finding::good(CHECK, format!("{shown} is in the hands of {holder}"))
@@ -53,22 +57,90 @@ pub(super) fn check(port: &Path) -> Vec<Finding> {
     }]
 }
 
+/// All serial ports, for those who look for the right one.
+pub(super) fn present() -> Finding {
+    const CHECK: &str = "serial ports";
+    match serial::list_ports() {
+        Ok(ports) if ports.is_empty() => Finding::good(CHECK, "none"),
+        Ok(ports) => {
+            let all: Vec<String> = ports.iter().map(describe).collect();
+            Finding::good(CHECK, all.join("; "))
+        }
+        Err(error) => Finding::doubtful(
+            CHECK,
+            error.to_string(),
+            "look for them with ls -l /dev/serial/by-id",
+        ),
+    }
+}
+
+/// Vendor and product number of the USB device behind a port, if there is one.
+pub(super) fn usb_numbers(port: &Path) -> Option<(u16, u16)> {
+    // Ports are listed by their own names, and configured by links to them.
+    let own = fs::canonicalize(port).ok()?;
+    let ports = serial::list_ports().unwrap_or_default();
+    let usb = ports
+        .into_iter()
+        .find(|listed| Path::new(&listed.path) == own)?
+        .usb?;
+    Some((usb.vendor_id, usb.product_id))
+}
+
+fn describe(port: &PortInfo) -> String {
+    let mut text = port.path.clone();
+    if let Some(usb) = &port.usb {
+        text.push_str(&format!(" ({:04x}:{:04x}", usb.vendor_id, usb.product_id));
+        if let Some(product) = &usb.product {
+            text.push_str(&format!(" {product}"));
+        }
+        if let Some(serial) = &usb.serial {
+            text.push_str(&format!(", serial {serial}"));
+        }
+        text.push(')');
+    }
+    if let Some(holder) = serial::port_holder(&port.path) {
+        text.push_str(&format!(", used by {holder}"));
+    }
+    text
+}
+
 fn present_ports() -> String {
-    let ports = scanner_driver::transport::serial::list_ports().unwrap_or_default();
+    let ports = serial::list_ports().unwrap_or_default();
     if ports.is_empty() {
         return "no serial port is there at all: plug in and switch on the scanner, and look at \
-                the kernel's messages with dmesg"
+                the kernel's messages with dmesg; a scanner with a USB interface of its own needs \
+                scanner.transport = \"usb\""
             .into();
     }
-    let names: Vec<String> = ports
-        .into_iter()
-        .map(|port| match port.usb.and_then(|usb| usb.product) {
-            Some(product) => format!("{} ({product})", port.path),
-            None => port.path,
-        })
-        .collect();
+    let names: Vec<String> = ports.iter().map(describe).collect();
     format!(
         "set scanner.port to one that is there: {}",
-        names.join(", ")
+        names.join("; ")
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use scanner_driver::transport::serial::UsbInfo;
+
+    use super::*;
+
+    #[test]
+    fn a_port_is_told_with_the_device_behind_it() {
+        let port = PortInfo {
+            path: "/dev/relief-no-such-port".into(),
+            usb: Some(UsbInfo {
+                vendor_id: 0x1209,
+                product_id: 2,
+                manufacturer: None,
+                product: Some("Scanner".into()),
+                serial: Some("7".into()),
+            }),
+        };
+        assert_eq!(
+            describe(&port),
+            "/dev/relief-no-such-port (1209:0002 Scanner, serial 7)"
+        );
+        assert_eq!(usb_numbers(Path::new("/dev/null")), None);
+    }
 }
