@@ -7,10 +7,10 @@ use super::side::Labelled;
 
 /// How far from the line that is known others are looked at: offset, slope and bend, in
 /// spacings.
-const WITHIN: [f64; 3] = [2.0, 0.5, 0.02];
+const WITHIN: [f64; 3] = [1.5, 0.3, 0.02];
 /// Curves tried per search: offsets, slopes and bends.
-const STRAIGHT: [usize; 3] = [15, 15, 1];
-const BENT: [usize; 3] = [11, 11, 7];
+const STRAIGHT: [usize; 3] = [11, 11, 1];
+const BENT: [usize; 3] = [9, 9, 5];
 /// Searches, each among what the one before left likely.
 const SEARCHES: usize = 6;
 /// Logarithm of the odds against the best curve beyond which another is not likely.
@@ -41,7 +41,7 @@ struct Witness {
 pub(crate) struct Posterior {
     witnesses: Vec<Witness>,
     /// Those that the curves searched among disagree about.
-    at_issue: Vec<Witness>,
+    at_issue: AtIssue,
     costs: Vec<f64>,
 }
 
@@ -111,18 +111,22 @@ impl Posterior {
         let (centre, reach) = ([0, 1, 2].map(middle), [0, 1, 2].map(half));
         let step = [0, 1, 2].map(|k| 2.0 * reach[k] / tried[k] as f64);
         self.at_issue.clear();
-        self.at_issue.extend(self.witnesses.iter().filter(|w| {
-            let within = w.along.abs();
-            (w.across - at(&centre, w.along)).abs()
-                <= reach[0] + within * (reach[1] + within * reach[2])
-        }));
+        for w in &self.witnesses {
+            let along = w.along.abs();
+            let room = w.side * (w.across - at(&centre, w.along));
+            let reach_there = reach[0] + along * (reach[1] + along * reach[2]);
+            if room.abs() <= reach_there {
+                let cell = 0.5 * (step[0] + along * (step[1] + along * step[2]));
+                self.at_issue.push(w, cell);
+            }
+        }
         let value = |k: usize, number: usize| ranges[k].start + (number as f64 + 0.5) * step[k];
         self.costs.clear();
         for i in 0..tried[0] {
             for j in 0..tried[1] {
                 for k in 0..tried[2] {
                     let curve = [value(0, i), value(1, j), value(2, k)];
-                    self.costs.push(cost(&self.at_issue, &curve, &step));
+                    self.costs.push(self.at_issue.cost(&curve));
                 }
             }
         }
@@ -159,19 +163,56 @@ fn at(curve: &Curve, along: f64) -> f64 {
     curve[0] + along * (curve[1] + along * curve[2])
 }
 
-/// What the samples have against the curves around this one, in steps of `step`.
-fn cost(witnesses: &[Witness], curve: &Curve, step: &[f64; 3]) -> f64 {
-    let mut cost = 0.0;
-    for w in witnesses {
-        let room = w.side * (w.across - at(curve, w.along));
-        let along = w.along.abs();
-        let reach = 0.5 * (step[0] + along * (step[1] + along * step[2]));
-        if room < reach {
-            // The share of the curves that have it on the wrong side, about.
-            cost += w.trust * (0.5 - 0.5 * room / reach).min(1.0);
+/// Witnesses as the share of curves around one, in a cell of those tried, that have each on
+/// the wrong side: about `p + q (offset + slope along + bend along^2)`, cut to 0 and 1.
+#[derive(Debug, Default)]
+struct AtIssue {
+    p: Vec<f64>,
+    q: Vec<f64>,
+    along: Vec<f64>,
+    trust: Vec<f64>,
+}
+
+/// Sums kept side by side.
+const LANES: usize = 4;
+
+impl AtIssue {
+    fn clear(&mut self) {
+        for values in [&mut self.p, &mut self.q, &mut self.along, &mut self.trust] {
+            values.clear();
         }
     }
-    cost
+
+    /// `cell` is how far the edge is moved at this place by half a cell.
+    fn push(&mut self, w: &Witness, cell: f64) {
+        let scale = 0.5 * w.side / cell;
+        self.p.push(0.5 - scale * w.across);
+        self.q.push(scale);
+        self.along.push(w.along);
+        self.trust.push(w.trust);
+    }
+
+    /// What the witnesses have against the curves around this one.
+    fn cost(&self, curve: &Curve) -> f64 {
+        let wrong = |p: f64, q: f64, along: f64| {
+            let share: f64 = p + q * at(curve, along);
+            share.clamp(0.0, 1.0)
+        };
+        let mut sums = [0.0; LANES];
+        let (p, p_left) = self.p.as_chunks::<LANES>();
+        let (q, q_left) = self.q.as_chunks::<LANES>();
+        let (along, along_left) = self.along.as_chunks::<LANES>();
+        let (trust, trust_left) = self.trust.as_chunks::<LANES>();
+        for (((p, q), along), trust) in p.iter().zip(q).zip(along).zip(trust) {
+            for k in 0..LANES {
+                sums[k] += trust[k] * wrong(p[k], q[k], along[k]);
+            }
+        }
+        for (((p, q), along), trust) in p_left.iter().zip(q_left).zip(along_left).zip(trust_left) {
+            sums[0] += trust * wrong(*p, *q, *along);
+        }
+        (sums[0] + sums[1]) + (sums[2] + sums[3])
+    }
 }
 
 #[cfg(test)]
