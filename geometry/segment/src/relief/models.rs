@@ -2,7 +2,6 @@
 
 use super::piece::Pieces;
 use super::surface::{LEAST_QUARTIC_NODES, Surface};
-use crate::components::{self, depths};
 use crate::merge::{Border, Pair, borders};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
@@ -26,10 +25,6 @@ const ALLOWANCE: f64 = 2.0;
 /// proportion.
 const STEEP: f64 = 0.5;
 
-/// A plane without a node so deep, in nodes from where it ends, lies within what the regridder
-/// rounds at creases. It may be a terrace of coarse depths, which turns by as much as a rise
-/// too low for a step makes of so few nodes.
-const LEAST_DEPTH: u8 = 3;
 /// Fewer pairs are no ground to go by.
 const LEAST_PAIRS: usize = 3;
 
@@ -73,15 +68,9 @@ impl<'a> Models<'a> {
                 nodes.into_iter().step_by(every).collect()
             })
             .collect();
-        let is_deep = deep(scene, pieces);
         let planes = borders(scene, &pieces.labels)
             .into_iter()
-            .filter_map(|border| {
-                let (a, b) = border.regions;
-                let are_deep = is_deep[a as usize] && is_deep[b as usize];
-                let found = planes(scene, pieces, &samples, &border, are_deep)?;
-                Some((border.regions, found))
-            })
+            .filter_map(|border| Some((border.regions, planes(scene, pieces, &samples, &border)?)))
             .collect();
         Self {
             pieces,
@@ -203,16 +192,6 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     values.get(values.len() / 2).copied()
 }
 
-/// Whether each piece has a node that lies [`LEAST_DEPTH`] deep.
-fn deep(scene: &Scene<'_>, pieces: &Pieces) -> Vec<bool> {
-    let mut is_deep = vec![false; pieces.surfaces.len()];
-    let depths = depths(scene, &pieces.labels, LEAST_DEPTH, components::Border::All);
-    for (label, depth) in pieces.labels.iter().zip(depths) {
-        is_deep[*label as usize] |= depth >= LEAST_DEPTH;
-    }
-    is_deep
-}
-
 fn ends(scene: &Scene<'_>, labels: &[u32], pair: Pair) -> (u32, u32) {
     let first = pair.first as usize;
     let other = first
@@ -252,7 +231,6 @@ fn planes(
     pieces: &Pieces,
     samples: &[Vec<u32>],
     border: &Border,
-    are_deep: bool,
 ) -> Option<Planes> {
     let (a, b) = border.regions;
     let one = pieces.surfaces[a as usize].as_ref()?;
@@ -283,14 +261,7 @@ fn planes(
         (turn_rad < ALLOWANCE * scene.crease_rad && gap_mm < scene.step_mm)
             .then_some(Planes::Together)
     } else {
-        let depth_mm = f64::from(LEAST_DEPTH) * scene.grid.pitch_mm;
-        let terrace_rad = libm::atan2(scene.step_mm, depth_mm);
-        let least_rad = if are_deep {
-            scene.crease_rad
-        } else {
-            scene.crease_rad.max(terrace_rad)
-        };
-        (turn_rad >= least_rad || gap_mm >= scene.step_mm).then_some(Planes::Apart)
+        (turn_rad >= scene.crease_rad || gap_mm >= scene.step_mm).then_some(Planes::Apart)
     }
 }
 
@@ -304,10 +275,8 @@ mod tests {
     const SIDE: usize = 60;
     const PITCH_MM: f64 = 0.42;
 
-    /// What `found` makes of the border between an image's left and right parts, the left one so
-    /// many columns wide, with z by column and row.
+    /// What `found` makes of the border between an image's halves, with z by column and row.
     fn parts<T>(
-        left: usize,
         z_mm: impl Fn(f64, f64) -> f64,
         found: impl Fn(&Scene<'_>, &Models<'_>, &Border) -> T,
     ) -> T {
@@ -329,7 +298,7 @@ mod tests {
         };
         let mut pieces = Pieces {
             labels: (0..SIDE * SIDE)
-                .map(|node| if node < left * SIDE { 1 } else { 2 })
+                .map(|node| if node < SIDE * SIDE / 2 { 1 } else { 2 })
                 .collect(),
             surfaces: vec![None, None, None],
         };
@@ -341,21 +310,18 @@ mod tests {
         found(&scene, &Models::new(&scene, &pieces), border)
     }
 
-    /// What is found of two planes, the left one so many columns wide, of which the right one
-    /// turns by so many radians and lies so much higher.
-    fn planes_of(left: usize, turn_rad: f64, rise_mm: f64) -> Option<Planes> {
+    /// What is found of a plane's two halves, of which the right one turns by so many radians
+    /// and lies so much higher.
+    fn halves(turn_rad: f64, rise_mm: f64) -> Option<Planes> {
         let z_mm = |column: f64, row: f64| {
-            let right = (column - left as f64).max(0.0) * PITCH_MM;
-            let rise_mm = if column < left as f64 { 0.0 } else { rise_mm };
+            let right = column - (SIDE / 2) as f64;
+            let rise_mm = if right < 0.0 { 0.0 } else { rise_mm };
+            let right = right.max(0.0) * PITCH_MM;
             0.05 * row + libm::tan(turn_rad) * right + rise_mm
         };
-        parts(left, z_mm, |_, models, border| {
+        parts(z_mm, |_, models, border| {
             models.planes.get(&border.regions).copied()
         })
-    }
-
-    fn halves(turn_rad: f64, rise_mm: f64) -> Option<Planes> {
-        planes_of(SIDE / 2, turn_rad, rise_mm)
     }
 
     #[test]
@@ -368,14 +334,6 @@ mod tests {
     }
 
     #[test]
-    fn what_may_be_a_terrace_is_no_certain_face() {
-        // A third of a pitch for each node: 0.32 radians.
-        assert_eq!(planes_of(12, 0.3, 0.0), Some(Planes::Apart));
-        assert_eq!(planes_of(5, 0.3, 0.0), None, "its border has to tell");
-        assert_eq!(planes_of(5, 0.5, 0.0), Some(Planes::Apart));
-    }
-
-    #[test]
     fn curved_surfaces_that_go_on_in_each_other_make_no_border() {
         let strength = |kink: f64, bend: f64, rise_mm: f64| {
             let z_mm = |column: f64, row: f64| {
@@ -383,7 +341,7 @@ mod tests {
                 let rise_mm = if right < 0.0 { 0.0 } else { rise_mm };
                 bend * (right * right + 0.1 * row * row) + kink * right.max(0.0) + rise_mm
             };
-            parts(SIDE / 2, z_mm, |scene, models, border| {
+            parts(z_mm, |scene, models, border| {
                 models.strength_of_large(scene, &border.pairs)
             })
         };
