@@ -14,7 +14,8 @@
 //! 3. Pieces compete for the nodes at their borders.
 //! 4. Two planes are one face when one surface explains both. Other neighbours become one
 //!    region where what a crease and a step would add to a fit across their border is small,
-//!    through windows of several sizes.
+//!    through windows of several sizes; curved ones also where their own surfaces go on in each
+//!    other. What a plane ends in is a step where most of that border is one.
 //!
 //! # `shim-lee`, the baseline
 //! Section II.2 of Shim & Lee 1995, *Conversion of the range data into the CAD format*: a unit

@@ -18,6 +18,9 @@ pub(crate) struct Border {
     /// The two regions, lower label first.
     pub(crate) regions: (u32, u32),
     pub(crate) pairs: Vec<Pair>,
+    /// How many neighbouring nodes of the two have a step between them instead of a link, of
+    /// pieces that have a link, too.
+    pub(crate) steps: usize,
     /// Below 1 the border is neither crease nor step; `None` where nothing could be measured.
     strength: Option<f64>,
     stale: bool,
@@ -82,43 +85,89 @@ fn rename(borders: &mut Vec<Border>, kept: u32, lost: u32) {
         if same {
             border.pairs.append(&mut next.pairs);
             border.pairs.sort_unstable();
+            border.steps += next.steps;
         }
         same
     });
 }
 
-/// The borders between regions, by these.
+/// The borders between regions that are linked, by these.
 pub(crate) fn borders(scene: &Scene<'_>, labels: &[u32]) -> Vec<Border> {
-    let mut found: Vec<((u32, u32), Pair)> = Vec::new();
+    let (grid, links) = (&scene.grid, &scene.links);
+    // No pair where a step lies between.
+    let mut found: Vec<((u32, u32), Option<Pair>)> = Vec::new();
     for node in 0..labels.len() {
-        let mut take = |other: usize, to_the_right: bool| {
+        let mut take = |other: usize, to_the_right: bool, is_linked: bool| {
             let (a, b) = (labels[node], labels[other]);
             if a != b && a != NONE && b != NONE {
                 let first = node as u32;
-                found.push((
-                    (a.min(b), a.max(b)),
-                    Pair {
-                        first,
-                        to_the_right,
-                    },
-                ));
+                let pair = Pair {
+                    first,
+                    to_the_right,
+                };
+                found.push(((a.min(b), a.max(b)), is_linked.then_some(pair)));
             }
         };
-        if scene.links.up(node) {
-            take(node + 1, false);
+        let (column, row) = grid.column_row(node);
+        if row + 1 < grid.rows {
+            take(node + 1, false, links.up(node));
         }
-        if scene.links.right(node) {
-            take(node + scene.grid.rows, true);
+        if column + 1 < grid.columns {
+            take(node + grid.rows, true, links.right(node));
         }
     }
     found.sort_unstable();
     found
         .chunk_by(|a, b| a.0 == b.0)
-        .map(|chunk| Border {
-            regions: chunk[0].0,
-            pairs: chunk.iter().map(|(_, pair)| *pair).collect(),
-            strength: None,
-            stale: true,
+        .map(|chunk| {
+            let pairs: Vec<Pair> = chunk.iter().filter_map(|(_, pair)| *pair).collect();
+            Border {
+                regions: chunk[0].0,
+                steps: chunk.len() - pairs.len(),
+                pairs,
+                strength: None,
+                stale: true,
+            }
         })
+        .filter(|border| !border.pairs.is_empty())
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::{Grid, Links};
+    use crate::noise::noise;
+    use range_image::{Lattice, RangeImage};
+
+    #[test]
+    fn a_border_tells_links_from_steps() {
+        let (side, step_mm) = (20, 0.5);
+        let mut image = RangeImage::masked(Lattice { pitch_mm: 0.5 }, 0, 0, side, side);
+        for column in 0..side {
+            for row in 0..side {
+                // Level in the lowest six rows, a step above.
+                let is_high = column >= side / 2 && row >= 6;
+                image.set_z_mm(column, row, Some(if is_high { 4.0 } else { 0.0 }));
+            }
+        }
+        let grid = Grid::new(&image);
+        let scene = Scene {
+            grid,
+            links: Links::new(&grid, step_mm),
+            noise: noise(&image, &grid),
+            step_mm,
+            crease_rad: 0.1,
+        };
+        let halves = |node: usize| if node < side * side / 2 { 1 } else { 2 };
+        let labels: Vec<u32> = (0..side * side).map(halves).collect();
+        let found = borders(&scene, &labels);
+        assert_eq!(found.len(), 1);
+        assert_eq!((found[0].pairs.len(), found[0].steps), (6, side - 6));
+        let quarters = |node: usize| halves(node) + 2 * u32::from(node % side >= 6);
+        let labels: Vec<u32> = (0..side * side).map(quarters).collect();
+        let found = borders(&scene, &labels);
+        let regions: Vec<(u32, u32)> = found.iter().map(|b| b.regions).collect();
+        assert_eq!(regions, [(1, 2), (1, 3)], "steps alone are no border");
+    }
 }

@@ -44,14 +44,22 @@ pub(crate) fn divide(
                 None => {}
             }
             let is_small = sizes[0].min(sizes[1]) <= SMALL;
-            if certain || !is_small && models.beside_plane(scene, labels, border, sizes) {
+            let is_beside_plane = models.beside_plane(scene, labels, border, sizes);
+            // Where a plane ends mostly in steps, a few links across them are noise's. Free
+            // forms are not judged so: they break into steps where they are steep.
+            if is_beside_plane && border.steps > border.pairs.len() {
+                return None;
+            }
+            if certain || !is_small && is_beside_plane {
                 return border::strength(scene, labels, border, 1.0);
             }
             let near = border::strength(scene, labels, border, 0.0);
-            if !is_small {
-                return near;
-            }
-            match (near, models.strength(scene, &border.pairs)) {
+            let models = if is_small {
+                models.strength(scene, &border.pairs)
+            } else {
+                models.strength_of_large(scene, &border.pairs)
+            };
+            match (near, models) {
                 (Some(near), Some(models)) => Some(near.min(models)),
                 (near, models) => near.or(models),
             }

@@ -1,7 +1,7 @@
 //! What the pieces' own surfaces say of the borders between them.
 
 use super::piece::Pieces;
-use super::surface::Surface;
+use super::surface::{LEAST_QUARTIC_NODES, Surface};
 use crate::merge::{Border, Pair, borders};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
@@ -24,6 +24,9 @@ const ALLOWANCE: f64 = 2.0;
 /// Surfaces whose normal's z is below this (60 degrees of incidence) may turn by more, in
 /// proportion.
 const STEEP: f64 = 0.5;
+
+/// Fewer pairs are no ground to go by.
+const LEAST_PAIRS: usize = 3;
 
 /// What two planes are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -138,20 +141,55 @@ impl<'a> Models<'a> {
 
     /// How much of a crease or step the surfaces make of a border; 1 is the least that counts.
     pub(crate) fn strength(&self, scene: &Scene<'_>, pairs: &[Pair]) -> Option<f64> {
-        let mut strengths: Vec<f64> = pairs
-            .iter()
-            .filter_map(|pair| {
-                let (a, b) = ends(scene, &self.pieces.labels, *pair);
-                let one = self.pieces.surfaces[a as usize].as_ref()?;
-                let other = self.pieces.surfaces[b as usize].as_ref()?;
-                let meeting = meet(scene, one, other, *pair);
-                let allowed = ALLOWANCE * scene.crease_rad * (STEEP / meeting.facing).max(1.0);
-                Some((meeting.turn_rad / allowed).max(meeting.gap_mm / scene.step_mm))
-            })
-            .collect();
-        strengths.sort_by(f64::total_cmp);
-        strengths.get(strengths.len() / 2).copied()
+        let strength = |meeting: Meeting| {
+            let allowed = ALLOWANCE * scene.crease_rad * (STEEP / meeting.facing).max(1.0);
+            (meeting.turn_rad / allowed).max(meeting.gap_mm / scene.step_mm)
+        };
+        let meetings = self.meetings(scene, pairs, 0);
+        median(meetings.into_iter().map(|(_, m)| strength(m)).collect())
     }
+
+    /// The same of large regions, by curved surfaces alone that rest on many nodes, and without
+    /// allowance: these are carried on for certain, while a border may be a narrow passage
+    /// between steps, or bend as no quadric does. `None` where most of it runs otherwise.
+    pub(crate) fn strength_of_large(&self, scene: &Scene<'_>, pairs: &[Pair]) -> Option<f64> {
+        let mut meetings = self.meetings(scene, pairs, LEAST_QUARTIC_NODES);
+        meetings.retain(|(are_planes, _)| !are_planes);
+        if meetings.len() < LEAST_PAIRS || 2 * meetings.len() < pairs.len() {
+            return None;
+        }
+        let turn_rad = median(meetings.iter().map(|(_, m)| m.turn_rad).collect())?;
+        let gap_mm = median(meetings.iter().map(|(_, m)| m.gap_mm).collect())?;
+        Some((turn_rad / scene.crease_rad).max(gap_mm / scene.step_mm))
+    }
+
+    /// How the pieces of at least so many nodes lie to each other along a border, and whether
+    /// both are planes.
+    fn meetings(
+        &self,
+        scene: &Scene<'_>,
+        pairs: &[Pair],
+        least_nodes: usize,
+    ) -> Vec<(bool, Meeting)> {
+        let surface = |piece: u32| {
+            let is_enough = self.sizes[piece as usize] >= least_nodes;
+            let surface = self.pieces.surfaces[piece as usize].as_ref();
+            surface.filter(|_| is_enough)
+        };
+        let meetings = pairs.iter().filter_map(|pair| {
+            let (a, b) = ends(scene, &self.pieces.labels, *pair);
+            let (one, other) = (surface(a)?, surface(b)?);
+            let are_planes = one.is_plane() && other.is_plane();
+            Some((are_planes, meet(scene, one, other, *pair)))
+        });
+        meetings.collect()
+    }
+}
+
+/// The greater of the two in the middle.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
 }
 
 fn ends(scene: &Scene<'_>, labels: &[u32], pair: Pair) -> (u32, u32) {
@@ -237,16 +275,16 @@ mod tests {
     const SIDE: usize = 60;
     const PITCH_MM: f64 = 0.42;
 
-    /// What is found of a plane's two halves, of which the right one turns by so many radians
-    /// and lies so much higher.
-    fn halves(turn_rad: f64, rise_mm: f64) -> Option<Planes> {
+    /// What `found` makes of the border between an image's halves, with z by column and row.
+    fn parts<T>(
+        z_mm: impl Fn(f64, f64) -> f64,
+        found: impl Fn(&Scene<'_>, &Models<'_>, &Border) -> T,
+    ) -> T {
         let mut image = RangeImage::masked(Lattice { pitch_mm: PITCH_MM }, 0, 0, SIDE, SIDE);
         for column in 0..SIDE {
             for row in 0..SIDE {
                 let stray = ((column * 7 + row * 13 + column * row) % 11) as f64 - 5.0;
-                let right = column.saturating_sub(SIDE / 2) as f64 * PITCH_MM;
-                let rise_mm = if column < SIDE / 2 { 0.0 } else { rise_mm };
-                let z_mm = 0.05 * row as f64 + libm::tan(turn_rad) * right + rise_mm;
+                let z_mm = z_mm(column as f64, row as f64);
                 image.set_z_mm(column, row, Some(z_mm + 0.001 * stray));
             }
         }
@@ -264,12 +302,26 @@ mod tests {
                 .collect(),
             surfaces: vec![None, None, None],
         };
-        let samples = pieces.members();
+        let members = pieces.members();
         for label in [1, 2] {
-            pieces.surfaces[label] = Surface::fit(&scene, &samples[label], 1.0);
+            pieces.surfaces[label] = Surface::fit(&scene, &members[label], 1.0);
         }
         let border = &borders(&scene, &pieces.labels)[0];
-        planes(&scene, &pieces, &samples, border)
+        found(&scene, &Models::new(&scene, &pieces), border)
+    }
+
+    /// What is found of a plane's two halves, of which the right one turns by so many radians
+    /// and lies so much higher.
+    fn halves(turn_rad: f64, rise_mm: f64) -> Option<Planes> {
+        let z_mm = |column: f64, row: f64| {
+            let right = column - (SIDE / 2) as f64;
+            let rise_mm = if right < 0.0 { 0.0 } else { rise_mm };
+            let right = right.max(0.0) * PITCH_MM;
+            0.05 * row + libm::tan(turn_rad) * right + rise_mm
+        };
+        parts(z_mm, |_, models, border| {
+            models.planes.get(&border.regions).copied()
+        })
     }
 
     #[test]
@@ -279,5 +331,23 @@ mod tests {
         assert_eq!(halves(0.15, 0.0), Some(Planes::Apart));
         assert_eq!(halves(0.08, 0.0), None, "its border has to tell");
         assert_eq!(halves(0.0, 0.3), None, "its border has to tell");
+    }
+
+    #[test]
+    fn curved_surfaces_that_go_on_in_each_other_make_no_border() {
+        let strength = |kink: f64, bend: f64, rise_mm: f64| {
+            let z_mm = |column: f64, row: f64| {
+                let right = (column - (SIDE / 2) as f64) * PITCH_MM;
+                let rise_mm = if right < 0.0 { 0.0 } else { rise_mm };
+                bend * (right * right + 0.1 * row * row) + kink * right.max(0.0) + rise_mm
+            };
+            parts(z_mm, |scene, models, border| {
+                models.strength_of_large(scene, &border.pairs)
+            })
+        };
+        assert!(strength(0.0, 0.02, 0.0).unwrap() < 0.2);
+        assert!(strength(0.15, 0.02, 0.0).unwrap() > 1.0);
+        assert!(strength(0.0, 0.02, 0.35).unwrap() > 0.6);
+        assert_eq!(strength(0.0, 0.0, 0.0), None, "planes are judged otherwise");
     }
 }

@@ -24,8 +24,10 @@ const POWERS: [(usize, usize); QUARTIC] = [
 const PLANE: usize = 3;
 const QUADRIC: usize = 6;
 const QUARTIC: usize = 15;
-/// Fewer nodes carry no quadric, and no quartic.
-const LEAST_NODES: [usize; 2] = [24, 120];
+/// Fewer nodes carry no quadric.
+const LEAST_QUADRIC_NODES: usize = 24;
+/// Fewer nodes carry no quartic.
+pub(super) const LEAST_QUARTIC_NODES: usize = 120;
 /// F ratio from which more terms are believed.
 const LEAST_RATIO: f64 = 8.0;
 /// More terms must take away this share of the noise's variance.
@@ -67,14 +69,14 @@ impl Surface {
             gain > terms * LEAST_RATIO * scene.noise.area_nodes * left
                 && gain > LEAST_GAIN * variance * nodes.len() as f64
         };
-        if nodes.len() < LEAST_NODES[0] {
+        if nodes.len() < LEAST_QUADRIC_NODES {
             return Some(best);
         }
         match frame.surface(&sums, QUADRIC, roughness) {
             Some(quadric) if gains(&best, &quadric) => best = quadric,
             _ => return Some(best),
         }
-        if nodes.len() >= LEAST_NODES[1] {
+        if nodes.len() >= LEAST_QUARTIC_NODES {
             let sums = frame.sums::<QUARTIC>(scene, nodes);
             if let Some(quartic) = frame.surface(&sums, QUARTIC, roughness)
                 && gains(&best, &quartic)
