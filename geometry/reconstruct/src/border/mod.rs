@@ -5,6 +5,7 @@ pub(crate) mod cracks;
 pub(crate) mod crossing;
 pub(crate) mod deflect;
 pub(crate) mod intersection;
+pub(crate) mod junctions;
 pub(crate) mod map;
 pub(crate) mod path;
 pub(crate) mod segments;
