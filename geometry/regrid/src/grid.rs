@@ -217,28 +217,26 @@ impl GridWorker {
                 let closes = |n: &Neighbour| surfaces.iter().any(|other| other.holds(n));
                 let place =
                     self.surroundings
-                        .place(&self.samples, spacing, &support, &agrees, closes);
-                let distance = match place {
-                    Place::Among => outside,
-                    Place::Beside { distance } => distance.max(outside),
-                    Place::Alone => return None,
-                };
-                let supported = place == Place::Among && outside <= support.margin || {
-                    // Where no surface ends, whatever lies on the other side closes.
-                    let any =
-                        self.surroundings
-                            .place(&self.samples, spacing, &support, &agrees, |_| true);
-                    let closed = match any {
-                        Place::Beside { distance } => distance.max(outside) <= support.margin,
-                        _ => outside <= support.margin,
-                    };
-                    let mut inside = || {
-                        self.silhouette.holds(&around, |wide, windows| {
-                            let number = windows * neighbours;
-                            wide.extend_from_slice(self.search.wider(window, x_mm, y_mm, number));
-                        })
-                    };
-                    (closed || distance <= BESIDE) && inside().unwrap_or(closed)
+                        .place(&self.samples, spacing, &support, agrees, closes);
+                let supported = match place {
+                    Place::Among if outside <= support.margin => true,
+                    Place::Among | Place::Beside { .. } => {
+                        let distance = match place {
+                            Place::Beside { distance } => distance.max(outside),
+                            _ => outside,
+                        };
+                        distance <= BESIDE
+                            && self
+                                .silhouette
+                                .holds(&around, |wide, windows| {
+                                    let number = windows * neighbours;
+                                    wide.extend_from_slice(
+                                        self.search.wider(window, x_mm, y_mm, number),
+                                    );
+                                })
+                                .unwrap_or(distance <= support.margin)
+                    }
+                    Place::Alone => false,
                 };
                 let quality = || quality(&self.samples, &fit.plane, |n| surface.holds(n));
                 supported.then(|| (fit.plane.c + surface.lift_mm, quality()))
