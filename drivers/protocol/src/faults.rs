@@ -36,6 +36,11 @@ impl Faults {
     /// The stored calibration is damaged.
     pub const CALIBRATION: Self = Self(1 << 11);
 
+    /// Those after which nothing may start again before a person has looked: a device keeps
+    /// their bits through `Hello`, and a host clears them on a person's word only.
+    pub const ATTENDED: Self =
+        Self(Self::LASER.0 | Self::LIMIT_SWITCH.0 | Self::INTERLOCK.0 | Self::EMERGENCY_STOP.0);
+
     /// Each named bit with what it tells the user.
     pub const NAMED: [(Self, &'static str); 12] = [
         (Self::LASER, "laser fault"),
@@ -62,6 +67,18 @@ impl Faults {
     #[must_use]
     pub fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
+    }
+
+    /// Whether some fault is in both sets.
+    #[must_use]
+    pub const fn intersects(self, other: Self) -> bool {
+        self.0 & other.0 != 0
+    }
+
+    /// What is in both sets.
+    #[must_use]
+    pub const fn intersection(self, other: Self) -> Self {
+        Self(self.0 & other.0)
     }
 
     /// Both sets together.

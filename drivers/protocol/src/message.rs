@@ -98,6 +98,7 @@ direction! {
         CloseScan,
         Abort,
         ClearFaults,
+        Continue,
         Grant,
         Resend,
     }
@@ -118,6 +119,7 @@ direction! {
         ScanClosed,
         Aborted,
         FaultsCleared,
+        ScanContinued,
         Rejected,
         Banner,
         StatusChanged,

@@ -165,6 +165,10 @@ pub enum ScannerError {
     /// The device stopped because it did not hear from the host in time.
     #[error("the scanner stopped by itself, since it did not hear from this computer in time")]
     DeadMan,
+    /// The table stopped on its way, and no fault says why: a greeting that came late over a
+    /// line with buffers does that.
+    #[error("the scanner's table stopped before it had arrived")]
+    Halted,
     /// Somebody pressed stop on the device.
     #[error("the scan was stopped at the scanner")]
     StoppedAtDevice,
@@ -182,6 +186,31 @@ pub enum ScannerError {
     /// The device breaks the rules of the protocol.
     #[error("the scanner breaks the protocol: {0}")]
     Protocol(String),
+    /// What was measured before an interruption is not what is measured after it.
+    #[error(
+        "the object or the table has moved: what led up to column {column} was measured again, and \
+         {how}"
+    )]
+    Moved {
+        /// Index of the last column measured again.
+        column: u32,
+        /// How it differs, with figures.
+        how: String,
+    },
+    /// Another scanner is there than the one that the scan was begun with.
+    #[error("the scan was begun with the scanner {wanted}, and {found} is connected")]
+    OtherScanner {
+        /// Model and serial number of the right one.
+        wanted: String,
+        /// Those of the one that is there.
+        found: String,
+    },
+    /// The scanner came back with another calibration.
+    #[error("the scanner has been calibrated anew since the scan was begun")]
+    OtherCalibration,
+    /// No scan is paused.
+    #[error("no scan is paused")]
+    NothingPaused,
     /// A scan runs already.
     #[error("a scan is running already")]
     ScanRunning,
@@ -194,6 +223,26 @@ pub enum ScannerError {
     /// The driver has been shut down.
     #[error("the scanner's driver has been shut down")]
     Closed,
+}
+
+impl ScannerError {
+    /// Whether the same may succeed when it is tried again at once: a request that came late
+    /// or twice over a bad line, or a device that has just come back.
+    #[must_use]
+    pub fn may_pass(&self) -> bool {
+        matches!(
+            self,
+            Self::LostConnection { .. }
+                | Self::Restarted { .. }
+                | Self::DeadMan
+                | Self::Halted
+                | Self::Timeout { .. }
+                | Self::Refused {
+                    reason: RejectReason::Busy | RejectReason::NotHomed | RejectReason::NoSession,
+                    ..
+                }
+        )
+    }
 }
 
 /// What a reject's detail adds for the user.

@@ -6,6 +6,7 @@
 //! over any [`transport::Transport`].
 
 pub mod limits;
+pub mod recovery;
 pub mod session;
 pub mod transport;
 
@@ -16,11 +17,12 @@ mod settings;
 
 pub use error::ScannerError;
 pub use link::{LinkScanner, SerialScanner, UsbScanner};
+pub use recovery::Pause;
 pub use scanner::{
-    Acknowledger, DeviceStatus, LineCounts, RawColumn, RawSample, ScanInfo, ScanStream, Scanner,
-    StreamControl, StreamItem,
+    Acknowledger, DeviceStatus, LineCounts, RawColumn, RawSample, ScanInfo, ScanProgress,
+    ScanStream, Scanner, StreamControl, StreamItem,
 };
-pub use settings::LinkSettings;
+pub use settings::{LinkSettings, ResumeSettings};
 pub use transport::serial::SerialSettings;
 pub use transport::usb::UsbSettings;
 

@@ -10,6 +10,7 @@ use std::time::Duration;
 use scanner_protocol::{Activity, Faults, Identity, ScanPlan};
 
 use crate::error::ScannerError;
+use crate::recovery::Pause;
 
 /// A scanner: a table that carries the object past a measuring head.
 ///
@@ -39,6 +40,14 @@ pub trait Scanner: Send + Sync {
     /// # Errors
     /// What the device refuses, or [`ScannerError::ScanRunning`].
     fn start_scan(&self, plan: &ScanPlan) -> Result<ScanStream, ScannerError>;
+
+    /// Lets a paused scan go on: a person has looked, and says that nothing stands in the way.
+    ///
+    /// # Errors
+    /// [`ScannerError::NothingPaused`].
+    fn resume_scan(&self) -> Result<(), ScannerError> {
+        Err(ScannerError::NothingPaused)
+    }
 
     /// Turns the laser off and stops the table at once. A running scan's stream ends with
     /// [`ScannerError::Aborted`], as does whatever else is waited for.
@@ -125,8 +134,23 @@ pub struct RawSample {
 pub enum StreamItem {
     /// The next column.
     Column(RawColumn),
+    /// The scan has stopped after the last column, or the reason has changed.
+    Paused(Pause),
+    /// The scan goes on.
+    Resumed,
     /// No column will come any more.
     End(Result<(), ScannerError>),
+}
+
+/// What a scan brings.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ScanProgress {
+    /// The next column.
+    Column(RawColumn),
+    /// It has stopped after the last column, or the reason has changed.
+    Paused(Pause),
+    /// It goes on.
+    Resumed,
 }
 
 /// What a [`ScanStream`] tells its scanner.
@@ -172,18 +196,36 @@ impl ScanStream {
         self.info
     }
 
-    /// The next column; blocks until it is there. `None` is the regular end.
+    /// The next column, pauses passed over; blocks until it is there. `None` is the regular
+    /// end.
     ///
     /// # Errors
     /// Why the scan ended early; the same again when called again. Every column that
     /// arrived before comes first.
     #[allow(clippy::should_implement_trait)] // A fallible stream reads better with `?`.
     pub fn next(&mut self) -> Result<Option<RawColumn>, ScannerError> {
+        loop {
+            match self.next_progress()? {
+                Some(ScanProgress::Column(column)) => return Ok(Some(column)),
+                Some(ScanProgress::Paused(_) | ScanProgress::Resumed) => {}
+                None => return Ok(None),
+            }
+        }
+    }
+
+    /// The next column, or word of a pause; blocks until it is there. `None` is the regular
+    /// end.
+    ///
+    /// # Errors
+    /// As [`ScanStream::next`].
+    pub fn next_progress(&mut self) -> Result<Option<ScanProgress>, ScannerError> {
         if let Some(end) = &self.ended {
             return end.clone().map(|()| None);
         }
         match self.items.recv() {
-            Ok(StreamItem::Column(column)) => Ok(Some(column)),
+            Ok(StreamItem::Column(column)) => Ok(Some(ScanProgress::Column(column))),
+            Ok(StreamItem::Paused(pause)) => Ok(Some(ScanProgress::Paused(pause))),
+            Ok(StreamItem::Resumed) => Ok(Some(ScanProgress::Resumed)),
             Ok(StreamItem::End(end)) => {
                 self.ended = Some(end.clone());
                 end.map(|()| None)

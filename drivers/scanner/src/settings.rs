@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crate::error::ScannerError;
-use crate::limits::MAX_CREDITS;
+use crate::limits::{MAX_CREDITS, MAX_OVERLAP};
 
 /// How patiently the driver talks to a scanner.
 ///
@@ -43,9 +43,39 @@ pub struct LinkSettings {
     pub reconnect_first: Duration,
     /// Longest pause between attempts to connect again; the pause doubles up to this.
     pub reconnect_longest: Duration,
+    /// How a scan goes on after an interruption; `None` lets the first trouble end it.
+    pub resume: Option<ResumeSettings>,
     /// Seed of the jitter on those pauses (up to a quarter, so that several hosts which
     /// lost the same hub do not come back in step).
     pub jitter_seed: u64,
+}
+
+/// How a scan goes on after an interruption.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ResumeSettings {
+    /// Fewest columns measured again, to prove that neither table nor object has moved; where
+    /// they hold little, more are taken, up to [`crate::limits::MAX_OVERLAP`]. At least 1.
+    pub overlap_columns: u16,
+    /// Attempts to go on without a new column, before a person is asked.
+    pub attempts: u32,
+    /// Longest pause after which the laser may go on again without a person's word.
+    pub unattended: Duration,
+    /// Pause before the first attempt to go on.
+    pub first_pause: Duration,
+    /// Longest pause between attempts; the pause doubles up to this.
+    pub longest_pause: Duration,
+}
+
+impl Default for ResumeSettings {
+    fn default() -> Self {
+        Self {
+            overlap_columns: 2,
+            attempts: 10,
+            unattended: Duration::from_secs(15 * 60),
+            first_pause: Duration::from_millis(250),
+            longest_pause: Duration::from_secs(10),
+        }
+    }
 }
 
 impl Default for LinkSettings {
@@ -64,6 +94,7 @@ impl Default for LinkSettings {
             column_timeout: Duration::from_secs(30),
             reconnect_first: Duration::from_millis(250),
             reconnect_longest: Duration::from_secs(10),
+            resume: None,
             jitter_seed: 0,
         }
     }
@@ -109,6 +140,17 @@ impl LinkSettings {
         }
         if self.reconnect_longest < self.reconnect_first {
             return wrong("reconnect_longest must not be below reconnect_first");
+        }
+        if let Some(resume) = &self.resume {
+            if resume.overlap_columns == 0 || resume.overlap_columns > MAX_OVERLAP {
+                return wrong(&format!("overlap_columns must be 1 to {MAX_OVERLAP}"));
+            }
+            if resume.attempts == 0 || resume.first_pause < shortest {
+                return wrong("attempts and first_pause must not be 0");
+            }
+            if resume.longest_pause < resume.first_pause {
+                return wrong("longest_pause must not be below first_pause");
+            }
         }
         Ok(())
     }

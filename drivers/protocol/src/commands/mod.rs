@@ -30,4 +30,4 @@ pub use limits::{GetLimits, Limits};
 pub use move_table::{Move, MoveStarted};
 pub use rejected::{RejectReason, Rejected};
 pub use resend::{Missing, RESEND_BITMAP, Resend};
-pub use scan::{Scan, ScanAccepted, ScanPlan};
+pub use scan::{Continue, Scan, ScanAccepted, ScanContinued, ScanPlan};

@@ -1,4 +1,4 @@
-//! Starting a scan.
+//! Starting a scan, and taking one up again.
 
 use crate::message::Request;
 use crate::wire::{MessageError, Reader, Wire, Writer, message};
@@ -76,4 +76,39 @@ message! {
 
 impl Request for Scan {
     type Reply = ScanAccepted;
+}
+
+message! {
+    /// Takes an interrupted scan up again, from one of its columns on. Columns keep the
+    /// indices that they have in the plan.
+    Continue = 0x0d {
+        /// The host's number for what follows: another than before, so that late frames of
+        /// what went before are told apart.
+        scan_id: u16,
+        /// Columns from `first_column` on that may be sent before the first
+        /// [`crate::commands::Grant`].
+        credits: u16,
+        /// Index of the first column to measure: below the plan's number of columns.
+        first_column: u32,
+        /// Where to measure: the plan that the scan was begun with.
+        plan: ScanPlan,
+    }
+}
+
+message! {
+    /// The scan goes on. The device drives to that column and turns the laser on.
+    ScanContinued = 0x8d {
+        /// The scan's number.
+        scan_id: u16,
+        /// Columns of the whole scan, as [`ScanAccepted`] had it.
+        columns: u32,
+        /// Nominal distance between neighbouring samples of a column, micrometres.
+        spacing_um: u32,
+        /// Whether laterals within a column are evenly spaced.
+        uniform: bool,
+    }
+}
+
+impl Request for Continue {
+    type Reply = ScanContinued;
 }

@@ -9,7 +9,7 @@ use scanner_protocol::events::*;
 use scanner_protocol::{Decoder, DeviceMessage, Faults, Frame, HostMessage, Message, text};
 
 /// The message is written as these bytes, and read back from them.
-fn check<M: Message + PartialEq + std::fmt::Debug>(tag: u16, message: M, hex: &str) {
+pub(crate) fn check<M: Message + PartialEq + std::fmt::Debug>(tag: u16, message: M, hex: &str) {
     let bytes: Vec<u8> = hex
         .split(' ')
         .map(|byte| u8::from_str_radix(byte, 16).expect("two hexadecimal digits"))

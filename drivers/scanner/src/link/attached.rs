@@ -51,6 +51,10 @@ macro_rules! attached {
                 self.link.start_scan(plan)
             }
 
+            fn resume_scan(&self) -> Result<(), ScannerError> {
+                self.link.resume_scan()
+            }
+
             fn abort(&self) -> Result<(), ScannerError> {
                 self.link.abort()
             }

@@ -2,6 +2,7 @@
 
 mod attached;
 mod backoff;
+mod stream;
 mod worker;
 
 pub use attached::{SerialScanner, UsbScanner};
@@ -27,6 +28,7 @@ enum Call {
     Identify(SyncSender<Result<Outcome, ScannerError>>),
     Acknowledge(ScanNumber, u32),
     CloseScan(ScanNumber),
+    Resume(SyncSender<Result<Outcome, ScannerError>>),
     Shutdown,
 }
 
@@ -147,6 +149,10 @@ impl Scanner for LinkScanner {
             }
             _ => Err(ScannerError::Closed),
         }
+    }
+
+    fn resume_scan(&self) -> Result<(), ScannerError> {
+        self.call(Call::Resume).map(|_| ())
     }
 
     fn abort(&self) -> Result<(), ScannerError> {

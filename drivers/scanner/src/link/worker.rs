@@ -5,18 +5,18 @@
 
 use std::collections::BTreeMap;
 use std::io;
-use std::sync::mpsc::{
-    Receiver, RecvTimeoutError, SyncSender, TryRecvError, TrySendError, sync_channel,
-};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError};
 use std::time::{Duration, Instant};
 
-use scanner_protocol::Identity;
+use scanner_protocol::{Identity, ScanPlan};
 
 use super::backoff::Backoff;
+use super::stream::Stream;
 use super::{Call, Outcome, ScanNumber};
 use crate::error::ScannerError;
 use crate::limits::MAX_OUTBOX;
-use crate::scanner::{ScanInfo, StreamItem};
+use crate::recovery::Recovery;
+use crate::scanner::ScanInfo;
 use crate::session::{Answer, Command, Event, Session, Ticket};
 use crate::settings::LinkSettings;
 use crate::transport::{Connector, Transport};
@@ -55,19 +55,14 @@ pub(super) struct Worker {
     parked: Vec<(Ticket, Command)>,
     /// Who waits for which outcome.
     callers: BTreeMap<Ticket, Reply>,
+    /// What the scans that have been asked for are to be.
+    plans: BTreeMap<Ticket, ScanPlan>,
     next_ticket: u64,
     /// Who waits for the identity.
     identify: Vec<Reply>,
     identity: Option<Box<Identity>>,
     stream: Option<Stream>,
     next_scan: u64,
-}
-
-/// The reader of a scan.
-struct Stream {
-    number: ScanNumber,
-    /// `None` once the end has been sent; acknowledgements still come after it.
-    items: Option<SyncSender<StreamItem>>,
 }
 
 /// An open transport and the session over it.
@@ -95,6 +90,7 @@ impl Worker {
             logged: None,
             parked: Vec::new(),
             callers: BTreeMap::new(),
+            plans: BTreeMap::new(),
             next_ticket: 0,
             identify: Vec::new(),
             identity: None,
@@ -115,6 +111,7 @@ impl Worker {
                 self.connect();
             }
             self.take_events();
+            self.mind_the_scan();
         }
         self.say_farewell();
     }
@@ -160,10 +157,29 @@ impl Worker {
                     self.hurry();
                 }
             },
+            Call::Resume(reply) => {
+                let resumed = match &mut self.stream {
+                    Some(stream) => stream.scan.resume(now),
+                    None => Err(ScannerError::NothingPaused),
+                };
+                let _ = reply.send(resumed.map(|()| Outcome::Done));
+                self.hurry();
+            }
+            Call::Do(Command::Scan(_), reply) if self.is_paused() => {
+                let _ = reply.send(Err(ScannerError::ScanRunning));
+            }
             Call::Do(command, reply) => {
+                if command == Command::Abort
+                    && let Some(stream) = &mut self.stream
+                {
+                    stream.scan.abort();
+                }
                 self.next_ticket += 1;
                 let ticket = Ticket(self.next_ticket);
                 self.callers.insert(ticket, reply);
+                if let Command::Scan(plan) = command {
+                    self.plans.insert(ticket, plan);
+                }
                 match &mut self.line {
                     Some(line) => line.session.command(ticket, command, now),
                     None => {
@@ -173,14 +189,15 @@ impl Worker {
                 }
             }
             Call::Acknowledge(number, column) => {
-                if self.is_current(number)
-                    && let Some(line) = &mut self.line
-                {
-                    line.session.acknowledge(column, now);
+                if let Some(stream) = self.stream.as_mut().filter(|s| s.number == number) {
+                    stream.scan.acknowledge(column);
+                    if let Some(line) = &mut self.line {
+                        line.session.acknowledge(column, now);
+                    }
                 }
             }
             Call::CloseScan(number) => {
-                if self.is_current(number) {
+                if self.stream.as_ref().is_some_and(|s| s.number == number) {
                     self.stream = None;
                     if let Some(line) = &mut self.line {
                         line.session.close_scan();
@@ -191,10 +208,10 @@ impl Worker {
         true
     }
 
-    fn is_current(&self, number: ScanNumber) -> bool {
+    fn is_paused(&self) -> bool {
         self.stream
             .as_ref()
-            .is_some_and(|stream| stream.number == number)
+            .is_some_and(|stream| stream.scan.is_paused())
     }
 
     /// A device that has just been plugged in is tried at once, and then, since it may need a
@@ -260,6 +277,12 @@ impl Worker {
     }
 
     fn event(&mut self, event: Event) {
+        let now = self.now();
+        let event = match &mut self.stream {
+            Some(stream) => stream.scan.event(event, now),
+            None => Some(event),
+        };
+        let Some(event) = event else { return };
         match event {
             Event::Ready(identity) => {
                 tracing::info!(
@@ -277,13 +300,14 @@ impl Worker {
             }
             Event::Finished(ticket, Ok(Answer::Scan(info))) => self.begin_stream(ticket, info),
             Event::Finished(ticket, result) => {
+                self.plans.remove(&ticket);
                 if let Some(reply) = self.callers.remove(&ticket) {
                     // Whoever asked may have gone.
                     let _ = reply.send(result.map(Outcome::from));
                 }
             }
-            Event::Column(column) => self.stream_item(StreamItem::Column(column)),
-            Event::ScanOver(result) => self.stream_item(StreamItem::End(result)),
+            // Of a scan that nobody reads any more.
+            Event::Column(_) | Event::ScanOver(_) => {}
             Event::Lost(error) => self.disconnected(&error),
         }
     }
@@ -291,42 +315,35 @@ impl Worker {
     fn begin_stream(&mut self, ticket: Ticket, info: ScanInfo) {
         self.next_scan += 1;
         let number = ScanNumber(self.next_scan);
-        // Every column in flight, and the end: a send never finds the channel full.
-        let (sender, items) = sync_channel(usize::from(self.settings.credits) + 1);
-        let taken = self
-            .callers
-            .remove(&ticket)
-            .is_some_and(|reply| reply.send(Ok(Outcome::Scan(info, number, items))).is_ok());
-        if taken {
-            self.stream = Some(Stream {
-                number,
-                items: Some(sender),
-            });
-        } else if let Some(line) = &mut self.line {
+        let begun = self.plans.remove(&ticket).zip(self.identity.clone());
+        let reply = self.callers.remove(&ticket);
+        if let (Some((plan, identity)), Some(reply)) = (begun, reply) {
+            let scan = Recovery::begun(self.settings.resume.clone(), identity, plan, info);
+            let (stream, items) = Stream::new(number, scan, self.settings.credits);
+            if reply.send(Ok(Outcome::Scan(info, number, items))).is_ok() {
+                self.stream = Some(stream);
+                return;
+            }
+        }
+        if let Some(line) = &mut self.line {
             line.session.close_scan();
         }
     }
 
-    fn stream_item(&mut self, item: StreamItem) {
+    /// Lets a paused scan go on, and passes on what has come of it.
+    fn mind_the_scan(&mut self) {
+        let now = self.now();
         let Some(stream) = &mut self.stream else {
             return;
         };
-        let last = matches!(item, StreamItem::End(_));
-        let Some(items) = stream.items.take() else {
-            return;
-        };
-        match items.try_send(item) {
-            Ok(()) if !last => stream.items = Some(items),
-            Ok(()) => {}
-            // The reader has gone; its closing of the scan is on the way.
-            Err(TrySendError::Disconnected(_)) => {}
-            Err(TrySendError::Full(_)) => {
-                // Only possible if columns are acknowledged before they are taken.
-                tracing::error!("columns were acknowledged before they were taken; scan closed");
-                self.stream = None;
-                if let Some(line) = &mut self.line {
-                    line.session.close_scan();
-                }
+        let session = self.line.as_mut().map(|line| &mut line.session);
+        stream.scan.poll(session, now);
+        if stream.pass_on().is_err() {
+            // Only possible if columns are acknowledged before they are taken.
+            tracing::error!("columns were acknowledged before they were taken; scan closed");
+            self.stream = None;
+            if let Some(line) = &mut self.line {
+                line.session.close_scan();
             }
         }
     }
@@ -346,8 +363,12 @@ impl Worker {
         for reply in std::mem::take(&mut self.callers).into_values() {
             let _ = reply.send(Err(error.clone()));
         }
-        self.stream_item(StreamItem::End(Err(error.clone())));
-        self.stream = None;
+        // A scan that can go on waits for the connection.
+        self.mind_the_scan();
+        if !self.is_paused() {
+            self.stream = None;
+        }
+        self.plans.clear();
         self.retry_at = self.now() + self.backoff.next();
     }
 

@@ -4,11 +4,11 @@ use std::time::Duration;
 
 use scanner_protocol::ScanPlan;
 use scanner_protocol::commands::{
-    Abort, ClearFaults, CloseScan, Heartbeat, Home, Move, Scan, SetLaser,
+    Abort, ClearFaults, CloseScan, Continue, Heartbeat, Home, Move, Scan, SetLaser,
 };
 
-use super::request::Purpose;
-use super::scan::Flow;
+use super::request::{GoOn, Purpose};
+use super::scan::{Acknowledged, Flow, Taken};
 use super::{Command, Phase, Session, Ticket};
 use crate::error::ScannerError;
 
@@ -18,7 +18,11 @@ impl Session {
     pub fn command(&mut self, ticket: Ticket, command: Command, now: Duration) {
         let begins = matches!(
             command,
-            Command::Home | Command::Move(_) | Command::Laser(true) | Command::Scan(_)
+            Command::Home
+                | Command::HomeAgain { .. }
+                | Command::Move(_)
+                | Command::Laser(true)
+                | Command::Scan(_)
         );
         if begins && self.scan_over {
             // Every column of the last scan is here, though not all are acknowledged. The
@@ -34,6 +38,9 @@ impl Session {
                 self.requests.push(&Heartbeat {}, Purpose::Status(ticket));
             }
             (Phase::Ready, Command::Home) => self.requests.push(&Home {}, Purpose::Home(ticket)),
+            (Phase::Ready, Command::HomeAgain { attended }) => self
+                .requests
+                .push(&Home {}, Purpose::HomeAgain(ticket, attended)),
             (Phase::Ready, Command::Move(table_counts)) => self
                 .requests
                 .push(&Move { table_counts }, Purpose::Move(ticket, table_counts)),
@@ -45,6 +52,45 @@ impl Session {
                 .push(&ClearFaults {}, Purpose::ClearFaults(ticket)),
             (Phase::Ready, Command::Scan(plan)) => self.start_scan(ticket, plan),
         }
+        self.poll(now);
+    }
+
+    /// Takes up a scan whose columns below `handed` are here, from `first_column` on. Its
+    /// outcome comes like that of a command; those columns come again.
+    pub fn go_on(
+        &mut self,
+        ticket: Ticket,
+        plan: ScanPlan,
+        first_column: u32,
+        handed: u32,
+        acknowledged: Acknowledged,
+        now: Duration,
+    ) {
+        if self.phase != Phase::Ready || self.scan.is_some() || self.requests.has_scan() {
+            return self.finish(ticket, Err(ScannerError::ScanRunning));
+        }
+        self.next_scan_id = self.next_scan_id.wrapping_add(1);
+        let scan_id = self.next_scan_id;
+        let taken = Taken {
+            first_column,
+            handed,
+            acknowledged,
+        };
+        let send_below = taken.granted(self.flow(&plan).credits, plan.columns);
+        self.requests.push(
+            &Continue {
+                scan_id,
+                credits: u16::try_from(send_below.saturating_sub(first_column)).unwrap_or(u16::MAX),
+                first_column,
+                plan,
+            },
+            Purpose::Continue(Box::new(GoOn {
+                ticket,
+                scan_id,
+                plan,
+                taken,
+            })),
+        );
         self.poll(now);
     }
 
@@ -113,7 +159,7 @@ impl Session {
     /// Makes a refused request again, now that the faults are cleared.
     pub(super) fn ask_again(&mut self, refused: Purpose) {
         match refused {
-            Purpose::Home(_) => self.requests.push(&Home {}, refused),
+            Purpose::Home(_) | Purpose::HomeAgain(..) => self.requests.push(&Home {}, refused),
             Purpose::Move(_, table_counts) => self.requests.push(&Move { table_counts }, refused),
             Purpose::Scan(ticket, scan_id, plan) => self.ask_for_scan(ticket, scan_id, plan),
             other => self.fail(&other, ScannerError::Closed),

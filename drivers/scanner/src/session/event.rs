@@ -16,6 +16,12 @@ pub enum Command {
     Status,
     /// Home the table and wait for it.
     Home,
+    /// Home the table for a scan that is to go on. Faults that need a person are cleared only
+    /// if one has `attended` to them.
+    HomeAgain {
+        /// A person has looked.
+        attended: bool,
+    },
     /// Move the table to a position in counts and wait for it.
     Move(i32),
     /// Switch the laser.

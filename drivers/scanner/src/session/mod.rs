@@ -19,6 +19,7 @@ use scanner_protocol::{Activity, Calibration, Decoder, Frame, Identity, Message,
 
 pub use event::{Answer, Command, Event, Ticket};
 use request::{Due, Purpose, Requests};
+pub use scan::Acknowledged;
 use scan::ScanTracker;
 
 use crate::error::ScannerError;
@@ -91,7 +92,7 @@ impl Session {
             outbox: Vec::new(),
             events: VecDeque::new(),
             phase: Phase::Opening,
-            requests: Requests::default(),
+            requests: Requests::new(now),
             waiting: VecDeque::new(),
             boot_id: 0,
             nameplate: None,
@@ -101,7 +102,8 @@ impl Session {
             recovered: None,
             scan: None,
             scan_over: false,
-            next_scan_id: 0,
+            // As with tags: another number than those of earlier sessions.
+            next_scan_id: now.as_millis() as u16,
             stream_tag: 0,
             last_sent: now,
             last_heard: now,

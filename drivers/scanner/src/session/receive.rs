@@ -3,15 +3,15 @@
 use std::time::Duration;
 
 use scanner_protocol::commands::{
-    Abort, ClearFaults, CloseScan, GetCalibration, GetLimits, Heartbeat, Hello, Home, Identify,
-    Move, Scan, ScanAccepted, SetLaser,
+    Abort, ClearFaults, CloseScan, Continue, GetCalibration, GetLimits, Heartbeat, Hello, Home,
+    Identify, Move, Scan, ScanAccepted, ScanContinued, SetLaser,
 };
 use scanner_protocol::{
     Activity, DeviceMessage, Faults, HostMessage, Message, Packet, RejectReason, Rejected, Status,
 };
 
 use super::request::Purpose;
-use super::scan::ScanTracker;
+use super::scan::{ScanTracker, Taken};
 use super::{Answer, Motion, Phase, Session, Ticket, on_its_way};
 use crate::error::ScannerError;
 use crate::limits::MAX_SCAN_COLUMNS;
@@ -57,7 +57,7 @@ impl Session {
             }
             DeviceMessage::Status(status) => {
                 let purpose = self.requests.answered(tag, Heartbeat::KIND);
-                if self.on_status(&status, now)
+                if self.on_status(&status, purpose.is_some(), now)
                     && let Some(Purpose::Status(ticket)) = purpose
                 {
                     let status = self.device_status(&status);
@@ -67,10 +67,12 @@ impl Session {
                 }
             }
             DeviceMessage::StatusChanged(status) => {
-                self.on_status(&status.0, now);
+                self.on_status(&status.0, false, now);
             }
             DeviceMessage::HomeStarted(_) => {
-                if let Some(Purpose::Home(ticket)) = self.requests.answered(tag, Home::KIND) {
+                if let Some(Purpose::Home(ticket) | Purpose::HomeAgain(ticket, _)) =
+                    self.requests.answered(tag, Home::KIND)
+                {
                     self.start_motion(ticket, None, now);
                 }
             }
@@ -85,6 +87,7 @@ impl Session {
             DeviceMessage::ScanClosed(_) => self.done(tag, CloseScan::KIND),
             DeviceMessage::Aborted(_) => self.done(tag, Abort::KIND),
             DeviceMessage::ScanAccepted(reply) => self.on_accepted(&reply, tag, now),
+            DeviceMessage::ScanContinued(reply) => self.on_continued(&reply, tag, now),
             DeviceMessage::Rejected(reply) => self.on_rejected(&reply, tag, now),
             DeviceMessage::Banner(banner) => {
                 // The banner of the start that we know may come late.
@@ -131,7 +134,14 @@ impl Session {
             spacing_um: reply.spacing_um,
             uniform: reply.uniform,
         };
-        self.scan = Some(ScanTracker::new(scan_id, info, self.flow(&plan), now));
+        let taken = Taken::default();
+        self.scan = Some(ScanTracker::new(
+            scan_id,
+            info,
+            self.flow(&plan),
+            taken,
+            now,
+        ));
         self.scan_over = false;
         if reply.columns == 0 || reply.columns > MAX_SCAN_COLUMNS {
             self.close_scan();
@@ -142,6 +152,28 @@ impl Session {
             return self.finish(ticket, Err(error));
         }
         self.finish(ticket, Ok(Answer::Scan(info)));
+    }
+
+    fn on_continued(&mut self, reply: &ScanContinued, tag: u16, now: Duration) {
+        let Some(Purpose::Continue(go_on)) = self.requests.answered(tag, Continue::KIND) else {
+            return;
+        };
+        let info = ScanInfo {
+            columns: reply.columns,
+            spacing_um: reply.spacing_um,
+            uniform: reply.uniform,
+        };
+        let flow = self.flow(&go_on.plan);
+        self.scan = Some(ScanTracker::new(
+            go_on.scan_id,
+            info,
+            flow,
+            go_on.taken,
+            now,
+        ));
+        self.scan_over = false;
+        // The caller knows how many columns there were before.
+        self.finish(go_on.ticket, Ok(Answer::Scan(info)));
     }
 
     fn on_faults_cleared(&mut self, remaining: Faults, tag: u16) {
@@ -175,6 +207,11 @@ impl Session {
         }
         // A fault may be over and only its bit still set; whoever starts something new has
         // seen to it. Tried once, so that a device that contradicts itself ends it.
+        let faults = Faults(reply.detail);
+        let for_a_person = faults.intersects(Faults::ATTENDED) && !purpose.attended();
+        if reply.reason == RejectReason::Faulted && for_a_person {
+            return self.fail(&purpose, ScannerError::Fault(faults));
+        }
         if reply.reason == RejectReason::Faulted
             && purpose.starts_motion()
             && self.recovered != purpose.ticket()
@@ -196,8 +233,9 @@ impl Session {
         }
     }
 
-    /// Takes a status into account; `false` if it shows that the device has restarted.
-    fn on_status(&mut self, status: &Status, now: Duration) -> bool {
+    /// Takes a status into account; `false` if it shows that the device has restarted. One
+    /// that answers a request is `fresh`; another may be late.
+    fn on_status(&mut self, status: &Status, fresh: bool, now: Duration) -> bool {
         if self.phase != Phase::Ready {
             return true;
         }
@@ -205,18 +243,35 @@ impl Session {
             self.restart("noticed by its status", now);
             return false;
         }
-        self.check_motion(status);
+        if fresh {
+            self.check_motion(status);
+        }
         if let Some(scan) = self.scan.as_mut().filter(|_| !self.scan_over) {
             if scan.scan_id() == status.scan_id {
                 scan.sent(status.columns);
                 if on_its_way(status.activity) {
                     scan.excuse(now);
                 }
-            } else {
+            } else if fresh {
                 self.end_scan(Err(ScannerError::Protocol(
                     "it no longer knows the running scan".to_owned(),
                 )));
             }
+        } else if fresh
+            && self.scan.is_none()
+            && self.requests.is_idle()
+            && status.scan_id != 0
+            && matches!(
+                status.activity,
+                Activity::Scanning | Activity::Waiting | Activity::Moving
+            )
+        {
+            // A request that came late, or twice: nobody wants this scan.
+            tracing::warn!(scan = status.scan_id, "closing a scan nobody asked for");
+            let unwanted = CloseScan {
+                scan_id: status.scan_id,
+            };
+            self.requests.push(&unwanted, Purpose::CloseScan);
         }
         true
     }
@@ -238,7 +293,7 @@ impl Session {
         let result = match status.activity {
             Activity::Idle if arrived => Ok(Answer::Done),
             Activity::Idle | Activity::Faulted => Err(if status.faults.is_empty() {
-                ScannerError::Protocol("its table stopped before it had arrived".to_owned())
+                ScannerError::Halted
             } else if status.faults == Faults::DEAD_MAN {
                 ScannerError::DeadMan
             } else {

@@ -6,6 +6,7 @@ use std::time::Duration;
 use scanner_protocol::{Frame, Request, ScanPlan};
 
 use super::event::Ticket;
+use super::scan::Taken;
 
 /// What a request is for, and so what to do with its reply.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -17,14 +18,26 @@ pub(super) enum Purpose {
     Heartbeat,
     Status(Ticket),
     Home(Ticket),
+    /// Homing for a scan that is to go on; whether a person has looked.
+    HomeAgain(Ticket, bool),
     Move(Ticket, i32),
     Laser(Ticket),
     ClearFaults(Ticket),
     /// Clearing faults, to try again what was refused for them.
     Recover(Box<Purpose>),
     Scan(Ticket, u16, ScanPlan),
+    Continue(Box<GoOn>),
     CloseScan,
     Abort(Option<Ticket>),
+}
+
+/// A scan to be taken up.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct GoOn {
+    pub(super) ticket: Ticket,
+    pub(super) scan_id: u16,
+    pub(super) plan: ScanPlan,
+    pub(super) taken: Taken,
 }
 
 impl Purpose {
@@ -34,11 +47,12 @@ impl Purpose {
             Self::Hello => "open a session",
             Self::Nameplate | Self::Calibration | Self::Limits => "identify itself",
             Self::Heartbeat | Self::Status(_) => "tell its status",
-            Self::Home(_) => "home the table",
+            Self::Home(_) | Self::HomeAgain(..) => "home the table",
             Self::Move(..) => "move the table",
             Self::Laser(_) => "switch the laser",
             Self::ClearFaults(_) | Self::Recover(_) => "clear its faults",
             Self::Scan(..) => "scan",
+            Self::Continue(_) => "take the scan up again",
             Self::CloseScan => "close the scan",
             Self::Abort(_) => "abort",
         }
@@ -50,11 +64,12 @@ impl Purpose {
             Self::Hello => "answer to the greeting",
             Self::Nameplate | Self::Calibration | Self::Limits => "identification",
             Self::Heartbeat | Self::Status(_) => "status",
-            Self::Home(_) => "answer to the homing command",
+            Self::Home(_) | Self::HomeAgain(..) => "answer to the homing command",
             Self::Move(..) => "answer to the move command",
             Self::Laser(_) => "answer to the laser command",
             Self::ClearFaults(_) | Self::Recover(_) => "answer to the clearing of faults",
             Self::Scan(..) => "answer to the scan command",
+            Self::Continue(_) => "answer to the taking up of the scan",
             Self::CloseScan => "answer to the closing of the scan",
             Self::Abort(_) => "answer to the abort command",
         }
@@ -65,19 +80,29 @@ impl Purpose {
         match self {
             Self::Status(ticket)
             | Self::Home(ticket)
+            | Self::HomeAgain(ticket, _)
             | Self::Move(ticket, _)
             | Self::Laser(ticket)
             | Self::ClearFaults(ticket)
             | Self::Scan(ticket, ..) => Some(*ticket),
             Self::Abort(ticket) => *ticket,
             Self::Recover(refused) => refused.ticket(),
+            Self::Continue(go_on) => Some(go_on.ticket),
             _ => None,
         }
     }
 
     /// Whether it begins something in which the table moves.
     pub(super) fn starts_motion(&self) -> bool {
-        matches!(self, Self::Home(_) | Self::Move(..) | Self::Scan(..))
+        matches!(
+            self,
+            Self::Home(_) | Self::HomeAgain(..) | Self::Move(..) | Self::Scan(..)
+        )
+    }
+
+    /// Whether faults that need a person may be cleared for its sake.
+    pub(super) fn attended(&self) -> bool {
+        !matches!(self, Self::HomeAgain(_, false))
     }
 
     /// Whether it belongs to opening the session.
@@ -120,6 +145,15 @@ pub(super) enum Due {
 }
 
 impl Requests {
+    /// No requests yet. The first tag depends on the time, so that a reply to an earlier
+    /// session, late on a line with buffers, is not taken for one of this session.
+    pub(super) fn new(now: Duration) -> Self {
+        Self {
+            next_tag: now.as_millis() as u16,
+            ..Self::default()
+        }
+    }
+
     /// Queues a request. An abort overtakes all others.
     pub(super) fn push<R: Request>(&mut self, request: &R, purpose: Purpose) {
         self.next_tag = self.next_tag.wrapping_add(1);
@@ -150,7 +184,7 @@ impl Requests {
             .chain(&self.queue)
             .any(|open| match &open.purpose {
                 Purpose::Recover(refused) => matches!(**refused, Purpose::Scan(..)),
-                purpose => matches!(purpose, Purpose::Scan(..)),
+                purpose => matches!(purpose, Purpose::Scan(..) | Purpose::Continue(_)),
             })
     }
 

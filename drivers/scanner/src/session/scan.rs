@@ -25,6 +25,57 @@ pub(super) struct Flow {
     pub(super) column_timeout: Duration,
 }
 
+/// The columns that are safe with the host, in whatever order it says so.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Acknowledged {
+    below: u32,
+    ahead: BTreeSet<u32>,
+}
+
+impl Acknowledged {
+    /// Adds a column, if it is one of those `handed` on and is not in already; says whether
+    /// all below some further index are safe now.
+    pub fn add(&mut self, column: u32, handed: u32) -> bool {
+        if column < self.below || column >= handed {
+            return false;
+        }
+        let before = self.below;
+        self.ahead.insert(column);
+        while self.ahead.remove(&self.below) {
+            self.below += 1;
+        }
+        self.below > before
+    }
+
+    /// Every column below is safe.
+    #[must_use]
+    pub fn below(&self) -> u32 {
+        self.below
+    }
+}
+
+/// Where a scan is taken up; the default is its beginning.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct Taken {
+    /// The first column to come.
+    pub(super) first_column: u32,
+    /// Columns below were handed on before.
+    pub(super) handed: u32,
+    pub(super) acknowledged: Acknowledged,
+}
+
+impl Taken {
+    /// The device may send columns below this index. Those that are here already need no
+    /// room.
+    pub(super) fn granted(&self, credits: u16, columns: u32) -> u32 {
+        self.acknowledged
+            .below()
+            .saturating_add(u32::from(credits))
+            .max(self.handed)
+            .min(columns)
+    }
+}
+
 /// A scan from its acceptance to its last column.
 #[derive(Debug)]
 pub(super) struct ScanTracker {
@@ -39,8 +90,7 @@ pub(super) struct ScanTracker {
     window: VecDeque<Slot>,
     /// There is evidence that every column below has been sent once.
     sent_below: u32,
-    acknowledged_below: u32,
-    acknowledged_ahead: BTreeSet<u32>,
+    taken: Taken,
     grant_due: bool,
     end: Option<ScanEnd>,
     /// When the last column became complete, or credit came after there was none.
@@ -60,17 +110,22 @@ struct Slot {
 }
 
 impl ScanTracker {
-    pub(super) fn new(scan_id: u16, info: ScanInfo, flow: Flow, now: Duration) -> Self {
+    pub(super) fn new(
+        scan_id: u16,
+        info: ScanInfo,
+        flow: Flow,
+        taken: Taken,
+        now: Duration,
+    ) -> Self {
         Self {
             scan_id,
             info,
             flow,
             total: info.columns,
-            next: 0,
+            next: taken.first_column,
             window: VecDeque::new(),
-            sent_below: 0,
-            acknowledged_below: 0,
-            acknowledged_ahead: BTreeSet::new(),
+            sent_below: taken.first_column,
+            taken,
             grant_due: false,
             end: None,
             progress: now,
@@ -83,9 +138,7 @@ impl ScanTracker {
 
     /// The device may send columns below this index.
     fn granted(&self) -> u32 {
-        self.acknowledged_below
-            .saturating_add(u32::from(self.flow.credits))
-            .min(self.info.columns)
+        self.taken.granted(self.flow.credits, self.info.columns)
     }
 
     /// The slot of a column in flight; `None` for one handed on already, or never granted.
@@ -215,13 +268,9 @@ impl ScanTracker {
 
     /// A column is safe with the host.
     pub(super) fn acknowledge(&mut self, column: u32, now: Duration) {
-        if column < self.acknowledged_below || column >= self.next {
-            return;
-        }
         let starved = self.next >= self.granted();
-        self.acknowledged_ahead.insert(column);
-        while self.acknowledged_ahead.remove(&self.acknowledged_below) {
-            self.acknowledged_below += 1;
+        let handed = self.next.max(self.taken.handed);
+        if self.taken.acknowledged.add(column, handed) {
             self.grant_due = true;
         }
         if starved && self.next < self.granted() {
@@ -231,7 +280,7 @@ impl ScanTracker {
     }
 
     pub(super) fn all_acknowledged(&self) -> bool {
-        self.acknowledged_below >= self.total
+        self.taken.acknowledged.below() >= self.total
     }
 
     /// The grant to be sent now, if there is news, or anyway if `repeat`.
@@ -242,7 +291,7 @@ impl ScanTracker {
         self.grant_due = false;
         Some(Grant {
             scan_id: self.scan_id,
-            acknowledged_below: self.acknowledged_below,
+            acknowledged_below: self.taken.acknowledged.below(),
             send_below: self.granted(),
         })
     }

@@ -249,7 +249,9 @@ impl Device {
             ),
             HostMessage::GetLimits(_) => Frame::new(tag, &self.limits()),
             HostMessage::Heartbeat(_) => Frame::new(tag, &self.status(now)),
-            HostMessage::Home(_) | HostMessage::Scan(_) if !self.faults.is_empty() => {
+            HostMessage::Home(_) | HostMessage::Scan(_) | HostMessage::Continue(_)
+                if !self.faults.is_empty() =>
+            {
                 reject(RejectReason::Faulted, self.faults.0)
             }
             HostMessage::Home(_) if self.is_measuring() => reject(RejectReason::Busy, 0),
@@ -278,8 +280,35 @@ impl Device {
                     },
                 )
             }
-            HostMessage::Scan(_) if !self.homed => reject(RejectReason::NotHomed, 0),
-            HostMessage::Scan(_) if self.is_measuring() => reject(RejectReason::Busy, 0),
+            HostMessage::Scan(_) | HostMessage::Continue(_) if !self.homed => {
+                reject(RejectReason::NotHomed, 0)
+            }
+            HostMessage::Scan(_) | HostMessage::Continue(_) if self.is_measuring() => {
+                reject(RejectReason::Busy, 0)
+            }
+            HostMessage::Continue(request) => {
+                self.scans += 1;
+                self.laser_on = true;
+                self.activity = Activity::Scanning;
+                self.scan = Some(Scanning {
+                    id: request.scan_id,
+                    columns: request.plan.columns,
+                    next: request.first_column,
+                    acknowledged_below: request.first_column,
+                    send_below: request.first_column + u32::from(request.credits),
+                    resend: VecDeque::new(),
+                    end: None,
+                });
+                Frame::new(
+                    tag,
+                    &ScanContinued {
+                        scan_id: request.scan_id,
+                        columns: request.plan.columns,
+                        spacing_um: 400,
+                        uniform: false,
+                    },
+                )
+            }
             HostMessage::Scan(scan) => {
                 self.scans += 1;
                 self.laser_on = true;

@@ -88,7 +88,7 @@ fn plug() -> (mpsc::Sender<MemoryTransport>, impl Connector) {
 
 /// Nothing is lost between these two, so that a thread that has to wait long for a busy
 /// processor must not pass for a device that is gone.
-fn unhurried() -> LinkSettings {
+pub(crate) fn unhurried() -> LinkSettings {
     LinkSettings {
         request_timeout: Duration::from_secs(20),
         dead_man: Duration::from_secs(60),
@@ -99,7 +99,14 @@ fn unhurried() -> LinkSettings {
     }
 }
 
-fn connect(device: Device) -> (LinkScanner, Running, mpsc::Sender<MemoryTransport>) {
+pub(crate) fn connect(device: Device) -> (LinkScanner, Running, mpsc::Sender<MemoryTransport>) {
+    connect_with(device, unhurried())
+}
+
+pub(crate) fn connect_with(
+    device: Device,
+    settings: LinkSettings,
+) -> (LinkScanner, Running, mpsc::Sender<MemoryTransport>) {
     let (sockets, connector) = plug();
     let (ours, theirs) = memory::pair();
     sockets.send(ours).unwrap();
@@ -108,12 +115,12 @@ fn connect(device: Device) -> (LinkScanner, Running, mpsc::Sender<MemoryTranspor
         ..device
     };
     let running = Running::serve(Arc::new(Mutex::new(device)), theirs);
-    let scanner = LinkScanner::start(connector, unhurried()).unwrap();
+    let scanner = LinkScanner::start(connector, settings).unwrap();
     (scanner, running, sockets)
 }
 
 /// Waits for something that the device's own thread will bring about.
-fn eventually(what: &str, done: impl Fn() -> bool) {
+pub(crate) fn eventually(what: &str, done: impl Fn() -> bool) {
     let until = Instant::now() + Duration::from_secs(30);
     while !done() {
         assert!(Instant::now() < until, "never: {what}");

@@ -11,5 +11,6 @@ mod hostile;
 mod link;
 mod opening;
 mod pty;
+mod resume;
 mod scans;
 mod usb;

@@ -1,0 +1,426 @@
+//! One scan across interruptions: lost lines, restarts of the device, faults that pass.
+//!
+//! ```text
+//!              columns                 trouble
+//!  running -------------> handed on ------------> waiting <---------+
+//!     ^                                  |           | device there |
+//!     |                       a person   |           v              | trouble
+//!     |                       must look  |        homing -----------+
+//!     |                                  v           |              |
+//!     |                             told to go on    v              |
+//!     +--- the last columns, measured again, are ---- continuing ---+
+//!          as they were
+//! ```
+//!
+//! Like the session it knows neither I/O nor clocks: events of the session and the time go
+//! in; columns, each once, and word of pauses come out.
+
+mod overlap;
+mod pause;
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use scanner_protocol::{Head, Identity, ScanPlan};
+
+pub use pause::Pause;
+use pause::{Class, class};
+
+use crate::error::ScannerError;
+use crate::scanner::{RawColumn, ScanInfo};
+use crate::session::{Acknowledged, Answer, Command, Event, Session, Ticket};
+use crate::settings::ResumeSettings;
+
+/// Tickets from here on are a recovery's own.
+const OWN_TICKETS: u64 = 1 << 63;
+
+/// What a scan comes to, in order.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Progress {
+    /// The next column.
+    Column(RawColumn),
+    /// It has stopped after the last column; or it has, and the reason has changed.
+    Paused(Pause),
+    /// It goes on: the columns before and after fit together.
+    Resumed,
+    /// No column will come any more.
+    Over(Result<(), ScannerError>),
+}
+
+/// A scan from its acceptance to its end, across interruptions.
+#[derive(Debug)]
+pub struct Recovery {
+    /// Without them the first trouble ends the scan.
+    settings: Option<ResumeSettings>,
+    identity: Box<Identity>,
+    plan: ScanPlan,
+    info: ScanInfo,
+    state: State,
+    progress: VecDeque<Progress>,
+    /// Every column below has been handed on.
+    handed: u32,
+    acknowledged: Acknowledged,
+    /// The last columns handed on, to be compared.
+    kept: VecDeque<RawColumn>,
+    /// Those of them that have come again.
+    again: Vec<RawColumn>,
+    pause: Option<Paused>,
+    /// Attempts to go on since a column was last handed on.
+    attempts: u32,
+    /// The device at the other end is the one the scan was begun with.
+    same_device: bool,
+    next_ticket: u64,
+}
+
+/// A pause that has been told of.
+#[derive(Debug)]
+struct Paused {
+    told: Pause,
+    since: Duration,
+    /// A person has looked: faults may be cleared.
+    attended: bool,
+    /// Failures since it began.
+    failures: u32,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// Columns come; in a pause they are those to compare.
+    Running,
+    /// Goes on from this time on, as soon as the device is there.
+    Waiting(Duration),
+    /// Waits for a person.
+    Attended,
+    Homing(Ticket),
+    Homed,
+    Continuing(Ticket),
+    /// The scan on the device is unwanted; then a person is waited for.
+    Refused,
+    Over,
+}
+
+impl Recovery {
+    /// A scan that the device has just accepted.
+    #[must_use]
+    pub fn begun(
+        settings: Option<ResumeSettings>,
+        identity: Box<Identity>,
+        plan: ScanPlan,
+        info: ScanInfo,
+    ) -> Self {
+        Self {
+            settings,
+            identity,
+            plan,
+            info,
+            state: State::Running,
+            progress: VecDeque::new(),
+            handed: 0,
+            acknowledged: Acknowledged::default(),
+            kept: VecDeque::new(),
+            again: Vec::new(),
+            pause: None,
+            attempts: 0,
+            same_device: true,
+            next_ticket: OWN_TICKETS,
+        }
+    }
+
+    /// What has come of the scan, in order.
+    pub fn next_progress(&mut self) -> Option<Progress> {
+        self.progress.pop_front()
+    }
+
+    /// Whether it has stopped and may go on.
+    #[must_use]
+    pub fn is_paused(&self) -> bool {
+        self.pause.is_some() && self.state != State::Over
+    }
+
+    /// Whether no column will come any more.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        self.state == State::Over
+    }
+
+    /// A column is safe with the host.
+    pub fn acknowledge(&mut self, column: u32) {
+        self.acknowledged.add(column, self.handed);
+    }
+
+    /// A person says that the scan may go on.
+    ///
+    /// # Errors
+    /// [`ScannerError::NothingPaused`] if it has not stopped.
+    pub fn resume(&mut self, now: Duration) -> Result<(), ScannerError> {
+        let (Some(pause), false) = (&mut self.pause, self.state == State::Over) else {
+            return Err(ScannerError::NothingPaused);
+        };
+        pause.attended = true;
+        pause.since = now;
+        pause.failures = 0;
+        // The same trouble once more is news again.
+        if std::mem::take(&mut pause.told.needs_person) {
+            self.progress
+                .push_back(Progress::Paused(pause.told.clone()));
+        }
+        self.attempts = 0;
+        if matches!(self.state, State::Waiting(_) | State::Attended) {
+            self.state = State::Waiting(now);
+        }
+        Ok(())
+    }
+
+    /// Ends a paused scan; one that runs is ended by the session.
+    pub fn abort(&mut self) {
+        if self.is_paused() {
+            self.end(Err(ScannerError::Aborted));
+        }
+    }
+
+    /// Takes what concerns the scan from an event of the session; the rest is given back.
+    pub fn event(&mut self, event: Event, now: Duration) -> Option<Event> {
+        match event {
+            Event::Column(column) => {
+                self.column(column, now);
+                None
+            }
+            Event::ScanOver(result) => {
+                // Of a scan that has been refused no end is wanted either.
+                if self.state == State::Running {
+                    match result {
+                        Ok(()) => self.end(Ok(())),
+                        Err(error) => self.interrupted(error, now),
+                    }
+                }
+                None
+            }
+            Event::Finished(ticket, result) if ticket.0 >= OWN_TICKETS => {
+                self.finished(ticket, result, now);
+                None
+            }
+            Event::Ready(identity) => {
+                self.meet(&identity, now);
+                Some(Event::Ready(identity))
+            }
+            other => Some(other),
+        }
+    }
+
+    /// Does what is due; `session` is there while there is a connection.
+    pub fn poll(&mut self, session: Option<&mut Session>, now: Duration) {
+        let Some(settings) = &self.settings else {
+            return;
+        };
+        let unattended = settings.unattended;
+        if let (State::Waiting(_), Some(pause)) = (self.state, &mut self.pause)
+            && now >= pause.since + unattended
+        {
+            pause.told.needs_person = true;
+            self.progress
+                .push_back(Progress::Paused(pause.told.clone()));
+            self.state = State::Attended;
+        }
+        let Some(session) = session else { return };
+        if self.state == State::Refused {
+            session.close_scan();
+            let attended = self.pause.as_ref().is_some_and(|pause| pause.attended);
+            self.state = if attended {
+                State::Waiting(now)
+            } else {
+                State::Attended
+            };
+        }
+        if !session.is_ready() || !self.same_device {
+            return;
+        }
+        match self.state {
+            State::Waiting(from) if now >= from => {
+                let ticket = self.ticket();
+                self.state = State::Homing(ticket);
+                let attended = self.pause.as_ref().is_some_and(|pause| pause.attended);
+                session.command(ticket, Command::HomeAgain { attended }, now);
+            }
+            State::Homed => {
+                let ticket = self.ticket();
+                self.state = State::Continuing(ticket);
+                self.attempts += 1;
+                let first_column = self.kept.front().map_or(self.handed, |column| column.index);
+                session.go_on(
+                    ticket,
+                    self.plan,
+                    first_column,
+                    self.handed,
+                    self.acknowledged.clone(),
+                    now,
+                );
+            }
+            _ => {}
+        }
+    }
+
+    /// When [`Recovery::poll`] has something to do, events aside.
+    #[must_use]
+    pub fn deadline(&self) -> Option<Duration> {
+        let (Some(settings), Some(pause)) = (&self.settings, &self.pause) else {
+            return None;
+        };
+        match self.state {
+            State::Waiting(from) => Some(from.min(pause.since + settings.unattended)),
+            _ => None,
+        }
+    }
+
+    fn ticket(&mut self) -> Ticket {
+        self.next_ticket += 1;
+        Ticket(self.next_ticket)
+    }
+
+    fn column(&mut self, column: RawColumn, now: Duration) {
+        if self.state != State::Running {
+            return;
+        }
+        if column.index < self.handed {
+            return self.compare(column, now);
+        }
+        self.go_on();
+        self.handed = column.index + 1;
+        self.attempts = 0;
+        if let Some(settings) = &self.settings {
+            self.kept.push_back(column.clone());
+            overlap::trim(&mut self.kept, settings.overlap_columns);
+        }
+        self.progress.push_back(Progress::Column(column));
+    }
+
+    /// A column that is there already, measured again; the last of them decides.
+    fn compare(&mut self, again: RawColumn, now: Duration) {
+        let last = again.index + 1 == self.handed;
+        self.again.push(again);
+        if !last {
+            return;
+        }
+        let count_mm = match self.identity.calibration.head {
+            Head::Polar { range_count_pm, .. } => f64::from(range_count_pm) * 1e-9,
+            Head::Cartesian { count_pm } => f64::from(count_pm) * 1e-9,
+        };
+        match overlap::compare(&self.kept, &std::mem::take(&mut self.again), count_mm) {
+            Ok(()) => self.go_on(),
+            Err(how) => {
+                let error = ScannerError::Moved {
+                    column: self.handed - 1,
+                    how,
+                };
+                self.interrupted(error, now);
+                if self.state == State::Attended {
+                    self.state = State::Refused;
+                }
+            }
+        }
+    }
+
+    fn go_on(&mut self) {
+        if self.pause.take().is_some() {
+            self.progress.push_back(Progress::Resumed);
+        }
+    }
+
+    fn meet(&mut self, identity: &Identity, now: Duration) {
+        let ours = &self.identity;
+        let other = if (identity.model.as_str(), identity.serial.as_str())
+            != (ours.model.as_str(), ours.serial.as_str())
+        {
+            Some(ScannerError::OtherScanner {
+                wanted: format!("{} {}", ours.model, ours.serial),
+                found: format!("{} {}", identity.model, identity.serial),
+            })
+        } else if identity.calibration != ours.calibration {
+            Some(ScannerError::OtherCalibration)
+        } else {
+            None
+        };
+        self.same_device = other.is_none();
+        if let Some(error) = other
+            && self.is_paused()
+        {
+            self.tell(error, false, now);
+        }
+    }
+
+    fn finished(&mut self, ticket: Ticket, result: Result<Answer, ScannerError>, now: Duration) {
+        match (self.state, result) {
+            (State::Homing(ours), Ok(_)) if ours == ticket => self.state = State::Homed,
+            (State::Continuing(ours), Ok(Answer::Scan(info))) if ours == ticket => {
+                if info == self.info {
+                    self.state = State::Running;
+                    self.again.clear();
+                } else {
+                    self.end(Err(ScannerError::Protocol(format!(
+                        "it took up a scan of {} columns as one of {}",
+                        self.info.columns, info.columns
+                    ))));
+                }
+            }
+            (State::Homing(ours) | State::Continuing(ours), Err(error)) if ours == ticket => {
+                self.interrupted(error, now);
+            }
+            _ => {}
+        }
+    }
+
+    fn interrupted(&mut self, error: ScannerError, now: Duration) {
+        if self.state == State::Over {
+            return;
+        }
+        let class = class(&error);
+        let Some(settings) = self.settings.as_ref().filter(|_| class != Class::Final) else {
+            return self.end(Err(error));
+        };
+        let needs_person = class == Class::NeedsPerson || self.attempts >= settings.attempts;
+        let failures = self.pause.as_ref().map_or(0, |pause| pause.failures);
+        let wait = settings
+            .first_pause
+            .saturating_mul(1 << failures.min(16))
+            .min(settings.longest_pause);
+        self.state = if needs_person {
+            State::Attended
+        } else {
+            State::Waiting(now + wait)
+        };
+        self.tell(error, needs_person, now);
+        if let Some(pause) = &mut self.pause {
+            pause.failures += 1;
+            // Whoever has looked has seen what was then; not this.
+            pause.attended &= !needs_person;
+        }
+    }
+
+    /// Tells of a pause, unless that is known.
+    fn tell(&mut self, cause: ScannerError, needs_person: bool, now: Duration) {
+        let told = Pause {
+            cause,
+            needs_person,
+            columns: self.handed,
+        };
+        let pause = self.pause.get_or_insert_with(|| Paused {
+            told: Pause {
+                columns: u32::MAX,
+                ..told.clone()
+            },
+            since: now,
+            attended: false,
+            failures: 0,
+        });
+        if pause.told != told {
+            pause.told = told.clone();
+            self.progress.push_back(Progress::Paused(told));
+        }
+    }
+
+    fn end(&mut self, result: Result<(), ScannerError>) {
+        if self.state != State::Over {
+            self.state = State::Over;
+            self.progress.push_back(Progress::Over(result));
+        }
+    }
+}
