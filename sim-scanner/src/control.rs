@@ -30,7 +30,7 @@ pub(crate) struct Running {
     pub(crate) stalled: bool,
     /// Whether a host has the port open; unknown for endpoints without one.
     pub(crate) host_connected: Option<bool>,
-    /// The plug is out; for endpoints that have one.
+    /// The plug is out.
     pub(crate) unplugged: bool,
     /// The endpoint to the host is to be halted once; for endpoints on USB.
     pub(crate) halt_endpoint: bool,
@@ -53,6 +53,11 @@ pub struct LineUse {
 }
 
 impl Running {
+    /// Whether the plug is out, by a tester's hand or a mishap.
+    pub(crate) fn is_unplugged(&self) -> bool {
+        self.unplugged || self.device.is_unplugged()
+    }
+
     pub(crate) fn note_to_host(&mut self, bytes: usize) {
         self.line.to_host_bytes += bytes as u64;
     }
@@ -195,7 +200,18 @@ impl Control {
         self.act(|running, now| running.device.press_stop(now));
     }
 
-    /// Pulls the plug, with whatever is under way; for endpoints on USB.
+    /// See [`Device::set_interlock`].
+    pub fn set_interlock(&self, open: bool) {
+        self.act(|running, now| running.device.set_interlock(open, now));
+    }
+
+    /// See [`Device::move_part`].
+    pub fn move_part(&self, by_mm: crate::Vec3) {
+        self.act(|running, _| running.device.move_part(by_mm));
+    }
+
+    /// Pulls the plug, with whatever is under way. On a pseudo-terminal all bytes are lost; the
+    /// port stays, as that of a serial card does.
     pub fn unplug(&self) {
         self.act(|running, _| running.unplugged = true);
     }

@@ -23,6 +23,7 @@ pub mod config;
 pub mod control;
 pub mod device;
 pub mod endpoint;
+pub mod fault;
 pub mod line;
 pub mod mechanics;
 pub mod noise;

@@ -15,7 +15,7 @@ use sim_scanner::control::Control;
 use sim_scanner::device::DeviceSettings;
 use sim_scanner::endpoint::pty::PtyServer;
 use sim_scanner::endpoint::usb::{Attachment, Personality, UsbServer};
-use sim_scanner::line::LineFaults;
+use sim_scanner::fault::FaultSpec;
 use sim_scanner::preset::{Overrides, Preset};
 use sim_scanner::source::Source;
 
@@ -24,8 +24,8 @@ use sim_scanner::source::Source;
 /// With --pty it makes a pseudo-terminal, links it at LINK, and behaves on it like a scanner
 /// on a serial port. With --usbip it is a USB device that hosts attach over the network
 /// (`usbip attach -r HOST -b 1-1`), with --usb one of this machine. The signal USR1 pulls
-/// the plug of a USB device, USR2 puts it back. It serves until it is ended (Ctrl-C, or the
-/// TERM signal), when the link or device goes.
+/// the plug (of a pseudo-terminal: all bytes are lost), USR2 puts it back. It serves until it
+/// is ended (Ctrl-C, or the TERM signal), when the link or device goes.
 #[derive(Debug, Parser)]
 #[command(name = "sim-scanner", version)]
 struct Cli {
@@ -130,15 +130,19 @@ struct Cli {
     #[arg(long, default_value = "SIM-0001", value_name = "TEXT")]
     serial: String,
 
-    /// Faults of the line, as key=value,...: flip (per bit), lose, garbage and stall (per
-    /// byte), stall-ms, to (host, device or both), seed. Example: flip=1e-5,lose=1e-5,seed=7
+    /// Faults, as key=value,...: on the line flip (rate per bit), lose, double, garbage, flood
+    /// and stall (per byte), stall-ms, cut, replay, delay and reorder (per frame), delay-ms, to
+    /// (host, device or both); in the device reset, table-stall, limit-switch,
+    /// over-temperature, laser, interlock, move-part, clock-jump, unplug and wrong-serial
+    /// (rate per column), babble (per start), move-mm, hold-ms; and seed.
+    /// Example: flip=1e-5,reset=0.001,seed=7
     #[arg(
         long,
         default_value = "",
         hide_default_value = true,
         value_name = "SPEC"
     )]
-    faults: LineFaults,
+    faults: FaultSpec,
 }
 
 /// Where the scanner is offered: exactly one.
@@ -225,9 +229,11 @@ impl Cli {
                     f64::INFINITY
                 },
                 fresh_noise: self.fresh_noise,
+                feels_the_plug: self.place.pty.is_none(),
+                mishaps: self.faults.device,
                 ..DeviceSettings::default()
             },
-            line: self.faults,
+            line: self.faults.line,
             table_plane: self.table_plane,
             back_plane_mm: self.back_plane_mm,
         }

@@ -24,6 +24,8 @@ pub enum Purpose {
     Fan = 6,
     /// The shape of a scene that is drawn from a seed.
     Scene = 7,
+    /// Mishaps of the device.
+    Mishap = 8,
 }
 
 /// A stream of draws.

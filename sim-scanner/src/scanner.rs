@@ -115,6 +115,9 @@ pub struct Scanner {
     pub mechanics: Mechanics,
     /// x of the part frame at table position 0, nanometres.
     pub table_origin_nm: i64,
+    /// How far the object stands from where the part frame has it, millimetres: it has been
+    /// moved, and nobody has told the device.
+    pub part_offset_mm: crate::Vec3,
     /// How readings stray.
     pub noise: NoiseModel,
     /// Seed of everything random.
@@ -162,7 +165,11 @@ impl Scanner {
             nominal,
             sweep.pitch_counts < 0,
         );
-        let x_mm = self.x_mm(stop.reported_counts) + stop.error_mm;
+        let x_mm = self.x_mm(stop.reported_counts) + stop.error_mm - self.part_offset_mm.x;
+        // Moving the camera the other way shows it the same.
+        let mut optics = self.optics;
+        optics.camera_y_mm -= self.part_offset_mm.y;
+        optics.camera_z_mm -= self.part_offset_mm.z;
         let samples = (0..sweep.samples)
             .map(|sample| {
                 let key = SampleKey {
@@ -171,7 +178,7 @@ impl Scanner {
                     column: index,
                     sample,
                 };
-                let (sample_out, truth) = self.sample(sweep, key, x_mm);
+                let (sample_out, truth) = self.sample(sweep, key, &optics, x_mm);
                 note(sample, truth);
                 sample_out
             })
@@ -183,10 +190,16 @@ impl Scanner {
         }
     }
 
-    fn sample(&self, sweep: &Sweep, key: SampleKey, x_mm: f64) -> (Sample, SampleTruth) {
+    fn sample(
+        &self,
+        sweep: &Sweep,
+        key: SampleKey,
+        optics: &Optics,
+        x_mm: f64,
+    ) -> (Sample, SampleTruth) {
         let lateral_counts = self.lateral_counts(sweep, key);
         let angle_rad = self.angle_rad(lateral_counts);
-        let spot = self.optics.look(&self.scene, x_mm, angle_rad);
+        let spot = optics.look(&self.scene, x_mm, angle_rad);
         let reading = spot.and_then(|spot| {
             let material = self.scene.material(spot.hit.face);
             self.noise.read(key, &spot, material, self.head.window_mm)

@@ -2,6 +2,7 @@
 
 use scanner_protocol::{Calibration, Head as WireHead, Limits, RejectReason, ScanPlan};
 
+use crate::Vec3;
 use crate::preset::{COLUMNS_MAX, SAMPLES_MAX, TABLE_MM};
 use crate::replay::Replay;
 use crate::scanner::{Column, HeadKind, Scanner, Sweep};
@@ -211,14 +212,30 @@ impl Source {
     }
 
     /// Where the table stands for a column.
-    pub(crate) fn start_counts(&self, plan: &ScanPlan, accepted: Accepted) -> i32 {
+    pub(crate) fn table_counts(&self, plan: &ScanPlan, accepted: Accepted, column: u32) -> i32 {
         match self {
-            Self::Simulated { .. } => plan.first_table_counts,
+            Self::Simulated { .. } => sweep(plan).table_counts(column),
             Self::Replay(replay) => {
                 replay
-                    .column(plan, accepted.first, accepted.columns, 0)
+                    .column(plan, accepted.first, accepted.columns, column)
                     .table_counts
             }
+        }
+    }
+
+    /// How far the object stands from where the part frame has it, millimetres.
+    pub(crate) fn part_offset_mm(&self) -> Vec3 {
+        match self {
+            Self::Simulated { scanner, .. } => scanner.part_offset_mm,
+            Self::Replay(_) => Vec3::ZERO,
+        }
+    }
+
+    /// Shifts what stands on the table against where it stood at first, as when somebody bumps
+    /// into it. A recording does not care.
+    pub(crate) fn set_part_offset_mm(&mut self, offset_mm: Vec3) {
+        if let Self::Simulated { scanner, .. } = self {
+            scanner.part_offset_mm = offset_mm;
         }
     }
 }

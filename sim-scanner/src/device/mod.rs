@@ -8,6 +8,7 @@
 
 mod bench;
 mod events;
+mod mishap;
 mod requests;
 mod scan;
 mod settings;
@@ -23,12 +24,14 @@ use scanner_protocol::{
 };
 
 pub use events::{Event, Snapshot};
+pub use mishap::Mishaps;
 pub use settings::DeviceSettings;
 
 use crate::random::{Draws, Purpose};
 use crate::source::Source;
 use bench::Bench;
 use events::EventLog;
+use mishap::Mischief;
 use scan::Scan;
 use table::Drive;
 
@@ -50,6 +53,10 @@ const POLL_BYTES: usize = 4096;
 
 /// Faults that do not keep the device from working: they tell of something that is over.
 const REPORTED_ONLY: Faults = Faults::DEAD_MAN.union(Faults::OVERRUN);
+
+/// Temperature of the head at work, and when it is too hot, hundredths of a degree Celsius.
+const WARM_CDEGC: i16 = 3_150;
+const TOO_HOT_CDEGC: i16 = 7_200;
 
 /// What the table is at, scans aside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,6 +94,7 @@ pub struct Device {
     out: Vec<u8>,
     log: EventLog,
     bench: Bench,
+    mischief: Mischief,
 }
 
 impl Device {
@@ -98,6 +106,7 @@ impl Device {
             .table_min_counts
             .saturating_add(settings.parked_counts);
         let mut device = Self {
+            mischief: Mischief::new(settings.mishaps),
             source,
             settings,
             seed,
@@ -217,6 +226,8 @@ impl Device {
         self.faults = self.causes;
         self.told = self.activity(now);
         self.log.push(Event::Booted);
+        let babble = self.mischief.babble();
+        self.out.extend(babble);
         let banner = Banner {
             min_version: MIN_VERSION,
             max_version: MAX_VERSION,
@@ -232,6 +243,7 @@ impl Device {
 
     /// Lets time pass: arrivals, and a host that has been silent too long.
     fn advance(&mut self, now: Duration) {
+        self.mishaps_go_on(now);
         if let Some(dead_man) = self.session
             && self.at_work(now)
             && now.saturating_sub(self.heard) >= dead_man
@@ -319,13 +331,18 @@ impl Device {
     fn status(&self, now: Duration) -> Status {
         Status {
             boot_id: self.boot_id(),
-            uptime_ms: now.saturating_sub(self.booted).as_millis() as u32,
+            uptime_ms: (now.saturating_sub(self.booted) + self.mischief.clock_off()).as_millis()
+                as u32,
             activity: self.activity(now),
             homed: self.homed,
             laser_on: self.laser_on,
             faults: self.faults,
             table_counts: self.table_counts(now),
-            temperature_cdegc: 3_150,
+            temperature_cdegc: if self.faults.contains(Faults::OVER_TEMPERATURE) {
+                TOO_HOT_CDEGC
+            } else {
+                WARM_CDEGC
+            },
             scan_id: self.scan.as_ref().map_or(0, Scan::id),
             columns: self.scan.as_ref().map_or(0, Scan::sent),
         }
@@ -335,7 +352,11 @@ impl Device {
         let dead_man = self.safety_wake(now);
         let arrival = self.drive.moves(now).then(|| self.drive.arrival());
         let scan = self.scan.as_ref().and_then(|s| s.due(self.stepped(), now));
-        [dead_man, arrival, scan].into_iter().flatten().min()
+        let mishap = self.mischief.due();
+        [dead_man, arrival, scan, mishap]
+            .into_iter()
+            .flatten()
+            .min()
     }
 
     /// Queues a message that answers no request.

@@ -3,18 +3,18 @@
 use core::time::Duration;
 
 use scanner_protocol::commands::{
-    Aborted, FaultsCleared, Hello, HelloReply, HomeStarted, LaserSet, Move, MoveStarted, Nameplate,
-    Scan as ScanRequest, ScanAccepted, ScanClosed,
+    Aborted, Continue, FaultsCleared, Hello, HelloReply, HomeStarted, LaserSet, Move, MoveStarted,
+    Nameplate, Scan as ScanRequest, ScanAccepted, ScanClosed, ScanContinued,
 };
 use scanner_protocol::{
-    Frame, HostMessage, MAX_VERSION, MIN_VERSION, Message, Packet, RejectReason, ScanEndReason,
-    text,
+    Faults, Frame, HostMessage, MAX_VERSION, MIN_VERSION, Message, Packet, RejectReason,
+    ScanEndReason, text,
 };
 
 use super::events::Event;
 use super::scan::Scan;
 use super::{Device, Task};
-use crate::source::Refusal;
+use crate::source::{Accepted, Refusal};
 
 impl Device {
     pub(super) fn carry_out(&mut self, packet: Packet, message: HostMessage, now: Duration) {
@@ -91,7 +91,19 @@ impl Device {
                 self.set_laser(wish.on);
                 reply(tag, &LaserSet { on: wish.on })
             }
-            HostMessage::Scan(request) => self.start_scan(tag, &request, now),
+            HostMessage::Scan(request) => {
+                let accepted = self.begin(&request, 0, now)?;
+                reply(
+                    tag,
+                    &ScanAccepted {
+                        scan_id: request.scan_id,
+                        columns: accepted.columns,
+                        spacing_um: accepted.spacing_um,
+                        uniform: accepted.uniform,
+                    },
+                )
+            }
+            HostMessage::Continue(request) => self.go_on(tag, &request, now),
             HostMessage::CloseScan(close) => {
                 if self.scan.as_ref().is_some_and(|s| s.id() == close.scan_id) {
                     if self.scan.as_ref().is_some_and(Scan::is_running) {
@@ -136,8 +148,11 @@ impl Device {
         self.halt(ScanEndReason::Closed, now);
         self.scan = None;
         self.once.forget();
-        // What a silent host brought about is over once there is a new session.
-        self.faults = self.causes;
+        // What a silent host brought about is over once there is a new session. What needs a
+        // person's eye stays until somebody has said so.
+        self.faults = self
+            .causes
+            .union(self.faults.intersection(Faults::ATTENDED));
         let wish = Duration::from_millis(u64::from(hello.dead_man_ms));
         let dead_man = wish.clamp(
             self.settings.dead_man_min,
@@ -153,16 +168,40 @@ impl Device {
         self.send(&Frame::new(packet.tag, &hello_reply));
     }
 
-    fn start_scan(
+    fn go_on(&mut self, tag: u16, request: &Continue, now: Duration) -> Result<Frame, Refusal> {
+        let whole = ScanRequest {
+            scan_id: request.scan_id,
+            credits: request.credits,
+            plan: request.plan,
+        };
+        let accepted = self.begin(&whole, request.first_column, now)?;
+        reply(
+            tag,
+            &ScanContinued {
+                scan_id: request.scan_id,
+                columns: accepted.columns,
+                spacing_um: accepted.spacing_um,
+                uniform: accepted.uniform,
+            },
+        )
+    }
+
+    /// Begins a scan at one of its columns.
+    fn begin(
         &mut self,
-        tag: u16,
         request: &ScanRequest,
+        first_column: u32,
         now: Duration,
-    ) -> Result<Frame, Refusal> {
+    ) -> Result<Accepted, Refusal> {
         self.ready(now)?;
         self.known_place()?;
         let accepted = self.source.accept(&request.plan)?;
-        let start = self.source.start_counts(&request.plan, accepted);
+        if first_column >= accepted.columns {
+            return Err((RejectReason::Zero, 0));
+        }
+        let start = self
+            .source
+            .table_counts(&request.plan, accepted, first_column);
         let repeat = if self.settings.fresh_noise {
             self.scans
         } else {
@@ -174,6 +213,7 @@ impl Device {
         self.start_table(start, now);
         self.scan = Some(Scan::new(
             request,
+            first_column,
             accepted,
             repeat,
             self.settings.credits_max,
@@ -182,21 +222,13 @@ impl Device {
             scan_id: request.scan_id,
             columns: accepted.columns,
         });
-        reply(
-            tag,
-            &ScanAccepted {
-                scan_id: request.scan_id,
-                columns: accepted.columns,
-                spacing_um: accepted.spacing_um,
-                uniform: accepted.uniform,
-            },
-        )
+        Ok(accepted)
     }
 
     fn nameplate(&self) -> Nameplate {
         Nameplate {
             model: text(&self.settings.model),
-            serial: text(&self.settings.serial),
+            serial: text(self.serial()),
             firmware: text(&self.settings.firmware),
         }
     }

@@ -12,6 +12,7 @@ use scanner_protocol::{
 
 use super::events::Event;
 use super::{Device, POLL_BYTES};
+use crate::Vec3;
 use crate::scanner::{Column, Sample};
 use crate::source::Accepted;
 
@@ -38,11 +39,15 @@ pub(super) struct Scan {
     resends: VecDeque<(u32, Missing)>,
     end: Option<(ScanEndReason, Faults)>,
     next_end: Duration,
+    /// Where the object stood for the columns below an index, for each time that it was moved:
+    /// a column sent again holds what was measured.
+    moves: Vec<(u32, Vec3)>,
 }
 
 impl Scan {
     pub(super) fn new(
         request: &ScanRequest,
+        first_column: u32,
         accepted: Accepted,
         repeat: u64,
         credits_max: u16,
@@ -55,19 +60,25 @@ impl Scan {
             repeat,
             credits_max,
             begun: false,
-            sent: 0,
-            acknowledged_below: 0,
-            send_below: u32::from(request.credits).min(credits_max),
+            sent: first_column,
+            acknowledged_below: first_column,
+            send_below: first_column.saturating_add(u32::from(request.credits).min(credits_max)),
             next_column: Duration::ZERO,
             starved: false,
             resends: VecDeque::new(),
             end: None,
             next_end: Duration::ZERO,
+            moves: Vec::new(),
         }
     }
 
     pub(super) fn id(&self) -> u16 {
         self.id
+    }
+
+    /// The object is about to be moved from there.
+    pub(super) fn note_move(&mut self, from_mm: Vec3) {
+        self.moves.push((self.sent, from_mm));
     }
 
     pub(super) fn sent(&self) -> u32 {
@@ -235,6 +246,7 @@ impl Device {
         self.drive = super::table::Drive::standing(table_counts);
         self.bench.column_measured();
         self.log.push(Event::ColumnSent(index));
+        self.risk_mishaps(now);
         true
     }
 
@@ -243,9 +255,20 @@ impl Device {
         let Some(scan) = &self.scan else { return 0 };
         let scan_id = scan.id;
         let uniform = scan.accepted.uniform;
-        let column = self
-            .source
-            .column(&scan.plan, scan.accepted, scan.repeat, index);
+        let moved = scan.moves.iter().find(|(below, _)| index < *below);
+        let column = match (moved, self.source.part_offset_mm()) {
+            (Some((_, stood_mm)), stands_mm) => {
+                self.source.set_part_offset_mm(*stood_mm);
+                let column = self
+                    .source
+                    .column(&scan.plan, scan.accepted, scan.repeat, index);
+                self.source.set_part_offset_mm(stands_mm);
+                column
+            }
+            (None, _) => self
+                .source
+                .column(&scan.plan, scan.accepted, scan.repeat, index),
+        };
         let size = if uniform {
             UNIFORM_SAMPLES
         } else {

@@ -2,6 +2,8 @@
 
 use core::time::Duration;
 
+use super::mishap::Mishaps;
+
 /// Names and pace of a device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeviceSettings {
@@ -28,6 +30,10 @@ pub struct DeviceSettings {
     /// Whether each scan has noise of its own (speckle stays the surface's). Otherwise equal
     /// scans are equal to the bit.
     pub fresh_noise: bool,
+    /// Whether it notices that the cable is out, as on USB.
+    pub feels_the_plug: bool,
+    /// What goes wrong by itself.
+    pub mishaps: Mishaps,
 }
 
 impl Default for DeviceSettings {
@@ -44,6 +50,8 @@ impl Default for DeviceSettings {
             credits_max: 64,
             scan_end_repeat: Duration::from_millis(250),
             fresh_noise: false,
+            feels_the_plug: false,
+            mishaps: Mishaps::default(),
         }
     }
 }

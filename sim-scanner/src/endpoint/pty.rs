@@ -215,6 +215,16 @@ impl Worker {
             running.host_connected = Some(connected);
         }
         let now = shared.now();
+        if running.is_unplugged() {
+            self.lose_everything();
+            let poll = running.device.poll(now);
+            shared.notify();
+            return Some(Wait {
+                readable: true,
+                writable: false,
+                until: poll.wake,
+            });
+        }
         let line_silent = now < self.silent_until;
         if running.stalled || line_silent {
             // The device hears nothing, yet its dead-man time runs on.
@@ -237,9 +247,14 @@ impl Worker {
                 Ok(count) => {
                     let bytes = buffer.get(..count).unwrap_or_default();
                     running.note_from_host(count);
-                    running.device.receive(&self.to_device.carry(bytes), now);
+                    running
+                        .device
+                        .receive(&self.to_device.carry(bytes, now), now);
                 }
             }
+        }
+        if self.to_device.due().is_some_and(|due| due <= now) {
+            running.device.receive(&self.to_device.carry(&[], now), now);
         }
         let was_busy = !self.pending.is_empty();
         let mut wake = None;
@@ -267,12 +282,26 @@ impl Worker {
         Some(Wait {
             readable: true,
             writable: !self.pending.is_empty(),
-            until: wake,
+            until: [wake, self.to_host.due(), self.to_device.due()]
+                .into_iter()
+                .flatten()
+                .min(),
         })
     }
 
+    /// The cable is out: what is under way, in both directions, is lost.
+    fn lose_everything(&mut self) {
+        let mut sink = [0; 4096];
+        while self.connected && matches!(rustix::io::read(&self.main, &mut sink), Ok(1..)) {}
+        self.pending.clear();
+        self.to_host.cut_off();
+        self.to_device.cut_off();
+        self.silent_until = Duration::ZERO;
+    }
+
     fn queue(&mut self, bytes: &[u8]) {
-        let carried = self.to_host.carry(bytes);
+        let now = self.shared.now();
+        let carried = self.to_host.carry(bytes, now);
         self.pending.extend(carried);
         let stalls = [self.to_host.take_stall(), self.to_device.take_stall()];
         for stall in stalls.into_iter().flatten() {

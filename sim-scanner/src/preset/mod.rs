@@ -255,6 +255,7 @@ impl Preset {
             },
             // Table position 0 is at the home switch, left of the object.
             table_origin_nm: libm::round((middle.x - TABLE_MM / 2.0) * 1e3) as i64 * 1000,
+            part_offset_mm: crate::Vec3::ZERO,
             noise,
             seed,
         };

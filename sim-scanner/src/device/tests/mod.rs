@@ -1,5 +1,6 @@
 //! The device in memory, with a clock that the test moves.
 
+mod mishaps;
 mod requests;
 mod safety;
 mod scans;

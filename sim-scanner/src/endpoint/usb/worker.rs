@@ -115,15 +115,18 @@ impl Worker {
 
     /// Pulls the plug, or puts it back.
     fn mind_the_plug(&mut self, running: &Running) {
-        if running.unplugged && !self.unplugged {
+        let unplugged = running.is_unplugged();
+        if unplugged && !self.unplugged {
             self.host = None;
             self.strangers.clear();
+            self.to_host.cut_off();
+            self.to_device.cut_off();
         }
-        if self.unplugged && !running.unplugged && self.listener.is_none() {
+        if self.unplugged && !unplugged && self.listener.is_none() {
             // The port may be taken by now; then the device stays unplugged.
             let _ = self.attach_to_this_machine();
         }
-        self.unplugged = running.unplugged;
+        self.unplugged = unplugged;
     }
 
     fn note_connection(&mut self, running: &mut Running, now: Duration) {
@@ -148,9 +151,11 @@ impl Worker {
             return [poll.wake, silence].into_iter().flatten().min();
         }
         let heard = self.function.hear();
-        if !heard.is_empty() {
+        if !heard.is_empty() || self.to_device.due().is_some_and(|due| due <= now) {
             running.note_from_host(heard.len());
-            running.device.receive(&self.to_device.carry(&heard), now);
+            running
+                .device
+                .receive(&self.to_device.carry(&heard, now), now);
         }
         if self.function.has_spoken() {
             let (bytes, wake) = poll_burst(&mut running.device, now);
@@ -159,7 +164,10 @@ impl Worker {
                 // All of it has been fetched, and there may be more.
                 return Some(now);
             }
-            return wake;
+            return [wake, self.to_host.due(), self.to_device.due()]
+                .into_iter()
+                .flatten()
+                .min();
         }
         // The host does not fetch: no more columns, but laser and table stay guarded.
         let due = running.device.safety_wake(now)?;
@@ -170,7 +178,7 @@ impl Worker {
     }
 
     fn speak(&mut self, running: &mut Running, bytes: &[u8], now: Duration) {
-        let carried = self.to_host.carry(bytes);
+        let carried = self.to_host.carry(bytes, now);
         let stalls = [self.to_host.take_stall(), self.to_device.take_stall()];
         for stall in stalls.into_iter().flatten() {
             self.silent_until = now + stall;
