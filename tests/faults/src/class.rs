@@ -1,0 +1,155 @@
+//! The classes of faults, at rates that a device can recover from.
+
+use sim_scanner::fault::FaultSpec;
+
+use crate::scene::Dice;
+use crate::simulation::Conditions;
+
+/// Who ends what a class of faults brings about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Need {
+    /// Nobody: scans end by themselves.
+    Nobody,
+    /// A person: the scan stops with a cause that has these words in it.
+    Person(&'static str),
+}
+
+/// A class of faults.
+#[derive(Debug, Clone, Copy)]
+pub struct Class {
+    /// Its name, as the simulator's.
+    pub name: &'static str,
+    /// The rate, and of what.
+    pub rate: f64,
+    /// What the rate is per.
+    pub per: &'static str,
+    /// Who ends it.
+    pub need: Need,
+}
+
+const fn class(name: &'static str, rate: f64, per: &'static str) -> Class {
+    Class {
+        name,
+        rate,
+        per,
+        need: Need::Nobody,
+    }
+}
+
+const fn person(name: &'static str, rate: f64, words: &'static str) -> Class {
+    Class {
+        name,
+        rate,
+        per: "column",
+        need: Need::Person(words),
+    }
+}
+
+/// The host does nothing for a while, as a computer that sleeps.
+pub const HOST_SLEEP: &str = "host-sleep";
+
+/// All classes.
+pub const CLASSES: [Class; 22] = [
+    class("flip", 1e-4, "bit"),
+    class("lose", 1e-3, "byte"),
+    class("double", 1e-3, "byte"),
+    class("garbage", 1e-3, "byte"),
+    class("flood", 2e-5, "byte"),
+    class("stall", 2e-5, "byte"),
+    class("cut", 0.05, "frame"),
+    class("replay", 0.05, "frame"),
+    class("delay", 0.05, "frame"),
+    class("reorder", 0.1, "frame"),
+    class("reset", 0.02, "column"),
+    class("babble", 1.0, "start"),
+    class("table-stall", 0.02, "column"),
+    class("over-temperature", 0.02, "column"),
+    class("clock-jump", 0.05, "column"),
+    class("unplug", 0.02, "column"),
+    class("wrong-serial", 0.01, "column"),
+    class(HOST_SLEEP, 0.02, "column"),
+    person("limit-switch", 0.02, "limit switch hit"),
+    person("laser", 0.02, "laser fault"),
+    person("interlock", 0.02, "interlock open"),
+    person("move-part", 0.02, "has moved"),
+];
+
+impl Class {
+    /// The class of a name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<&'static Self> {
+        CLASSES.iter().find(|class| class.name == name)
+    }
+
+    /// A scan under this class alone.
+    #[must_use]
+    pub fn alone(&self, seed: u64) -> Conditions {
+        conditions(&[(self, self.rate)], seed)
+    }
+}
+
+/// A scan under several classes, drawn from the seed, each at up to its rate.
+#[must_use]
+pub fn mix(seed: u64) -> (Conditions, Vec<&'static Class>) {
+    let mut dice = Dice::new(seed, 1);
+    let mut chosen = Vec::new();
+    for class in &CLASSES {
+        let share = if class.need == Need::Nobody { 0.3 } else { 0.1 };
+        let rate = class.rate * 10.0_f64.powf(-2.0 * dice.uniform());
+        if dice.uniform() < share {
+            chosen.push((class, rate));
+        }
+    }
+    let conditions = conditions(&chosen, seed);
+    (
+        conditions,
+        chosen.into_iter().map(|(class, _)| class).collect(),
+    )
+}
+
+fn conditions(classes: &[(&Class, f64)], seed: u64) -> Conditions {
+    let mut faults = FaultSpec::default();
+    let mut host_sleep = 0.0;
+    for (class, rate) in classes {
+        let (line, device) = (&mut faults.line, &mut faults.device);
+        let place = match class.name {
+            "flip" => &mut line.flip,
+            "lose" => &mut line.lose,
+            "double" => &mut line.double,
+            "garbage" => &mut line.garbage,
+            "flood" => &mut line.flood,
+            "stall" => &mut line.stall,
+            "cut" => &mut line.cut,
+            "replay" => &mut line.replay,
+            "delay" => &mut line.delay,
+            "reorder" => &mut line.reorder,
+            "reset" => &mut device.reset,
+            "babble" => {
+                // Nothing babbles that does not start.
+                device.reset = device.reset.max(0.02 * rate);
+                &mut device.babble
+            }
+            "table-stall" => &mut device.table_stall,
+            "over-temperature" => &mut device.over_temperature,
+            "clock-jump" => &mut device.clock_jump,
+            "unplug" => &mut device.unplug,
+            "wrong-serial" => &mut device.wrong_serial,
+            "limit-switch" => &mut device.limit_switch,
+            "laser" => &mut device.laser,
+            "interlock" => &mut device.interlock,
+            "move-part" => &mut device.move_part,
+            _ => &mut host_sleep,
+        };
+        *place = *rate;
+    }
+    faults.line.seed = seed;
+    faults.device.seed = seed;
+    Conditions {
+        seed,
+        faults,
+        host_sleep,
+        careless: false,
+        // Every other scan is on a line that nobody sees being pulled.
+        feels_the_plug: seed.is_multiple_of(2),
+    }
+}
