@@ -5,6 +5,7 @@ use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
+use storage::{Appender, Disk, LocalDisk};
 
 use crate::manifest::ManifestFile;
 
@@ -30,16 +31,23 @@ impl<W: Write> Write for Hashing<W> {
 
 /// Writes a file under its final name, syncs it, and tells what it holds.
 pub(crate) fn write_synced<E: From<io::Error>>(
+    disk: &dyn Disk,
     directory: &Path,
     name: &str,
     content: impl FnOnce(&mut dyn Write) -> Result<(), E>,
 ) -> Result<ManifestFile, E> {
-    let file = File::create(directory.join(name))?;
-    fill(file, name, content)
+    fill(emptied(disk, &directory.join(name))?, name, content)
+}
+
+/// A file without content, whatever it held before.
+fn emptied(disk: &dyn Disk, path: &Path) -> io::Result<Appender> {
+    let file = disk.open(path)?;
+    file.set_len(0)?;
+    Ok(Appender::new(file))
 }
 
 fn fill<E: From<io::Error>>(
-    file: File,
+    file: Appender,
     name: &str,
     content: impl FnOnce(&mut dyn Write) -> Result<(), E>,
 ) -> Result<ManifestFile, E> {
@@ -54,7 +62,7 @@ fn fill<E: From<io::Error>>(
     );
     content(&mut sink)?;
     let hashed = sink.into_inner().map_err(io::IntoInnerError::into_error)?;
-    hashed.sink.sync_all()?;
+    hashed.sink.sync_data()?;
     Ok(ManifestFile {
         name: name.to_owned(),
         bytes: hashed.bytes,
@@ -82,7 +90,7 @@ pub fn write_atomically<E: From<io::Error>>(
         _ => PathBuf::from("."),
     };
     let temporary = directory.join(format!(".{name}.{}.part", std::process::id()));
-    let written = File::create(&temporary)
+    let written = emptied(&LocalDisk, &temporary)
         .map_err(E::from)
         .and_then(|file| fill(file, &name, content))
         .and_then(|entry| {
@@ -135,7 +143,7 @@ mod tests {
         // FIPS 180-2, appendix B.1.
         let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         let directory = tempfile::tempdir().unwrap();
-        let entry = write_synced::<io::Error>(directory.path(), "a", |sink| {
+        let entry = write_synced::<io::Error>(&LocalDisk, directory.path(), "a", |sink| {
             sink.write_all(b"a")?;
             sink.write_all(b"bc")
         })

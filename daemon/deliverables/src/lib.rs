@@ -11,6 +11,7 @@ mod file;
 mod manifest;
 pub mod picture;
 pub mod report;
+mod shape;
 mod stopwatch;
 mod summary;
 mod write;
@@ -21,6 +22,6 @@ pub use manifest::{MANIFEST_NAME, Manifest, ManifestFile};
 pub use report::{Report, ScanReport};
 pub use stopwatch::Stopwatch;
 pub use write::{
-    DeliverError, Delivered, INLIERS_PICTURE_NAME, Inputs, RANGE_PICTURE_NAME,
+    DeliverError, Delivered, INLIERS_PICTURE_NAME, Inputs, Pictures, RANGE_PICTURE_NAME,
     REGIONS_PICTURE_NAME, REPORT_NAME, RESIDUALS_PICTURE_NAME, write, write_pictures,
 };

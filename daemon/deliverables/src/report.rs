@@ -155,6 +155,9 @@ pub struct RegionReport {
     pub label: u16,
     /// What its surface is; `none` where no face could be made of it.
     pub kind: String,
+    /// What shape its nodes speak for, whatever the faces in the CAD file are made of.
+    #[serde(default)]
+    pub shape: Option<ShapeReport>,
     /// Names of its faces in the CAD file.
     pub faces: Vec<String>,
     /// Patches of its surfaces, in all.
@@ -170,6 +173,16 @@ pub struct RegionReport {
     pub max_mm: Option<f64>,
     /// Peak signal-to-noise ratio of the surface at the region's nodes.
     pub psnr_db: Option<f64>,
+}
+
+/// The shape of a region.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ShapeReport {
+    /// `plane`, `sphere`, `cylinder`, `cone`, `torus` or `free-form`.
+    pub family: String,
+    /// Whether it is seen from within, as a bore or a fillet is; absent for a plane and a
+    /// free form.
+    pub hollow: Option<bool>,
 }
 
 /// What was removed as background.

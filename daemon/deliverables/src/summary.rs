@@ -11,6 +11,7 @@ use crate::report::{
     BackgroundRegionReport, BackgroundReport, CrumbReport, CrumbsReport, ModelReport,
     RangeImageReport, RegionReport, RegionsReport, Report, SettingsReport,
 };
+use crate::shape::shape;
 use crate::write::Inputs;
 
 impl Report {
@@ -103,9 +104,11 @@ fn regions(outcome: &Outcome) -> RegionsReport {
         .iter()
         .map(|fit| {
             let own = || faces.iter().filter(|face| face.region == fit.label);
+            let mut kinds = outcome.kinds.iter();
             RegionReport {
                 label: fit.label,
                 kind: own().next().map_or("none", kind).to_owned(),
+                shape: kinds.find(|k| k.label.get() == fit.label).and_then(shape),
                 faces: own().map(|face| face.name.clone()).collect(),
                 patches: fit.patches,
                 nodes: fit.nodes,

@@ -7,11 +7,12 @@ use std::path::Path;
 use jiff::Timestamp;
 use pipeline::{Observer, Outcome, Settings, Stage};
 use range_image::{Cancelled, Monitor, RangeImage};
+use storage::{Disk, LocalDisk, remove_file_if_there};
 
 use reconstruct::RegionFit;
 
 use crate::export::{CadOptions, WriteError, file_stem, write_iges};
-use crate::file::{sync_directory, write_synced};
+use crate::file::write_synced;
 use crate::manifest::{MANIFEST_NAME, Manifest, ManifestFile};
 use crate::picture;
 use crate::report::{Report, ScanReport};
@@ -79,8 +80,22 @@ pub const RESIDUALS_PICTURE_NAME: &str = "residuals.png";
 /// Name of the picture of the share of inliers around each node.
 pub const INLIERS_PICTURE_NAME: &str = "inliers.png";
 
-/// Writes `<name>.igs`, the pictures, `report.json` and `manifest.json` into an existing directory that nobody else looks at, and syncs them and it. The caller
-/// then puts the directory in its place by one rename.
+/// Whether pictures are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pictures {
+    /// As long as the disk has room for them; a warning in the report if it has not.
+    Drawn,
+    /// The disk is nearly full: only what cannot be seen otherwise is written.
+    LeftOut,
+}
+
+/// What stands in the report where pictures are missing.
+const NO_PICTURES: &str = "the pictures were left out, since the disk is nearly full: make room \
+     and run the scan again to have them";
+
+/// Writes `<name>.igs`, the pictures, `report.json` and `manifest.json` into an existing
+/// directory of this disk that nobody else looks at, and syncs them and it. The caller then
+/// puts the directory in its place by one rename.
 ///
 /// The stopwatch that has timed the pipeline goes on with the stages here, so that the
 /// report holds them all; only the time of writing the report itself is missing from it.
@@ -88,8 +103,10 @@ pub const INLIERS_PICTURE_NAME: &str = "inliers.png";
 /// # Errors
 /// [`DeliverError`]. What was already written stays for the caller to remove.
 pub fn write(
+    disk: &dyn Disk,
     directory: &Path,
     inputs: &Inputs<'_>,
+    pictures: Pictures,
     watch: &Stopwatch<'_>,
 ) -> Result<Delivered, DeliverError> {
     let model = &inputs.outcome.reconstruction.model;
@@ -99,6 +116,7 @@ pub fn write(
     watch.stage(Stage::Export);
     let cad_name = format!("{}.igs", file_stem(inputs.name));
     files.push(write_synced::<DeliverError>(
+        disk,
         directory,
         &cad_name,
         |sink| {
@@ -115,11 +133,24 @@ pub fn write(
 
     watch.check()?;
     watch.stage(Stage::Pictures);
-    files.extend(write_pictures(directory, inputs)?);
+    let drawn = match pictures {
+        Pictures::Drawn => unless_full(pictures_on(disk, directory, inputs))?,
+        Pictures::LeftOut => None,
+    };
+    let mut report = Report::new(inputs, watch.read());
+    match drawn {
+        Some(drawn) => files.extend(drawn),
+        None => {
+            // Those that were drawn before the disk was full take the room of the report.
+            for name in PICTURE_NAMES {
+                remove_file_if_there(disk, &directory.join(name))?;
+            }
+            report.warnings.push(NO_PICTURES.to_owned());
+        }
+    }
     watch.progress(1.0);
 
-    let report = Report::new(inputs, watch.read());
-    files.push(write_json(directory, REPORT_NAME, &report)?);
+    files.push(write_json(disk, directory, REPORT_NAME, &report)?);
     let manifest = Manifest {
         name: report.name.clone(),
         timestamp: report.timestamp.clone(),
@@ -128,13 +159,35 @@ pub fn write(
         seed: report.settings.seed,
         settings: report.settings.clone(),
     };
-    files.push(write_json(directory, MANIFEST_NAME, &manifest)?);
-    sync_directory(directory)?;
+    files.push(write_json(disk, directory, MANIFEST_NAME, &manifest)?);
+    disk.sync_dir(directory)?;
     Ok(Delivered {
         report,
         manifest,
         files,
     })
+}
+
+const PICTURE_NAMES: [&str; 4] = [
+    RANGE_PICTURE_NAME,
+    REGIONS_PICTURE_NAME,
+    RESIDUALS_PICTURE_NAME,
+    INLIERS_PICTURE_NAME,
+];
+
+/// `None` for what there was no room for.
+fn unless_full<T>(written: io::Result<T>) -> io::Result<Option<T>> {
+    match written {
+        Err(error)
+            if matches!(
+                error.kind(),
+                io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded
+            ) =>
+        {
+            Ok(None)
+        }
+        other => other.map(Some),
+    }
 }
 
 /// Regions up to this number stand in the legend by their labels, more by their sizes,
@@ -147,6 +200,14 @@ const LISTED_BY_LABEL: usize = 12;
 /// # Errors
 /// What the file system reports.
 pub fn write_pictures(directory: &Path, inputs: &Inputs<'_>) -> io::Result<Vec<ManifestFile>> {
+    pictures_on(&LocalDisk, directory, inputs)
+}
+
+fn pictures_on(
+    disk: &dyn Disk,
+    directory: &Path,
+    inputs: &Inputs<'_>,
+) -> io::Result<Vec<ManifestFile>> {
     let (image, outcome, name) = (inputs.image, inputs.outcome, inputs.name);
     let mut largest: Vec<&RegionFit> = outcome.reconstruction.regions.iter().collect();
     if largest.len() > LISTED_BY_LABEL {
@@ -163,30 +224,34 @@ pub fn write_pictures(directory: &Path, inputs: &Inputs<'_>) -> io::Result<Vec<M
         })
         .collect();
     let mut written = vec![
-        write_synced(directory, RANGE_PICTURE_NAME, |sink| {
+        write_synced(disk, directory, RANGE_PICTURE_NAME, |sink| {
             picture::write_range(image, name, sink)
         })?,
-        write_synced(directory, REGIONS_PICTURE_NAME, |sink| {
+        write_synced(disk, directory, REGIONS_PICTURE_NAME, |sink| {
             picture::write_regions(image, outcome, &notes, name, sink)
         })?,
-        write_synced(directory, RESIDUALS_PICTURE_NAME, |sink| {
+        write_synced(disk, directory, RESIDUALS_PICTURE_NAME, |sink| {
             picture::write_residuals(image, outcome, name, sink)
         })?,
     ];
     if let Some(inliers) = picture::inliers(image, name) {
-        written.push(write_synced(directory, INLIERS_PICTURE_NAME, |sink| {
-            inliers.write(sink)
-        })?);
+        written.push(write_synced(
+            disk,
+            directory,
+            INLIERS_PICTURE_NAME,
+            |sink| inliers.write(sink),
+        )?);
     }
     Ok(written)
 }
 
 fn write_json(
+    disk: &dyn Disk,
     directory: &Path,
     name: &str,
     document: &impl serde::Serialize,
 ) -> Result<ManifestFile, DeliverError> {
-    write_synced(directory, name, |sink| {
+    write_synced(disk, directory, name, |sink| {
         serde_json::to_writer_pretty(&mut *sink, document)?;
         sink.write_all(b"\n")?;
         Ok(())

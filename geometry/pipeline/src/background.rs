@@ -4,7 +4,7 @@ use core::fmt;
 use core::str::FromStr;
 
 use range_image::{RangeImage, RegionMap};
-use segment::{Background, View};
+use segment::Background;
 
 /// What is done with a recognised table, back plane or fixture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -72,35 +72,17 @@ pub struct Crumb {
     pub centre_mm: [f64; 3],
 }
 
-/// The part, apart from what surrounds it.
-#[derive(Debug, Clone)]
-pub(crate) struct Separated {
-    /// The range image with the background masked; `None` where that is none.
-    pub(crate) image: Option<RangeImage>,
-    pub(crate) regions: RegionMap,
-    pub(crate) background: Background,
-    pub(crate) roles: Vec<NodeRole>,
-    pub(crate) crumbs: Vec<Crumb>,
-}
-
 /// Nodes without a region that lie this near to a background plane are scraps of it,
 /// pitches.
 const SCRAP_PITCHES: f64 = 1.0;
 
-pub(crate) fn separate(
-    image: &RangeImage,
-    map: RegionMap,
-    view: &View,
-    policy: BackgroundPolicy,
-) -> Separated {
-    let background = match policy {
-        BackgroundPolicy::Remove => segment::background(image, &map, view),
-        BackgroundPolicy::Keep => Background::default(),
-    };
+/// What each node of a background region or without a region counts as, by the image's first
+/// division into regions; all others are of the part.
+pub(crate) fn roles(image: &RangeImage, map: &RegionMap, background: &Background) -> Vec<NodeRole> {
     let scrap_mm = SCRAP_PITCHES * image.pitch_mm();
     let rows = image.rows().max(1);
     let labels = map.raw_labels().iter().zip(image.raw_z_mm()).enumerate();
-    let roles: Vec<NodeRole> = labels
+    labels
         .map(|(k, (&label, &z))| {
             let scrap =
                 || background.holds(image.x_mm(k / rows), image.y_mm(k % rows), z, scrap_mm);
@@ -116,38 +98,23 @@ pub(crate) fn separate(
                 NodeRole::Part
             }
         })
-        .collect();
-    let crumbs = crumbs(image, &roles);
-    if background.regions.is_empty() {
-        return Separated {
-            image: None,
-            regions: map,
-            background,
-            roles,
-            crumbs,
-        };
-    }
+        .collect()
+}
+
+/// The image without the nodes of the background.
+pub(crate) fn masked(image: &RangeImage, roles: &[NodeRole]) -> RangeImage {
     let mut part = image.clone();
-    let mut labels = map.raw_labels().to_vec();
+    let rows = image.rows().max(1);
     for (k, role) in roles.iter().enumerate() {
         if *role == NodeRole::Background {
             part.set_z_mm(k / rows, k % rows, None);
-            if let Some(label) = labels.get_mut(k) {
-                *label = 0;
-            }
         }
     }
-    Separated {
-        regions: RegionMap::new(&part, labels),
-        image: Some(part),
-        background,
-        roles,
-        crumbs,
-    }
+    part
 }
 
 /// The crumbs, the largest first.
-fn crumbs(image: &RangeImage, roles: &[NodeRole]) -> Vec<Crumb> {
+pub(crate) fn crumbs(image: &RangeImage, roles: &[NodeRole]) -> Vec<Crumb> {
     let rows = image.rows().max(1);
     let is_crumb = |k: usize| roles.get(k) == Some(&NodeRole::Crumb);
     let mut seen = vec![false; roles.len()];
@@ -206,16 +173,16 @@ mod tests {
             labels[column * 4 + row] = label;
         }
         let map = RegionMap::new(&image, labels);
-        let found = separate(&image, map, &View::default(), BackgroundPolicy::Remove);
-        assert!(found.image.is_none());
-        assert_eq!(found.crumbs.len(), 2);
-        assert_eq!(found.crumbs[0].nodes, 3);
+        let roles = roles(&image, &map, &Background::default());
+        let found = crumbs(&image, &roles);
+        assert_eq!(found.len(), 2);
+        assert_eq!(found[0].nodes, 3);
         let expected = [14.0 / 3.0, 10.0 / 3.0, 6.0];
-        for (found, expected) in found.crumbs[0].centre_mm.iter().zip(expected) {
+        for (found, expected) in found[0].centre_mm.iter().zip(expected) {
             assert!((found - expected).abs() < 1e-12);
         }
-        assert_eq!(found.crumbs[1].centre_mm, [8.0, 6.0, 9.0]);
-        let count = |role| found.roles.iter().filter(|&&r| r == role).count();
+        assert_eq!(found[1].centre_mm, [8.0, 6.0, 9.0]);
+        let count = |role| roles.iter().filter(|&&r| r == role).count();
         assert_eq!(count(NodeRole::Part), 2);
         assert_eq!((count(NodeRole::Crumb), count(NodeRole::Masked)), (4, 14));
     }

@@ -55,6 +55,17 @@ impl Extent {
         }))
     }
 
+    /// Of these samples and those together, for scans that are read piece by piece.
+    #[must_use]
+    pub fn joined(self, other: Self) -> Self {
+        Self {
+            samples: self.samples + other.samples,
+            first: self.first,
+            low: [0, 1].map(|k| self.low[k].min(other.low[k])),
+            high: [0, 1].map(|k| self.high[k].max(other.high[k])),
+        }
+    }
+
     /// Number of samples.
     #[must_use]
     pub fn samples(&self) -> usize {
@@ -94,8 +105,15 @@ impl Extent {
     /// The finest grid for these samples, millimetres between its nodes.
     #[must_use]
     pub fn finest_pitch_mm(&self) -> f64 {
+        self.finest_pitch_among_mm(self.samples)
+    }
+
+    /// The finest grid for this extent if there are so many samples, some of them perhaps
+    /// still to come; millimetres between its nodes.
+    #[must_use]
+    pub fn finest_pitch_among_mm(&self, samples: usize) -> f64 {
         let [width, height] = self.sides_mm();
-        let nodes = NODES_ALWAYS.max(self.samples as f64 * NODES_PER_SAMPLE);
+        let nodes = NODES_ALWAYS.max(samples as f64 * NODES_PER_SAMPLE);
         let pitch_mm = (width * height / nodes).sqrt();
         // Two digits, not finer than what is allowed.
         let digit = libm::pow(10.0, libm::log10(pitch_mm).floor() - 1.0);
@@ -166,6 +184,26 @@ mod tests {
             Column::new(x, vec![sample])
         };
         points.iter().map(column).collect()
+    }
+
+    #[test]
+    fn pieces_come_to_the_same_as_the_whole() {
+        let column = |x_mm: f64, y_mm: &[f64]| {
+            let sample = |&y_mm: &f64| Sample {
+                y_mm,
+                z_mm: 0.0,
+                intensity: 0,
+            };
+            Column::new(x_mm, y_mm.iter().map(sample).collect())
+        };
+        let columns = [
+            column(1.0, &[2.0, -7.0]),
+            column(5.0, &[]),
+            column(-3.0, &[4.0]),
+            column(2.0, &[9.0, 1.0]),
+        ];
+        let pieces = columns.chunks(1).filter_map(Extent::of);
+        assert_eq!(pieces.reduce(Extent::joined), Extent::of(&columns));
     }
 
     #[test]

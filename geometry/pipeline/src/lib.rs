@@ -12,15 +12,19 @@
 
 mod background;
 mod extent;
+mod kinds;
 mod method;
 mod observer;
+mod part;
 mod process;
 mod settings;
 
 pub use background::{BackgroundPolicy, Crumb, NodeRole, UnknownPolicy};
 pub use extent::{Extent, no_surface, unusual_size};
+pub use kinds::{RegionKind, kinds};
 pub use method::{Method, UnknownMethod};
 pub use observer::{Observer, Stage};
+pub use part::{Part, divide};
 pub use process::{Outcome, PipelineError, process, process_columns, process_in_view};
 pub use segment::{Background, BackgroundKind, BackgroundRegion, Plane, View};
 pub use settings::{Settings, SettingsError};

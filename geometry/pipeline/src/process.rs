@@ -5,7 +5,8 @@ use reconstruct::{ReconstructError, Reconstruction};
 use regrid::RegridError;
 use segment::SegmentError;
 
-use crate::background::separate;
+use crate::kinds::{RegionKind, kinds};
+use crate::part::divide;
 use crate::{Background, Crumb, NodeRole, View};
 use crate::{Observer, Settings, SettingsError, Stage};
 
@@ -21,6 +22,8 @@ pub struct Outcome {
     pub roles: Vec<NodeRole>,
     /// Connected nodes that belong to no region, the largest first.
     pub crumbs: Vec<Crumb>,
+    /// What kind of surface each region of the part is, in the order of their labels.
+    pub kinds: Vec<RegionKind>,
     /// The model made of them, and how well it fits.
     pub reconstruction: Reconstruction,
     /// The stages that ran, in order.
@@ -202,26 +205,20 @@ pub fn process_in_view(
         });
     }
 
-    observer.stage(Stage::Segment);
-    let regions = segment::segment(image, &settings.segment, observer)?;
-    if regions.regions() == 0 {
-        let pitch_mm = image.pitch_mm();
-        return Err(PipelineError::NoSurface { nodes, pitch_mm });
-    }
-
     let view = view.within(roi.x_mm, roi.y_mm);
-    let part = separate(image, regions, &view, settings.background);
-    observer.check()?;
+    let part = divide(image, &view, settings, observer)?;
 
     observer.stage(Stage::Reconstruct);
     let part_image = part.image.as_ref().unwrap_or(image);
     let reconstruction =
         reconstruct::reconstruct(part_image, &part.regions, &settings.reconstruct, observer)?;
+    let kinds = kinds(part_image, &part.regions, observer)?;
     Ok(Outcome {
         regions: part.regions,
         background: part.background,
         roles: part.roles,
         crumbs: part.crumbs,
+        kinds,
         reconstruction,
         stages: vec![Stage::Segment, Stage::Reconstruct],
     })

@@ -3,7 +3,10 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use pipeline::{Method, Observer, PipelineError, Settings, Stage, process, process_columns};
+use pipeline::{
+    Method, NodeRole, Observer, PipelineError, Settings, Stage, View, divide, process,
+    process_columns,
+};
 use range_image::{Column, Lattice, Monitor, RangeImage, Sample, Unmonitored};
 
 /// A roof of two planes that meet at x = 0, 24 mm square, columns 0.5 mm apart.
@@ -138,4 +141,63 @@ fn settings_are_refused_with_their_stage() {
     assert!(refused(|s| s.reconstruct.tolerance_mm = f64::NAN).starts_with("reconstruct: "));
     assert!("relif".parse::<Method>().is_err());
     assert_eq!("shim-lee".parse::<Method>(), Ok(Method::ShimLee));
+}
+
+/// A rough roof of three planes before a smooth plane that fills the rest of the view, or
+/// nothing where that is left out.
+fn rough_roof(behind: bool) -> RangeImage {
+    let (columns, rows) = (120, 100);
+    let mut image = RangeImage::masked(Lattice { pitch_mm: 0.5 }, 0, 0, columns, rows);
+    let mut state = 7_u64;
+    let mut stray_mm = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        0.3 * ((state >> 40) as f64 / f64::from(1 << 24) - 0.5)
+    };
+    for column in 0..columns {
+        for row in 0..rows {
+            let (x, y) = (image.x_mm(column) - 30.0, image.y_mm(row) - 25.0);
+            let stray_mm = stray_mm();
+            let on_roof = x.abs() < 15.0 && y.abs() < 12.0;
+            let z_mm = if on_roof {
+                Some(40.0 - (0.5 * x).max(-0.3 * x) - (0.2 * y).max(0.0) + stray_mm)
+            } else {
+                behind.then_some(0.05 * x)
+            };
+            image.set_z_mm(column, row, z_mm);
+        }
+    }
+    image
+}
+
+#[test]
+fn a_smooth_plane_behind_has_no_say_in_the_faces_of_a_rough_part() {
+    let settings = Settings::new(0.5);
+    let noise_mm = |image: &RangeImage| {
+        let found = segment::segment_with_report(image, &settings.segment, &Unmonitored);
+        found.unwrap().report.noise_mm
+    };
+    let (alone, before_a_plane) = (rough_roof(false), rough_roof(true));
+    assert!(noise_mm(&before_a_plane) < 0.5 * noise_mm(&alone));
+
+    let view = View::default();
+    let part = divide(&before_a_plane, &view, &settings, &Unmonitored).unwrap();
+    assert_eq!(part.background.regions.len(), 1);
+    let left: usize = part.image.as_ref().map_or(0, RangeImage::valid_nodes);
+    assert_eq!(left, alone.valid_nodes());
+    assert_eq!(
+        part.regions,
+        divide(&alone, &view, &settings, &Unmonitored)
+            .unwrap()
+            .regions
+    );
+    assert!(part.regions.regions() >= 2);
+    let of_part = part.roles.iter().filter(|&&role| role == NodeRole::Part);
+    let labelled = part
+        .regions
+        .raw_labels()
+        .iter()
+        .filter(|&&label| label != 0);
+    assert_eq!(of_part.count(), labelled.count());
 }

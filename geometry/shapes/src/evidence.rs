@@ -1,0 +1,237 @@
+//! Which kind of surface the samples speak for.
+//!
+//! Every family is fitted, and so are polynomials, which stand for whatever is none of them.
+//! What tells is how much of the samples' scatter a surface leaves over, with a price for
+//! every number it needs (Schwarz 1978, "Estimating the dimension of a model"): never a
+//! distance that someone has fixed, so that a shallow bend is no plane where the noise is
+//! small, and noise makes no cone of a cylinder.
+
+use nalgebra::SVector;
+
+use crate::fit::{Fit, Sample, fit};
+use crate::robust;
+use crate::shape::Family;
+use crate::start::Frame;
+
+/// What the samples speak for.
+#[derive(Debug, Clone)]
+pub enum Verdict {
+    /// A surface of one of the families.
+    Shape(Box<Fit>),
+    /// None of them.
+    FreeForm,
+    /// The samples are too few to tell, or lie on a line.
+    Unknown,
+}
+
+/// One of the surfaces that were compared.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Candidate {
+    /// Its family; `None` for a polynomial.
+    pub family: Option<Family>,
+    /// How many free numbers it has.
+    pub freedom: usize,
+    /// What it leaves over and costs; the least is the best. Differences are in units of twice
+    /// the logarithm of the odds.
+    pub score: f64,
+}
+
+/// A verdict and what it rests on.
+#[derive(Debug, Clone)]
+pub struct Evidence {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// All that was compared, the best first.
+    pub candidates: Vec<Candidate>,
+}
+
+/// Independent samples for each free number that a surface must have to be looked at.
+const PER_NUMBER: f64 = 3.0;
+/// Distances count up to so many deviations.
+const MOST: f64 = 4.0;
+/// Scatter below this share of what samples are said to have is not believed.
+const LEAST_SCATTER: f64 = 0.3;
+/// How much better a polynomial must be than a shape not to be one by chance.
+const DOUBT: f64 = 5.0;
+/// What each number costs above its price, so that of a hundred planes not one gets a radius
+/// from its noise.
+const CAUTION: f64 = 4.0;
+
+/// Decides what kind of surface the samples are of. `area` is that of [`fit`].
+#[must_use]
+pub fn decide(samples: &[Sample], area: f64) -> Evidence {
+    let independent = samples.len() as f64 / area.max(1.0);
+    let enough = |freedom: usize| freedom as f64 * PER_NUMBER <= independent;
+    let frame = Frame::of(samples);
+    let polynomials = frame.map(|frame| polynomials(samples, &frame, &enough));
+    let mut scale = Scale {
+        independent,
+        surfaces: polynomials.unwrap_or_default(),
+    };
+    for family in Family::ALL {
+        if enough(family.freedom())
+            && scale.leaves_room(family.freedom())
+            && let Some(fit) = fit(family, samples, area)
+        {
+            scale.surfaces.push(Surface {
+                off: samples.iter().map(|sample| fit.off(sample)).collect(),
+                freedom: family.freedom(),
+                fit: Some(fit),
+            });
+        }
+    }
+    let mut scored = scale.scored();
+    scored.sort_by(|a, b| a.0.score.total_cmp(&b.0.score));
+    let best = |is_shape: bool| {
+        let found = scored.iter().find(|(c, _)| c.family.is_some() == is_shape);
+        found.map(|(candidate, _)| candidate.score)
+    };
+    let verdict = match (best(true), best(false)) {
+        (None, _) => Verdict::Unknown,
+        (Some(shape), Some(other)) if other + DOUBT < shape => Verdict::FreeForm,
+        _ => scored
+            .iter()
+            .find_map(|(_, fit)| fit.cloned())
+            .map_or(Verdict::Unknown, |fit| Verdict::Shape(Box::new(fit))),
+    };
+    let candidates = scored.iter().map(|(candidate, _)| *candidate).collect();
+    Evidence {
+        verdict,
+        candidates,
+    }
+}
+
+/// Surfaces on the scale that compares them.
+struct Scale {
+    independent: f64,
+    surfaces: Vec<Surface>,
+}
+
+impl Scale {
+    /// Distances count up to this, in deviations of the samples.
+    fn most(&self) -> f64 {
+        let deviations = self.surfaces.iter().map(Surface::deviation);
+        MOST * deviations.fold(f64::INFINITY, f64::min).max(LEAST_SCATTER)
+    }
+
+    fn score(&self, left: f64, freedom: usize) -> f64 {
+        let left = left.max(LEAST_SCATTER * LEAST_SCATTER);
+        let price = libm::log(self.independent.max(2.0)) + CAUTION;
+        self.independent * libm::log(left) + freedom as f64 * price
+    }
+
+    /// Whether a shape with so many free numbers could yet be the best: with more of them,
+    /// it costs what it costs, and it will hardly leave less than the surfaces there are do
+    /// for all their freedom.
+    fn leaves_room(&self, freedom: usize) -> bool {
+        let most = self.most();
+        let mut best = f64::INFINITY;
+        let mut floor = f64::INFINITY;
+        for surface in &self.surfaces {
+            let left = surface.left(most);
+            if surface.fit.is_some() {
+                best = best.min(self.score(left, surface.freedom));
+            }
+            let spared = 1.0 - surface.freedom as f64 / self.independent;
+            floor = floor.min(left / spared);
+        }
+        best > self.score(floor, freedom)
+    }
+
+    fn scored(&self) -> Vec<(Candidate, Option<&Fit>)> {
+        let most = self.most();
+        let scored = self.surfaces.iter().map(|surface| {
+            let candidate = Candidate {
+                family: surface.fit.as_ref().map(|fit| fit.shape.family()),
+                freedom: surface.freedom,
+                score: self.score(surface.left(most), surface.freedom),
+            };
+            (candidate, surface.fit.as_ref())
+        });
+        scored.collect()
+    }
+}
+
+/// A surface to be compared.
+struct Surface {
+    /// How far each sample is off it, in its deviations.
+    off: Vec<f64>,
+    freedom: usize,
+    fit: Option<Fit>,
+}
+
+impl Surface {
+    fn deviation(&self) -> f64 {
+        robust::deviation(self.off.iter().copied())
+    }
+
+    /// Mean of the squares, each up to a most.
+    fn left(&self, most: f64) -> f64 {
+        let squares = self.off.iter().map(|off| off.abs().min(most).powi(2));
+        squares.sum::<f64>() / self.off.len() as f64
+    }
+}
+
+/// Polynomials over the samples' plane, of degrees 2, 3, 4 and 6.
+fn polynomials(samples: &[Sample], frame: &Frame, enough: &impl Fn(usize) -> bool) -> Vec<Surface> {
+    let all = [
+        polynomial::<6>(samples, frame, 2, enough),
+        polynomial::<10>(samples, frame, 3, enough),
+        polynomial::<15>(samples, frame, 4, enough),
+        polynomial::<28>(samples, frame, 6, enough),
+    ];
+    all.into_iter().flatten().collect()
+}
+
+/// The polynomial of a degree with its `N` terms.
+fn polynomial<const N: usize>(
+    samples: &[Sample],
+    frame: &Frame,
+    degree: usize,
+    enough: &impl Fn(usize) -> bool,
+) -> Option<Surface> {
+    if !enough(N) {
+        return None;
+    }
+    let pairs = || (0..=degree).flat_map(|i| (0..=degree - i).map(move |j| (i, j)));
+    let terms = |u: &[f64], v: &[f64]| {
+        let mut terms = SVector::<f64, N>::zeros();
+        for (term, (i, j)) in terms.iter_mut().zip(pairs()) {
+            *term = u[i] * v[j];
+        }
+        terms
+    };
+    let place = |sample: &Sample| {
+        let [u, v, w] = frame.coordinates(&sample.point_mm);
+        (chebyshev(u / frame.reach), chebyshev(v / frame.reach), w)
+    };
+    let equation = |sample: &Sample| {
+        let ((u, _), (v, _), w) = place(sample);
+        (terms(&u, &v), w)
+    };
+    let equations: Vec<_> = samples.iter().map(equation).collect();
+    let (solved, _) = robust::solve(&equations)?;
+    let off = samples.iter().map(|sample| {
+        let ((u, du), (v, dv), w) = place(sample);
+        let [along, across] = [terms(&du, &v), terms(&u, &dv)];
+        let [along, across] = [along, across].map(|terms| terms.dot(&solved) / frame.reach);
+        let rise = (1.0 + along * along + across * across).sqrt();
+        (w - terms(&u, &v).dot(&solved)) / (rise * sample.sigma_mm)
+    });
+    Some(Surface {
+        off: off.collect(),
+        freedom: N,
+        fit: None,
+    })
+}
+
+/// Chebyshev's polynomials up to degree 6, and their derivatives.
+fn chebyshev(x: f64) -> ([f64; 7], [f64; 7]) {
+    let mut values = [1.0, x, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let mut slopes = [0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    for k in 2..values.len() {
+        values[k] = 2.0 * x * values[k - 1] - values[k - 2];
+        slopes[k] = 2.0 * (values[k - 1] + x * slopes[k - 1]) - slopes[k - 2];
+    }
+    (values, slopes)
+}

@@ -1,0 +1,106 @@
+//! Numbers that carry their derivatives (forward automatic differentiation).
+
+use core::ops::{Add, Mul, Neg, Sub};
+
+/// Numbers that a shape may have free, at most: those of a torus.
+pub(crate) const MOST_FREE: usize = 7;
+
+/// A value and its derivatives by the free numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Jet {
+    pub(crate) value: f64,
+    pub(crate) by: [f64; MOST_FREE],
+}
+
+impl Jet {
+    /// A value that depends on nothing.
+    pub(crate) fn constant(value: f64) -> Self {
+        Self {
+            value,
+            by: [0.0; MOST_FREE],
+        }
+    }
+
+    /// The free number of this index itself.
+    pub(crate) fn free(value: f64, index: usize) -> Self {
+        let mut jet = Self::constant(value);
+        jet.by[index] = 1.0;
+        jet
+    }
+
+    /// A function of this, from its value and its derivative here.
+    fn chained(self, value: f64, slope: f64) -> Self {
+        Self {
+            value,
+            by: self.by.map(|d| slope * d),
+        }
+    }
+
+    pub(crate) fn sqrt(self) -> Self {
+        let root = self.value.max(f64::MIN_POSITIVE).sqrt();
+        self.chained(root, 0.5 / root)
+    }
+
+    pub(crate) fn recip(self) -> Self {
+        let recip = 1.0 / self.value;
+        self.chained(recip, -recip * recip)
+    }
+
+    pub(crate) fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = libm::sincos(self.value);
+        (self.chained(sin, cos), self.chained(cos, -sin))
+    }
+}
+
+impl Add for Jet {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            value: self.value + other.value,
+            by: core::array::from_fn(|k| self.by[k] + other.by[k]),
+        }
+    }
+}
+
+impl Sub for Jet {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+impl Neg for Jet {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        self.chained(-self.value, -1.0)
+    }
+}
+
+impl Mul for Jet {
+    type Output = Self;
+
+    fn mul(self, other: Self) -> Self {
+        let first = self.chained(self.value * other.value, other.value);
+        let second = other.chained(0.0, self.value);
+        first + second
+    }
+}
+
+impl Mul<f64> for Jet {
+    type Output = Self;
+
+    fn mul(self, factor: f64) -> Self {
+        self.chained(self.value * factor, factor)
+    }
+}
+
+impl Add<f64> for Jet {
+    type Output = Self;
+
+    fn add(self, constant: f64) -> Self {
+        self.chained(self.value + constant, 1.0)
+    }
+}

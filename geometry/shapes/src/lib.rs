@@ -1,0 +1,26 @@
+//! Analytic surfaces: planes, spheres, cylinders, cones and tori, fitted to samples with
+//! uncertainties, and told apart.
+//!
+//! ```text
+//! samples --> starts (curvatures in their middle) --> descent --> Fit: shape, numbers, rms
+//!                                       of each family, and polynomials --> Evidence
+//! ```
+//!
+//! A fit minimises the distances along the normal, each in its own standard deviation, over
+//! the samples that are not too far off to be noise. Its numbers come with standard
+//! uncertainties: those of the noise met, to first order.
+
+mod evidence;
+mod fit;
+mod jet;
+mod local;
+mod robust;
+mod rotation;
+mod shape;
+mod start;
+mod uncertainty;
+
+pub use evidence::{Candidate, Evidence, Verdict, decide};
+pub use fit::{Fit, Sample, fit};
+pub use shape::{Cone, Cylinder, Family, Plane, Shape, Sphere, Torus};
+pub use uncertainty::{Measured, Numbers};

@@ -1,0 +1,194 @@
+//! Where fits begin: shapes with the curvatures that the samples have in the middle.
+
+use nalgebra::{Matrix2, Matrix3, SVector, SymmetricEigen, Vector3};
+
+use crate::fit::Sample;
+use crate::local::Local;
+use crate::robust;
+use crate::rotation;
+use crate::shape::Family;
+
+/// Angles that a cone's generator may have with its axis.
+const HALF_ANGLES_RAD: [f64; 4] = [-0.6, -0.15, 0.15, 0.6];
+/// Angles that a torus's normal may have over the plane of its tube's middle.
+const TUBE_ANGLES_RAD: [f64; 5] = [-1.2, -0.6, 0.1, 0.6, 1.2];
+/// Weight below which a sample has no part in a start.
+const NO_PART: f64 = 0.02;
+/// Curvature taken for none, times the samples' extent.
+const STRAIGHT: f64 = 1e-3;
+
+/// A plane through the samples, and the frame in which they are told.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Frame {
+    pub(crate) middle: Vector3<f64>,
+    pub(crate) normal: Vector3<f64>,
+    pub(crate) along: Vector3<f64>,
+    pub(crate) across: Vector3<f64>,
+    /// Half the extent of the samples in the plane, about.
+    pub(crate) reach: f64,
+}
+
+impl Frame {
+    /// The frame of samples' principal axes, its normal towards +z. `None` where they lie on
+    /// a line.
+    pub(crate) fn of(samples: &[Sample]) -> Option<Self> {
+        let count = samples.len().max(1) as f64;
+        let sum: Vector3<f64> = samples.iter().map(|s| s.point_mm).sum();
+        let middle = sum / count;
+        let mut spread = Matrix3::zeros();
+        for sample in samples {
+            let from = sample.point_mm - middle;
+            spread += from * from.transpose();
+        }
+        let eigen = SymmetricEigen::new(spread / count);
+        let mut order = [0, 1, 2];
+        order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+        let vector = |k: usize| eigen.eigenvectors.column(order[k]).into_owned();
+        let reach = 2.0 * eigen.eigenvalues[order[2]].max(0.0).sqrt();
+        let width = eigen.eigenvalues[order[1]].max(0.0).sqrt();
+        if width <= 1e-9 * reach || width.is_nan() {
+            return None;
+        }
+        let normal: Vector3<f64> = vector(0);
+        let normal = if normal.z < 0.0 { -normal } else { normal };
+        let along: Vector3<f64> = vector(2);
+        Some(Self {
+            middle,
+            normal,
+            along,
+            across: normal.cross(&along),
+            reach,
+        })
+    }
+
+    /// The terms of a quadratic at a point, and how far the point is above the plane.
+    fn quadratic(&self, point: &Vector3<f64>) -> (SVector<f64, 6>, f64) {
+        let [u, v, w] = self.coordinates(point);
+        let (u, v) = (u / self.reach, v / self.reach);
+        ([1.0, u, v, u * u, u * v, v * v].into(), w)
+    }
+
+    /// A point along, across and above.
+    pub(crate) fn coordinates(&self, point: &Vector3<f64>) -> [f64; 3] {
+        let from = point - self.middle;
+        [
+            from.dot(&self.along),
+            from.dot(&self.across),
+            from.dot(&self.normal),
+        ]
+    }
+}
+
+/// What a quadratic through the samples says of their middle.
+struct Middle {
+    frame: Frame,
+    /// Samples that lie near to the quadratic.
+    near: Vec<Sample>,
+    place: Vector3<f64>,
+    normal: Vector3<f64>,
+    /// Principal directions and their curvatures, the most curved first; positive where the
+    /// centre lies below.
+    principal: [(Vector3<f64>, f64); 2],
+    straight: f64,
+}
+
+impl Middle {
+    fn of(samples: &[Sample]) -> Option<Self> {
+        let frame = Frame::of(samples)?;
+        let quadratic = |sample: &Sample| frame.quadratic(&sample.point_mm);
+        let equations: Vec<_> = samples.iter().map(quadratic).collect();
+        let (c, weights) = robust::solve(&equations)?;
+        let tilt = [c[1] / frame.reach, c[2] / frame.reach];
+        let normal = (frame.normal - frame.along * tilt[0] - frame.across * tilt[1]).normalize();
+        let bend = c.fixed_rows::<3>(3) / (frame.reach * frame.reach);
+        let eigen = SymmetricEigen::new(Matrix2::new(
+            -2.0 * bend[0],
+            -bend[1],
+            -bend[1],
+            -2.0 * bend[2],
+        ));
+        let direction = |k: usize| {
+            let column = eigen.eigenvectors.column(k);
+            let direction = frame.along * column[0] + frame.across * column[1];
+            (direction - normal * direction.dot(&normal)).normalize()
+        };
+        let mut principal = [0, 1].map(|k| (direction(k), eigen.eigenvalues[k]));
+        if principal[0].1.abs() < principal[1].1.abs() {
+            principal.swap(0, 1);
+        }
+        let near = samples.iter().zip(&weights);
+        let near = near.filter(|(_, weight)| **weight > NO_PART);
+        Some(Self {
+            frame,
+            near: near.map(|(sample, _)| *sample).collect(),
+            place: frame.middle + frame.normal * c[0],
+            normal,
+            principal,
+            straight: STRAIGHT / frame.reach,
+        })
+    }
+
+    fn local(&self, family: Family, along: Vector3<f64>, numbers: [f64; 3]) -> Local {
+        Local {
+            family,
+            place: self.place,
+            normal: self.normal,
+            along,
+            numbers,
+        }
+    }
+
+    /// A curvature that is not zero.
+    fn bent(&self, curvature: f64) -> f64 {
+        if curvature.abs() < self.straight {
+            self.straight.copysign(curvature)
+        } else {
+            curvature
+        }
+    }
+}
+
+/// Shapes of a family to begin with. `None` where the samples lie on a line or curve.
+pub(crate) fn starts(family: Family, samples: &[Sample]) -> Option<Vec<Local>> {
+    let middle = Middle::of(samples)?;
+    let [(most, most_curvature), (least, least_curvature)] = middle.principal;
+    let ways = [
+        (least, most_curvature, least_curvature),
+        (most, least_curvature, most_curvature),
+    ];
+    Some(match family {
+        Family::Plane => vec![middle.local(family, least, [0.0; 3])],
+        Family::Sphere => {
+            let mean = 0.5 * (most_curvature + least_curvature);
+            vec![middle.local(family, least, [mean, 0.0, 0.0])]
+        }
+        Family::Cylinder => ways
+            .map(|(along, bend, _)| middle.local(family, along, [bend, 0.0, 0.0]))
+            .to_vec(),
+        Family::Cone => {
+            let mut all = Vec::new();
+            for (along, bend, _) in ways {
+                for angle in HALF_ANGLES_RAD {
+                    let bend = middle.bent(bend) / libm::cos(angle);
+                    all.push(middle.local(family, along, [bend, angle, 0.0]));
+                }
+            }
+            all
+        }
+        Family::Torus => {
+            let mut all = Vec::new();
+            all.extend(rotation::torus(&middle.near, &middle.frame));
+            for (along, about, tube) in ways {
+                let (about, tube) = (middle.bent(about), middle.bent(tube));
+                for angle in TUBE_ANGLES_RAD {
+                    // Meusnier: the circle about the axis bends by the cosine less than the
+                    // surface does along it.
+                    let radius = libm::cos(angle) * (1.0 / about - 1.0 / tube);
+                    let number = middle.bent(1.0 / radius);
+                    all.push(middle.local(family, along, [number, angle, tube]));
+                }
+            }
+            all
+        }
+    })
+}

@@ -1,0 +1,135 @@
+//! Fits to samples of known shapes, with noise: right, and as sure as they say.
+
+mod known;
+
+use nalgebra::Vector3;
+use shapes::{Family, Fit, Measured, Sample, Shape, fit};
+
+use known::{Case, NOISE_MM, Random, cases, samples};
+
+fn fitted(case: &Case, count: usize, seed: u64) -> Fit {
+    let family = case.0.family();
+    fit(family, &samples(case, count, seed), 1.0).expect("enough samples of this family")
+}
+
+#[test]
+fn every_family_is_found_again() {
+    for case in cases() {
+        let found = fitted(&case, 2000, 1);
+        assert!((found.rms_mm / NOISE_MM - 1.0).abs() < 0.05, "{found:?}");
+        assert!(found.held > 1990, "{}", found.held);
+        // Everywhere on the surface, not only at samples.
+        for k in 0..100 {
+            let place = (case.1)(&case.0, f64::from(k % 10) / 9.0, f64::from(k / 10) / 9.0);
+            let off = found.shape.distance_mm(&place).abs();
+            assert!(off < 0.3 * NOISE_MM, "{}: {off}", case.0.family());
+        }
+    }
+}
+
+#[test]
+fn a_tenth_of_strays_changes_nothing() {
+    for case in cases() {
+        let mut with = samples(&case, 1000, 3);
+        let clean = fit(case.0.family(), &with, 1.0).expect("as above");
+        let mut random = Random(9);
+        for sample in with.iter_mut().step_by(10) {
+            sample.point_mm.z += 20.0 * (random.uniform() - 0.3);
+        }
+        let found = fit(case.0.family(), &with, 1.0).expect("most are there");
+        assert!(found.held < 940, "{}", found.held);
+        for k in 0..100 {
+            let place = (case.1)(&case.0, f64::from(k % 10) / 9.0, f64::from(k / 10) / 9.0);
+            let apart = found.shape.distance_mm(&place) - clean.shape.distance_mm(&place);
+            assert!(apart.abs() < NOISE_MM, "{}: {apart}", case.0.family());
+        }
+    }
+}
+
+/// The error of a number over its stated deviation.
+fn pull(found: Option<Measured>, truth: f64) -> f64 {
+    let found = found.expect("a number of this family");
+    (found.value - truth) / found.deviation
+}
+
+#[test]
+fn numbers_are_as_sure_as_they_say() {
+    const SEEDS: u64 = 120;
+    for case in cases() {
+        let mut pulls: Vec<(&str, Vec<f64>)> = Vec::new();
+        let mut note = |name: &'static str, pull: f64| match pulls.iter_mut().find(|p| p.0 == name)
+        {
+            Some((_, all)) => all.push(pull),
+            None => pulls.push((name, vec![pull])),
+        };
+        for seed in 0..SEEDS {
+            let found = fitted(&case, 400, seed + 100);
+            let n = &found.numbers;
+            match (&case.0, &found.shape) {
+                (Shape::Plane(true_plane), Shape::Plane(plane)) => {
+                    let tilt = (plane.normal - true_plane.normal).dot(&Vector3::x());
+                    let sin = (1.0 - true_plane.normal.x.powi(2)).sqrt();
+                    note(
+                        "tilt",
+                        tilt / sin / n.direction_rad.expect("a plane has one"),
+                    );
+                    let off = true_plane
+                        .normal
+                        .dot(&(plane.point_mm - true_plane.point_mm));
+                    note("offset", off / n.place_mm);
+                }
+                (Shape::Sphere(sphere), _) => note("radius", pull(n.radius_mm, sphere.radius_mm)),
+                (Shape::Cylinder(cylinder), _) => {
+                    note("radius", pull(n.radius_mm, cylinder.radius_mm));
+                }
+                (Shape::Cone(cone), _) => {
+                    note("angle", pull(n.half_angle_rad, cone.half_angle_rad));
+                }
+                (Shape::Torus(torus), _) => {
+                    note("radius", pull(n.radius_mm, torus.radius_mm));
+                    note("tube", pull(n.tube_mm, torus.tube_mm));
+                }
+                _ => panic!("another family"),
+            }
+        }
+        for (name, pulls) in &pulls {
+            let family = case.0.family();
+            let mean = pulls.iter().sum::<f64>() / SEEDS as f64;
+            let square = pulls.iter().map(|p| p * p).sum::<f64>() / SEEDS as f64;
+            let within = pulls.iter().filter(|p| p.abs() <= 1.96).count();
+            // Of 120: 95 % is 114; five standard deviations of that are 12.
+            assert!(
+                within >= 102,
+                "{family} {name}: {within} of {SEEDS} within 95 %"
+            );
+            assert!((0.6..1.5).contains(&square), "{family} {name}: {square}");
+            assert!(mean.abs() < 0.45, "{family} {name}: {mean}");
+        }
+    }
+}
+
+#[test]
+fn what_is_too_flat_or_too_little_is_of_no_such_family() {
+    let plane = &cases()[0];
+    let few = samples(plane, 3, 1);
+    assert!(fit(Family::Plane, &few, 1.0).is_none());
+    assert!(fit(Family::Plane, &[], 1.0).is_none());
+    let line: Vec<Sample> = (0..50)
+        .map(|k| Sample {
+            point_mm: Vector3::new(f64::from(k), 2.0, 3.0),
+            sigma_mm: NOISE_MM,
+        })
+        .collect();
+    for family in Family::ALL {
+        assert!(fit(family, &line, 1.0).is_none(), "{family}");
+    }
+    let exact: Vec<Sample> = samples(plane, 500, 2)
+        .iter()
+        .map(|s| Sample {
+            point_mm: Vector3::new(s.point_mm.x, s.point_mm.y, 1.0),
+            ..*s
+        })
+        .collect();
+    assert!(fit(Family::Plane, &exact, 1.0).is_some());
+    assert!(fit(Family::Cylinder, &exact, 1.0).is_none());
+}
