@@ -24,8 +24,8 @@ pub(crate) const PREAMBLE_BYTES: usize = 12;
 pub(crate) const RECORD_HEAD_BYTES: usize = 5;
 /// Index, table position, dropouts and number of samples.
 pub(crate) const COLUMN_HEAD_BYTES: usize = 16;
-/// Lateral, range, intensity, flags.
-pub(crate) const SAMPLE_BYTES: usize = 10;
+/// Bytes of a sample in the file: lateral, range, intensity, flags.
+pub const SAMPLE_BYTES: usize = 10;
 /// Cause and number of columns.
 pub(crate) const END_HEAD_BYTES: usize = 5;
 

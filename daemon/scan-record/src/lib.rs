@@ -45,7 +45,7 @@ mod reader;
 mod writer;
 
 pub use column::{RawColumn, RawSample};
-pub use format::{MAGIC, MAX_HEADER_BYTES, MAX_REASON_BYTES, MAX_SAMPLES, VERSION};
+pub use format::{MAGIC, MAX_HEADER_BYTES, MAX_REASON_BYTES, MAX_SAMPLES, SAMPLE_BYTES, VERSION};
 pub use header::Header;
 pub use reader::{Ending, JournalReader, ReadError};
-pub use writer::{EndCause, JournalWriter, Storage, WriteError};
+pub use writer::{EndCause, JournalWriter, Storage, WriteError, most_bytes};

@@ -1,13 +1,15 @@
 //! Appending a scan to disk while it is measured.
 
-use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::Path;
 
+use storage::{Appender, Disk, LocalDisk};
+
 use crate::column::RawColumn;
 use crate::format::{
-    KIND_COLUMN, KIND_END, KIND_HEADER, MAGIC, MAX_HEADER_BYTES, MAX_REASON_BYTES, MAX_SAMPLES,
-    PREAMBLE_BYTES, VERSION, checksum, record_head,
+    COLUMN_HEAD_BYTES, END_HEAD_BYTES, KIND_COLUMN, KIND_END, KIND_HEADER, MAGIC, MAX_HEADER_BYTES,
+    MAX_REASON_BYTES, MAX_SAMPLES, PREAMBLE_BYTES, RECORD_HEAD_BYTES, SAMPLE_BYTES, VERSION,
+    checksum, record_head,
 };
 use crate::header::Header;
 
@@ -18,11 +20,24 @@ pub trait Storage: Write {
     /// # Errors
     /// When the medium could not promise that.
     fn sync_data(&mut self) -> io::Result<()>;
+
+    /// Gives back room that was set aside and is not needed. What is written stays.
+    ///
+    /// # Errors
+    /// When the medium could not.
+    fn release(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
-impl Storage for File {
+impl Storage for Appender {
     fn sync_data(&mut self) -> io::Result<()> {
-        File::sync_data(self)
+        Appender::sync_data(self)
+    }
+
+    fn release(&mut self) -> io::Result<()> {
+        // Room beyond the end goes with the cut.
+        self.file().set_len(self.bytes())
     }
 }
 
@@ -72,7 +87,7 @@ pub enum WriteError {
 
 /// Writes one journal.
 #[derive(Debug)]
-pub struct JournalWriter<S: Storage = File> {
+pub struct JournalWriter<S: Storage = Appender> {
     storage: S,
     record: Vec<u8>,
     payload: Vec<u8>,
@@ -82,20 +97,51 @@ pub struct JournalWriter<S: Storage = File> {
     failed: bool,
 }
 
-impl JournalWriter<File> {
+impl JournalWriter {
+    /// As [`JournalWriter::create_on`], on the file system of this machine.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn create(path: &Path, header: &Header) -> Result<Self, WriteError> {
+        Self::create_on(&LocalDisk, path, header)
+    }
+
     /// Makes the file, which must not exist yet, and syncs the header and the folder's
     /// entry, so that even a scan cut short at once can be found.
     ///
     /// # Errors
     /// [`WriteError::Io`], among others when the file exists.
-    pub fn create(path: &Path, header: &Header) -> Result<Self, WriteError> {
-        let file = OpenOptions::new().write(true).create_new(true).open(path)?;
-        let writer = Self::new(file, header)?;
+    pub fn create_on(disk: &dyn Disk, path: &Path, header: &Header) -> Result<Self, WriteError> {
+        let writer = Self::new(Appender::new(disk.create(path)?), header)?;
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-            File::open(folder)?.sync_all()?;
+            disk.sync_dir(folder)?;
         }
         Ok(writer)
     }
+}
+
+impl JournalWriter {
+    /// Sets room aside for the whole scan, so that it cannot end for want of it. What is not
+    /// needed is given back by [`JournalWriter::finish`].
+    ///
+    /// # Errors
+    /// [`WriteError::Io`] when there is not so much; the journal is as it was.
+    pub fn reserve(&mut self, columns: u32, samples: u32) -> Result<(), WriteError> {
+        let rest = most_bytes(columns, samples).saturating_sub(HEADER_ROOM_BYTES);
+        Ok(self.storage.file().reserve(self.bytes + rest)?)
+    }
+}
+
+/// What a header takes at most in a service's journals.
+const HEADER_ROOM_BYTES: u64 = 64 << 10;
+
+/// Most bytes of a journal with so many columns of so many samples.
+#[must_use]
+pub fn most_bytes(columns: u32, samples: u32) -> u64 {
+    let framing = (RECORD_HEAD_BYTES + size_of::<u32>()) as u64;
+    let column = COLUMN_HEAD_BYTES as u64 + u64::from(samples) * SAMPLE_BYTES as u64;
+    let end = (END_HEAD_BYTES + MAX_REASON_BYTES) as u64;
+    HEADER_ROOM_BYTES + u64::from(columns) * (framing + column) + framing + end
 }
 
 impl<S: Storage> JournalWriter<S> {
@@ -188,6 +234,7 @@ impl<S: Storage> JournalWriter<S> {
         self.payload.extend_from_slice(&self.columns.to_le_bytes());
         self.payload.extend_from_slice(&reason.as_bytes()[..cut]);
         self.write_record(KIND_END)?;
+        self.storage.release()?;
         self.sync()?;
         Ok(self.storage)
     }

@@ -1,4 +1,4 @@
-use scan_record::{EndCause, Ending, JournalReader, JournalWriter};
+use scan_record::{EndCause, Ending, JournalReader, JournalWriter, most_bytes};
 
 use crate::common::{column, header, journal};
 
@@ -40,6 +40,33 @@ fn a_file_is_made_once_and_never_over_another() {
     assert!(error.to_string().contains("File exists"), "{error}");
     let mut reader = JournalReader::open(&path).unwrap();
     assert_eq!(reader.next_column().unwrap(), Some(column(0, 3)));
+}
+
+#[test]
+fn room_for_the_whole_scan_is_set_aside_and_given_back() {
+    use std::os::unix::fs::MetadataExt;
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.scan");
+    let taken = || std::fs::metadata(&path).unwrap().blocks() * 512;
+    let mut writer = JournalWriter::create(&path, &header()).unwrap();
+    writer.reserve(100, 1_000).unwrap();
+    let most = most_bytes(100, 1_000);
+    assert!(taken() >= 100 * 10_000, "{} bytes are set aside", taken());
+    writer.append(&column(0, 3)).unwrap();
+    let reason = "x".repeat(10_000);
+    writer.finish(&EndCause::Fault(reason)).unwrap();
+    assert!(taken() < 100_000, "{} bytes are kept", taken());
+    assert!((1_002_500..1_102_500).contains(&most), "{most}");
+
+    // As much as is foreseen is enough for the largest.
+    let path = folder.path().join("b.scan");
+    let mut writer = JournalWriter::create(&path, &header()).unwrap();
+    for index in 0..100 {
+        writer.append(&column(index, 1_000)).unwrap();
+    }
+    writer.finish(&EndCause::Fault("x".repeat(10_000))).unwrap();
+    assert!(std::fs::metadata(&path).unwrap().len() <= most);
 }
 
 #[test]

@@ -1,0 +1,295 @@
+//! What must survive a restart: the scans' records and the job queue, in one redb file.
+//!
+//! Records are JSON in a versioned envelope, so that a later version of the service can
+//! tell what it reads. redb locks the file, which keeps a second service out. A file that is
+//! damaged is moved aside, and what can still be read of it goes into a new one; an error of
+//! the disk closes the file until it is next needed.
+
+mod backend;
+mod error;
+mod record;
+mod salvage;
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, PoisonError, RwLock};
+use std::time::{Duration, Instant};
+
+use redb::{Database, ReadableDatabase, ReadableTable, TableDefinition};
+use relief_api::{Job, JobId, Scan};
+use serde::de::DeserializeOwned;
+use storage::{Disk, remove_file_if_there};
+
+pub use error::StoreError;
+
+use backend::RecordsFile;
+use error::is_trouble_of_the_disk;
+use record::{decode, encode};
+
+const SCANS: TableDefinition<'_, &str, &[u8]> = TableDefinition::new("scans");
+const JOBS: TableDefinition<'_, JobId, &[u8]> = TableDefinition::new("jobs");
+
+/// Memory for pages of the file; a record has about a kilobyte.
+const CACHE_BYTES: usize = 4 << 20;
+
+/// How often a locked file is tried again.
+const RETRY: Duration = Duration::from_millis(20);
+
+/// The records.
+#[derive(Debug)]
+pub(crate) struct Store {
+    state: RwLock<State>,
+    disk: Arc<dyn Disk>,
+    path: PathBuf,
+}
+
+#[derive(Debug)]
+enum State {
+    Open(Database),
+    /// The disk refused something: redb wants the file opened anew.
+    Shut,
+    /// For good: whoever still holds the service then holds no lock on the file.
+    Closed,
+}
+
+impl Store {
+    /// Opens the records, waiting a while for a service that is just about to end.
+    pub(crate) async fn open_soon(
+        disk: &Arc<dyn Disk>,
+        path: &Path,
+        longest: Duration,
+    ) -> Result<Self, StoreError> {
+        let begun = Instant::now();
+        loop {
+            match Self::open(Arc::clone(disk), path) {
+                Err(StoreError::Locked { .. }) if begun.elapsed() < longest => {
+                    tokio::time::sleep(RETRY).await;
+                }
+                other => return other,
+            }
+        }
+    }
+
+    /// Opens the records, making them if there are none, and mending them if need be.
+    pub(crate) fn open(disk: Arc<dyn Disk>, path: &Path) -> Result<Self, StoreError> {
+        let failed = |error: &redb::Error| StoreError::of(path, error);
+        if !path.exists() {
+            put_new(&*disk, path).map_err(|error| failed(&error))?;
+        }
+        let database = match salvage::open_whole(&*disk, path)? {
+            Ok(database) => database,
+            Err(damage) => {
+                salvage::replace(&*disk, path, &damage)?;
+                open_database(&*disk, path).map_err(|error| failed(&error))?
+            }
+        };
+        Ok(Self {
+            state: RwLock::new(State::Open(database)),
+            disk,
+            path: path.to_owned(),
+        })
+    }
+
+    /// Closes the records, once what is being read or written is done; the next service
+    /// may open them when this returns.
+    pub(crate) fn close(&self) {
+        *self.state.write().unwrap_or_else(PoisonError::into_inner) = State::Closed;
+    }
+
+    fn with<T>(
+        &self,
+        work: impl FnOnce(&Database) -> Result<T, redb::Error>,
+    ) -> Result<T, StoreError> {
+        self.reopen()?;
+        let state = self.state.read().unwrap_or_else(PoisonError::into_inner);
+        let error = match &*state {
+            State::Open(database) => match work(database) {
+                Ok(done) => return Ok(done),
+                Err(error) => error,
+            },
+            State::Shut => redb::Error::PreviousIo,
+            State::Closed => {
+                return Err(StoreError::Closed {
+                    path: self.path.clone(),
+                });
+            }
+        };
+        drop(state);
+        if is_trouble_of_the_disk(&error) {
+            let mut state = self.state.write().unwrap_or_else(PoisonError::into_inner);
+            if matches!(*state, State::Open(_)) {
+                *state = State::Shut;
+            }
+        }
+        Err(StoreError::of(&self.path, &error))
+    }
+
+    /// Opens the file again that was shut after an error of the disk.
+    fn reopen(&self) -> Result<(), StoreError> {
+        if !matches!(
+            *self.state.read().unwrap_or_else(PoisonError::into_inner),
+            State::Shut
+        ) {
+            return Ok(());
+        }
+        let mut state = self.state.write().unwrap_or_else(PoisonError::into_inner);
+        if matches!(*state, State::Shut) {
+            // Were it made anew where it is missing, a disk that is not mounted would look like
+            // one without scans.
+            std::fs::metadata(&self.path)
+                .map_err(redb::Error::Io)
+                .and_then(|_| open_database(&*self.disk, &self.path))
+                .map(|database| *state = State::Open(database))
+                .map_err(|error| StoreError::of(&self.path, &error))?;
+            tracing::info!(file = %self.path.display(), "the records can be used again");
+        }
+        Ok(())
+    }
+
+    /// All scans, oldest first.
+    pub(crate) fn scans(&self) -> Result<Vec<Scan>, StoreError> {
+        let read = |database: &Database| -> Result<Vec<Vec<u8>>, redb::Error> {
+            let table = database.begin_read()?.open_table(SCANS)?;
+            table
+                .iter()?
+                .map(|row| Ok(row?.1.value().to_vec()))
+                .collect()
+        };
+        self.decode_all(self.with(read)?)
+    }
+
+    /// One scan.
+    pub(crate) fn scan(&self, id: &str) -> Result<Option<Scan>, StoreError> {
+        let read = |database: &Database| -> Result<Option<Vec<u8>>, redb::Error> {
+            let table = database.begin_read()?.open_table(SCANS)?;
+            Ok(table.get(id)?.map(|bytes| bytes.value().to_vec()))
+        };
+        let bytes = self.with(read)?;
+        bytes.map(|bytes| decode(&self.path, &bytes)).transpose()
+    }
+
+    /// Keeps a scan's record in place of any earlier one.
+    pub(crate) fn put_scan(&self, scan: &Scan) -> Result<(), StoreError> {
+        let bytes = encode(scan);
+        self.with(|database| {
+            let transaction = database.begin_write()?;
+            transaction
+                .open_table(SCANS)?
+                .insert(scan.id.as_str(), bytes.as_slice())?;
+            Ok(transaction.commit()?)
+        })
+    }
+
+    /// All jobs, oldest first.
+    pub(crate) fn jobs(&self) -> Result<Vec<Job>, StoreError> {
+        let read = |database: &Database| -> Result<Vec<Vec<u8>>, redb::Error> {
+            let table = database.begin_read()?.open_table(JOBS)?;
+            table
+                .iter()?
+                .map(|row| Ok(row?.1.value().to_vec()))
+                .collect()
+        };
+        self.decode_all(self.with(read)?)
+    }
+
+    /// One job.
+    pub(crate) fn job(&self, id: JobId) -> Result<Option<Job>, StoreError> {
+        let read = |database: &Database| -> Result<Option<Vec<u8>>, redb::Error> {
+            let table = database.begin_read()?.open_table(JOBS)?;
+            Ok(table.get(id)?.map(|bytes| bytes.value().to_vec()))
+        };
+        let bytes = self.with(read)?;
+        bytes.map(|bytes| decode(&self.path, &bytes)).transpose()
+    }
+
+    /// Keeps a job's record in place of any earlier one.
+    pub(crate) fn put_job(&self, job: &Job) -> Result<(), StoreError> {
+        let bytes = encode(job);
+        self.with(|database| {
+            let transaction = database.begin_write()?;
+            transaction
+                .open_table(JOBS)?
+                .insert(job.id, bytes.as_slice())?;
+            Ok(transaction.commit()?)
+        })
+    }
+
+    /// Keeps a new job under the next number, and notes it on its scan, both or neither.
+    pub(crate) fn add_job(&self, mut job: Job, scan: &mut Scan) -> Result<Job, StoreError> {
+        let mut noted = scan.clone();
+        let kept = self.with(|database| {
+            let transaction = database.begin_write()?;
+            {
+                let mut jobs = transaction.open_table(JOBS)?;
+                job.id = jobs.last()?.map_or(1, |(id, _)| id.value() + 1);
+                jobs.insert(job.id, encode(&job).as_slice())?;
+                noted.jobs.push(job.id);
+                transaction
+                    .open_table(SCANS)?
+                    .insert(noted.id.as_str(), encode(&noted).as_slice())?;
+            }
+            transaction.commit()?;
+            Ok((job, noted))
+        });
+        let (job, noted) = kept?;
+        *scan = noted;
+        Ok(job)
+    }
+
+    fn decode_all<T: DeserializeOwned>(&self, rows: Vec<Vec<u8>>) -> Result<Vec<T>, StoreError> {
+        rows.iter().map(|bytes| decode(&self.path, bytes)).collect()
+    }
+}
+
+/// Opens the file with all tables in it.
+fn open_database(disk: &dyn Disk, path: &Path) -> Result<Database, redb::Error> {
+    let file = RecordsFile::open(disk, path)?;
+    let database = Database::builder()
+        .set_cache_size(CACHE_BYTES)
+        // A damaged file is then told, where redb might otherwise panic on it later.
+        .set_check_integrity_on_open(true)
+        .create_with_backend(file)?;
+    let transaction = database.begin_write()?;
+    transaction.open_table(SCANS)?;
+    transaction.open_table(JOBS)?;
+    transaction.commit()?;
+    Ok(database)
+}
+
+/// Makes a file without records. It is made under another name: one that is half made, since
+/// the power failed, could not be told from one that is damaged.
+fn put_new(disk: &dyn Disk, path: &Path) -> Result<(), redb::Error> {
+    let new = path.with_extension("redb.new");
+    remove_file_if_there(disk, &new)?;
+    open_database(disk, &new)?.close()?;
+    disk.rename(&new, path)?;
+    if let Some(folder) = path.parent() {
+        disk.sync_dir(folder)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use storage::LocalDisk;
+
+    #[tokio::test]
+    async fn who_waits_for_the_records_has_them_as_soon_as_they_are_closed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("store");
+        let disk: Arc<dyn Disk> = Arc::new(LocalDisk);
+        let first = Store::open(Arc::clone(&disk), &path).unwrap();
+        let error = Store::open_soon(&disk, &path, Duration::ZERO)
+            .await
+            .unwrap_err();
+        assert!(matches!(error, StoreError::Locked { .. }), "{error}");
+        let (second, ()) = tokio::join!(
+            // Far longer than this takes.
+            Store::open_soon(&disk, &path, Duration::from_secs(600)),
+            async { first.close() }
+        );
+        assert_eq!(second.unwrap().jobs().unwrap(), []);
+        let error = first.jobs().unwrap_err();
+        assert!(matches!(error, StoreError::Closed { .. }), "{error}");
+    }
+}

@@ -1,0 +1,284 @@
+//! The power fails at every sync, and between them, of a scan and its jobs.
+//!
+//! A service takes a scan and processes it twice, on a disk that notes every step. From the
+//! notes what a medium would hold is made anew for each moment: with nothing that was not
+//! synced, with all of it, and with chance parts of it. A fresh service is started on each.
+
+mod dice;
+mod medium;
+mod recorder;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+
+use deliverables::Manifest;
+use relief_api::{Event, Job, JobState, PlanRequest, Rerun, Scan, ScanState, StartScan, path};
+use reliefd::Daemon;
+use scan_record::{JournalReader, RawColumn};
+
+use crate::client::Client;
+use crate::fake::FakeScanner;
+use crate::rig::{Rig, config, ended, job_over};
+use dice::Dice;
+use medium::{Loss, Medium};
+use recorder::{Recorder, Step, Told};
+
+const COLUMNS: u32 = 24;
+
+/// What the service did while the power was on.
+struct Story {
+    steps: Vec<Step>,
+    /// Its folder, whose name stands in the steps.
+    folder: tempfile::TempDir,
+    scan: String,
+    columns: Vec<RawColumn>,
+    /// Files by name of each published result.
+    results: BTreeMap<String, BTreeMap<String, Vec<u8>>>,
+}
+
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| {
+            let entry = entry.unwrap();
+            let name = entry.file_name().into_string().unwrap();
+            (name, fs::read(entry.path()).unwrap())
+        })
+        .collect()
+}
+
+fn columns(journal: &Path) -> Vec<RawColumn> {
+    let mut columns = Vec::new();
+    // Without a header there is no column either.
+    if let Ok(mut reader) = JournalReader::open(journal) {
+        while let Some(column) = reader.next_column().unwrap() {
+            columns.push(column);
+        }
+    }
+    columns
+}
+
+async fn published(events: &mut crate::client::Events, of: &Job) {
+    let find = |event: &Event| match event {
+        Event::Published { job, .. } if *job == of.id => Some(()),
+        _ => None,
+    };
+    events.until(find).await;
+}
+
+/// Takes a scan, and processes it twice.
+async fn story() -> Story {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::default();
+    let scanner = FakeScanner::new();
+    let told = recorder.clone();
+    scanner.on_acknowledge(move |column| told.tell(Told::Acknowledged(column)));
+    let disk = Arc::new(recorder.clone());
+    let daemon = Daemon::start_on(config(folder.path()), scanner.clone(), disk)
+        .await
+        .unwrap();
+    let client = Client::new(daemon.socket());
+    let mut events = client.events().await;
+    let request = StartScan {
+        name: "roof".into(),
+        plan: PlanRequest {
+            columns: Some(COLUMNS),
+            pitch_mm: Some(0.5),
+            samples: Some(24),
+            ..PlanRequest::default()
+        },
+        ..StartScan::default()
+    };
+    scanner.allow(0);
+    let scan: Scan = client.post(path::SCANS, &request).await;
+    recorder.tell(Told::Accepted(scan.id.clone()));
+    scanner.allow_all();
+    let scan = ended(&mut events, &scan.id).await;
+    assert_eq!(scan.state, ScanState::Complete, "{:?}", scan.reason);
+    recorder.tell(Told::Complete(scan.id.clone()));
+    let rig = Rig {
+        daemon,
+        client,
+        scanner,
+        folder,
+    };
+    let first = job_over(&mut events, &rig, scan.jobs[0]).await;
+    assert_eq!(first.state, JobState::Done, "{:?}", first.error);
+    published(&mut events, &first).await;
+    recorder.tell(Told::Published(first.result.clone()));
+    let rerun: Job = rig
+        .client
+        .post(&path::scan_rerun(&scan.id), &Rerun::default())
+        .await;
+    recorder.tell(Told::Queued(rerun.id));
+    let rerun = job_over(&mut events, &rig, rerun.id).await;
+    assert_eq!(rerun.state, JobState::Done, "{:?}", rerun.error);
+    published(&mut events, &rerun).await;
+    recorder.tell(Told::Published(rerun.result.clone()));
+
+    let columns = columns(&rig.journal(&scan.id));
+    assert_eq!(columns.len() as u32, COLUMNS);
+    let results = [first.result, rerun.result]
+        .map(|result| {
+            let files = files(&rig.daemon.spool_dir().join(&result));
+            (result, files)
+        })
+        .into();
+    rig.daemon.shutdown().await;
+    Story {
+        steps: recorder.steps(),
+        folder: rig.folder,
+        scan: scan.id,
+        columns,
+        results,
+    }
+}
+
+/// What may be relied on after some steps.
+#[derive(Default)]
+struct Promised {
+    accepted: bool,
+    columns: usize,
+    complete: bool,
+    queued: Option<u64>,
+    published: BTreeSet<String>,
+}
+
+impl Promised {
+    fn by(steps: &[Step]) -> Self {
+        let mut promised = Self::default();
+        for step in steps {
+            match step {
+                Step::Told(Told::Accepted(_)) => promised.accepted = true,
+                Step::Told(Told::Acknowledged(column)) => promised.columns = *column as usize + 1,
+                Step::Told(Told::Complete(_)) => promised.complete = true,
+                Step::Told(Told::Queued(job)) => promised.queued = Some(*job),
+                Step::Told(Told::Published(result)) => {
+                    promised.published.insert(result.clone());
+                }
+                _ => {}
+            }
+        }
+        promised
+    }
+}
+
+/// Starts a service on what is left after so many steps, and holds it to every promise.
+async fn revive(story: &Story, steps: usize, loss: Loss) {
+    let place = format!("{loss:?} of what was not synced lost after {steps} steps");
+    let happened = &story.steps[..steps];
+    let promised = Promised::by(happened);
+    let mut medium = Medium::new(story.folder.path());
+    for step in happened {
+        medium.step(step);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    medium.write_survivors(loss, folder.path());
+    let rig = Rig::start(folder, |_| {}).await;
+    // Jobs are numbered from 1; whoever comes after hears only of what is done again.
+    let mut events = rig.client.events().await;
+    let scans: relief_api::ScanList = rig.client.get(path::SCANS).await;
+    let jobs: relief_api::JobList = rig.client.get(path::JOBS).await;
+
+    assert!(scans.scans.len() <= 1, "{place}");
+    assert!(
+        !promised.accepted || scans.scans.len() == 1,
+        "{place}: the scan is lost"
+    );
+    let kept = columns(&rig.journal(&story.scan));
+    assert!(
+        kept.len() >= promised.columns,
+        "{place}: {} of {} acknowledged columns are kept",
+        kept.len(),
+        promised.columns
+    );
+    assert_eq!(kept, story.columns[..kept.len()], "{place}");
+    for scan in &scans.scans {
+        assert!(scan.state.is_over(), "{place}: {scan:?}");
+        assert!(scan.columns as usize == kept.len(), "{place}: {scan:?}");
+        if promised.complete {
+            assert_eq!(scan.state, ScanState::Complete, "{place}");
+        }
+        // A complete scan is processed, whenever it was that the power failed.
+        assert_eq!(
+            scan.state == ScanState::Complete,
+            !scan.jobs.is_empty(),
+            "{place}: {scan:?}"
+        );
+        let known: Vec<u64> = jobs.jobs.iter().rev().map(|job| job.id).collect();
+        assert_eq!(scan.jobs, known, "{place}");
+    }
+    if let Some(job) = promised.queued {
+        assert!(jobs.jobs.iter().any(|j| j.id == job), "{place}: {jobs:?}");
+    }
+
+    let mut results = BTreeSet::new();
+    for job in &jobs.jobs {
+        let is_promised = promised.published.contains(&job.result);
+        if is_promised {
+            assert_eq!(job.state, JobState::Done, "{place}: published twice");
+        }
+        let done = job_over(&mut events, &rig, job.id).await;
+        assert_eq!(done.state, JobState::Done, "{place}: {:?}", done.error);
+        assert!(results.insert(done.result.clone()), "{place}");
+        let now = files(&rig.daemon.spool_dir().join(&done.result));
+        check_whole(&now, &place);
+        if is_promised {
+            assert!(
+                now == story.results[&done.result],
+                "{place}: it was changed"
+            );
+        }
+    }
+    for result in &promised.published {
+        assert!(results.contains(result), "{place}: {result} is gone");
+    }
+    let spooled: BTreeSet<String> = fs::read_dir(rig.daemon.spool_dir())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    assert_eq!(spooled, results, "{place}");
+    rig.daemon.shutdown().await;
+}
+
+/// Every file that the manifest names is there, as long and with the bytes that it names.
+fn check_whole(files: &BTreeMap<String, Vec<u8>>, place: &str) {
+    let manifest: Manifest = serde_json::from_slice(&files["manifest.json"]).unwrap();
+    assert_eq!(manifest.files.len() + 1, files.len(), "{place}");
+    for file in &manifest.files {
+        let hash = deliverables::sha256_of(files[&file.name].as_slice()).unwrap();
+        assert_eq!(hash, file.sha256, "{place}: {}", file.name);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn nothing_promised_is_lost_wherever_the_power_fails() {
+    let story = story().await;
+    let is_sync = |step: &Step| matches!(step, Step::SyncFile { .. } | Step::SyncDir { .. });
+    let syncs: Vec<usize> = (0..story.steps.len())
+        .filter(|&at| is_sync(&story.steps[at]))
+        .collect();
+    assert!(syncs.len() > 40, "{} syncs", syncs.len());
+    let mut dice = Dice::new(1);
+    let mut images = 0;
+    for &at in &syncs {
+        // Before the sync took hold, and after it.
+        revive(&story, at, Loss::All).await;
+        revive(&story, at, Loss::Some(at as u64)).await;
+        revive(&story, at + 1, Loss::All).await;
+        images += 3;
+    }
+    for seed in 0..60 {
+        let at = dice.below(story.steps.len() as u64 + 1) as usize;
+        revive(&story, at, Loss::Some(seed)).await;
+        revive(&story, at, Loss::Nothing).await;
+        images += 2;
+    }
+    println!(
+        "{} steps, {} syncs, {images} media",
+        story.steps.len(),
+        syncs.len()
+    );
+}
