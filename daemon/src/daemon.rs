@@ -9,16 +9,22 @@ use std::time::Duration;
 
 use axum::Router;
 use scanner_driver::{Scanner, ScannerError, SerialScanner, UsbScanner};
+use storage::{Disk, LocalDisk, create_dir_all};
+use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
 use crate::acquisition::watch;
-use crate::config::{Config, Reloaded, ScannerConfig, Transport};
+use crate::config::{Config, HttpConfig, Reloaded, ScannerConfig, Transport};
 use crate::error::ServiceError;
-use crate::http::{Context, ListenError, bind_loopback, bind_socket, local_callers_only, router};
+use crate::http::{Context, ListenError, on_loopback, on_socket, serve};
 use crate::jobs::work;
-use crate::service::{Service, remove_if_there};
+use crate::laser::{Laser, LaserLogError};
+use crate::service::{Kept, Service, remove_if_there};
+use crate::space::tidy;
 use crate::spool::{Spool, SpoolError};
 use crate::store::{Store, StoreError};
+use crate::systemd::{Health, Inherited};
+use crate::tokens::{TokenError, Tokens};
 
 /// How long connections may take to end once the service stops.
 const DRAIN: Duration = Duration::from_secs(5);
@@ -47,6 +53,12 @@ pub enum StartError {
     /// The spool does not work.
     #[error("{0}; {hint}", hint = .0.hint())]
     Spool(#[from] SpoolError),
+    /// The tokens do not work.
+    #[error(transparent)]
+    Tokens(#[from] TokenError),
+    /// The log of the laser does not work.
+    #[error(transparent)]
+    Laser(#[from] LaserLogError),
     /// The API cannot be offered.
     #[error(transparent)]
     Listen(#[from] ListenError),
@@ -71,6 +83,8 @@ pub struct Daemon {
     servers: Vec<tokio::task::JoinHandle<()>>,
     threads: Vec<JoinHandle<()>>,
     socket: PathBuf,
+    /// Else it goes on without this process.
+    socket_is_ours: bool,
     listen: Option<SocketAddr>,
 }
 
@@ -90,8 +104,16 @@ impl Daemon {
     /// # Errors
     /// Any [`StartError`].
     pub async fn start(config: Config) -> Result<Self, StartError> {
+        Self::start_activated(config, Inherited::default()).await
+    }
+
+    /// The same, with the API on sockets that this process was handed over.
+    ///
+    /// # Errors
+    /// Any [`StartError`].
+    pub async fn start_activated(config: Config, inherited: Inherited) -> Result<Self, StartError> {
         let scanner = open_scanner(&config.scanner)?;
-        Self::start_with(config, scanner).await
+        Self::start_all(config, scanner, Arc::new(LocalDisk), inherited).await
     }
 
     /// Starts the service with any scanner.
@@ -99,43 +121,69 @@ impl Daemon {
     /// # Errors
     /// Any [`StartError`] but [`StartError::Scanner`].
     pub async fn start_with(config: Config, scanner: Arc<dyn Scanner>) -> Result<Self, StartError> {
-        let scans_dir = prepare_state(&config.service.state_dir)?;
+        Self::start_on(config, scanner, Arc::new(LocalDisk)).await
+    }
+
+    /// Starts the service with any scanner on any disk.
+    ///
+    /// # Errors
+    /// Any [`StartError`] but [`StartError::Scanner`].
+    pub async fn start_on(
+        config: Config,
+        scanner: Arc<dyn Scanner>,
+        disk: Arc<dyn Disk>,
+    ) -> Result<Self, StartError> {
+        Self::start_all(config, scanner, disk, Inherited::default()).await
+    }
+
+    async fn start_all(
+        config: Config,
+        scanner: Arc<dyn Scanner>,
+        disk: Arc<dyn Disk>,
+        inherited: Inherited,
+    ) -> Result<Self, StartError> {
+        let scans_dir = prepare_state(&*disk, &config.service.state_dir)?;
         let records = config.service.state_dir.join("reliefd.redb");
-        let store = Store::open_soon(&records, HANDOVER).await?;
+        let store = Store::open_soon(&disk, &records, HANDOVER).await?;
         remove_grids(&scans_dir);
-        let spool = Spool::open(&config.service.spool_dir)?;
-        let unix = bind_socket(&config.service.socket).await?;
-        let tcp = match config.service.listen {
-            Some(address) => Some(bind_loopback(address).await?),
-            None => None,
-        };
-        let listen = tcp.as_ref().and_then(|tcp| tcp.local_addr().ok());
-        let socket = config.service.socket.clone();
+        let spool = Spool::open(Arc::clone(&disk), &config.service.spool_dir)?;
+        let tokens = Tokens::open(&config.service.state_dir.join("tokens.json"))?;
+        let laser = Laser::open(&config.service.state_dir.join("laser.jsonl"))?;
+        let offered = inherited.or_bind(&config.service).await?;
         let workers = config.queue.workers;
-        let service = Arc::new(Service::new(config, scanner, store, spool, scans_dir));
+        let limits = config.http;
+        let kept = Kept {
+            disk,
+            store,
+            spool,
+            tokens,
+            laser,
+        };
+        let service = Arc::new(Service::new(config, scanner, kept, scans_dir));
         service.recover_scans().map_err(StartError::Recover)?;
+        service.adopt_journals().map_err(StartError::Recover)?;
         service.recover_jobs().map_err(StartError::Recover)?;
+        service.sweep();
 
         let stop = CancellationToken::new();
-        let app = router(Context {
+        let context = Context {
             service: Arc::clone(&service),
             stop: stop.clone(),
-        });
+            listeners: Arc::new(Semaphore::new(limits.listeners)),
+        };
         let mut daemon = Self {
             service,
             stop,
             servers: Vec::new(),
             threads: Vec::new(),
-            socket,
-            listen,
+            socket: offered.socket,
+            socket_is_ours: offered.socket_is_ours,
+            listen: offered.listen,
         };
         daemon.start_threads(workers).map_err(StartError::Thread)?;
-        daemon.serve(unix, app.clone());
-        if let Some(tcp) = tcp {
-            daemon.serve(
-                tcp,
-                app.layer(axum::middleware::from_fn(local_callers_only)),
-            );
+        daemon.serve(offered.unix, on_socket(&context), limits);
+        if let Some(tcp) = offered.tcp {
+            daemon.serve(tcp, on_loopback(&context), limits);
         }
         tracing::info!(socket = %daemon.socket.display(), "reliefd {} is ready", env!("CARGO_PKG_VERSION"));
         Ok(daemon)
@@ -153,26 +201,25 @@ impl Daemon {
         let service = Arc::clone(&self.service);
         self.threads.push(
             std::thread::Builder::new()
+                .name("tidy".into())
+                .spawn(move || tidy(&service))?,
+        );
+        let service = Arc::clone(&self.service);
+        self.threads.push(
+            std::thread::Builder::new()
                 .name("scanner-watch".into())
                 .spawn(move || watch(&service))?,
         );
         Ok(())
     }
 
-    fn serve<L>(&mut self, listener: L, app: Router)
+    fn serve<L>(&mut self, listener: L, app: Router, limits: HttpConfig)
     where
         L: axum::serve::Listener,
         L::Addr: std::fmt::Debug,
     {
-        let stopped = self.stop.clone().cancelled_owned();
-        self.servers.push(tokio::spawn(async move {
-            if let Err(error) = axum::serve(listener, app)
-                .with_graceful_shutdown(stopped)
-                .await
-            {
-                tracing::error!(%error, "the API ended");
-            }
-        }));
+        let serving = serve(listener, app, limits, self.stop.clone());
+        self.servers.push(tokio::spawn(serving));
     }
 
     /// The Unix socket of the API.
@@ -185,6 +232,12 @@ impl Daemon {
     #[must_use]
     pub fn listen(&self) -> Option<SocketAddr> {
         self.listen
+    }
+
+    /// A way to ask how the service does.
+    #[must_use]
+    pub fn health(&self) -> Health {
+        Health::new(&self.service)
     }
 
     /// The spool's folder.
@@ -237,7 +290,9 @@ impl Daemon {
         if tokio::time::timeout(DRAIN, drain).await.is_err() {
             tracing::warn!("some connections were cut");
         }
-        remove_if_there(&self.socket);
+        if self.socket_is_ours {
+            remove_if_there(&self.socket);
+        }
         // A connection, or a request that waits for the scanner, may hold the service for
         // longer than it is waited for above. The records are given up here in any case,
         // and last: who waits for them finds all else given up too.
@@ -251,9 +306,9 @@ impl Daemon {
 }
 
 /// Makes the state folder; gives that of the scans.
-fn prepare_state(state_dir: &Path) -> Result<PathBuf, StartError> {
+fn prepare_state(disk: &dyn Disk, state_dir: &Path) -> Result<PathBuf, StartError> {
     let scans_dir = state_dir.join("scans");
-    std::fs::create_dir_all(&scans_dir).map_err(|source| StartError::StateDir {
+    create_dir_all(disk, &scans_dir).map_err(|source| StartError::StateDir {
         path: state_dir.to_owned(),
         source,
     })?;

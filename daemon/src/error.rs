@@ -9,6 +9,7 @@ use crate::acquisition::PlanError;
 use crate::config::OverrideError;
 use crate::spool::SpoolError;
 use crate::store::StoreError;
+use crate::tokens::TokenError;
 
 /// Why the service refuses a request.
 #[derive(Debug, thiserror::Error)]
@@ -74,6 +75,15 @@ pub enum ServiceError {
     /// No scan is under way.
     #[error("no scan is under way")]
     NothingToAbort,
+    /// No scan is paused.
+    #[error("{}", match .scan {
+        Some(scan) => format!("the scan {scan} is not paused"),
+        None => "no scan is paused".to_owned(),
+    })]
+    NothingToResume {
+        /// The scan that was meant.
+        scan: Option<String>,
+    },
     /// There is no such job.
     #[error("there is no job {id}")]
     NoSuchJob {
@@ -96,12 +106,31 @@ pub enum ServiceError {
         /// The folder or file.
         what: String,
     },
+    /// The disk would get full.
+    #[error(
+        "there is no room in {folder}: the scan takes up to {}, and {} are to stay free \
+         (storage.reserve_mb), but only {} are free",
+        megabytes(*.scan_bytes), megabytes(*.reserve_bytes), megabytes(*.free_bytes)
+    )]
+    NoRoom {
+        /// The folder that would get full.
+        folder: String,
+        /// Most bytes that the scan takes there; 0 for the spool.
+        scan_bytes: u64,
+        /// Bytes that are to stay free.
+        reserve_bytes: u64,
+        /// Bytes that are free.
+        free_bytes: u64,
+    },
     /// The records do not work.
     #[error(transparent)]
     Store(#[from] StoreError),
     /// The spool does not work.
     #[error(transparent)]
     Spool(#[from] SpoolError),
+    /// The tokens do not work.
+    #[error(transparent)]
+    Token(#[from] TokenError),
     /// A file does not work.
     #[error("cannot read {what}: {source}")]
     Io {
@@ -115,6 +144,11 @@ pub enum ServiceError {
     Thread(io::Error),
 }
 
+/// A size for people.
+pub(crate) fn megabytes(bytes: u64) -> String {
+    format!("{:.1} MB", bytes as f64 * 1e-6)
+}
+
 /// What a panic said.
 pub(crate) fn panic_text(panic: &(dyn std::any::Any + Send)) -> &str {
     panic
@@ -122,4 +156,29 @@ pub(crate) fn panic_text(panic: &(dyn std::any::Any + Send)) -> &str {
         .copied()
         .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
         .unwrap_or("no message")
+}
+
+/// Longest message that may hold something given from outside, in characters.
+const MOST_MESSAGE_CHARS: usize = 1_000;
+
+/// A message that repeats what somebody wrote, however long that was.
+pub(crate) fn bounded(mut message: String) -> String {
+    if let Some((end, _)) = message.char_indices().nth(MOST_MESSAGE_CHARS) {
+        message.truncate(end);
+        message.push_str(" ...");
+    }
+    message
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_are_bounded_between_characters() {
+        assert_eq!(bounded("\u{e4}".into()), "\u{e4}");
+        let fits = "\u{e4}".repeat(MOST_MESSAGE_CHARS);
+        assert_eq!(bounded(fits.clone()), fits);
+        assert_eq!(bounded(format!("{fits}x")), format!("{fits} ..."));
+    }
 }

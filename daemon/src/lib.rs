@@ -13,23 +13,33 @@
 
 pub mod config;
 pub mod logging;
+pub mod systemd;
 
 mod acquisition;
+mod arguments;
 mod daemon;
 mod error;
 mod events;
 mod http;
 mod ids;
 mod jobs;
+mod laser;
+mod liveness;
+mod recovery;
 mod scans;
 mod service;
+mod space;
 mod spool;
 mod store;
+mod tokens;
 
 pub use acquisition::PlanError;
+pub use arguments::Arguments;
 pub use config::{Config, ConfigError};
 pub use daemon::{Daemon, StartError};
 pub use error::ServiceError;
 pub use http::ListenError;
+pub use laser::LaserLogError;
 pub use spool::SpoolError;
 pub use store::StoreError;
+pub use tokens::TokenError;

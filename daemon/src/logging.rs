@@ -2,6 +2,7 @@
 
 use std::io::IsTerminal;
 
+use tracing_journald::{Priority, PriorityMappings};
 use tracing_subscriber::filter::EnvFilter;
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
@@ -49,7 +50,7 @@ impl LogHandle {
 pub fn init(config: &LogConfig) -> Result<LogHandle, LogError> {
     let (filter, handle) = reload::Layer::new(filter(&config.level)?);
     let layer: Box<dyn Layer<_> + Send + Sync> = match resolved(config.format) {
-        LogFormat::Journald => Box::new(tracing_journald::layer().map_err(LogError::NoJournal)?),
+        LogFormat::Journald => Box::new(journal().map_err(LogError::NoJournal)?),
         LogFormat::Json => Box::new(fmt::layer().json().with_writer(std::io::stderr)),
         LogFormat::Text | LogFormat::Auto => Box::new(
             fmt::layer()
@@ -66,12 +67,33 @@ pub fn init(config: &LogConfig) -> Result<LogHandle, LogError> {
     Ok(LogHandle { filter: handle })
 }
 
-/// systemd sets JOURNAL_STREAM when standard error goes to its journal.
+/// A message's fields become fields of the journal's entry: `scan` is `RELIEF_SCAN`.
+fn journal() -> std::io::Result<tracing_journald::Layer> {
+    Ok(tracing_journald::layer()?
+        .with_syslog_identifier("reliefd".into())
+        .with_field_prefix(Some("RELIEF".into()))
+        .with_priority_mappings(PriorityMappings {
+            info: Priority::Informational,
+            debug: Priority::Debug,
+            ..PriorityMappings::new()
+        }))
+}
+
 fn resolved(format: LogFormat) -> LogFormat {
     match format {
-        LogFormat::Auto if std::env::var_os("JOURNAL_STREAM").is_some() => LogFormat::Journald,
+        LogFormat::Auto if goes_to_journal() => LogFormat::Journald,
         other => other,
     }
+}
+
+/// systemd sets JOURNAL_STREAM to device and number of the file that leads to its journal.
+/// Programs that were started by a service inherit the variable, but not always the file.
+fn goes_to_journal() -> bool {
+    let Some(said) = std::env::var_os("JOURNAL_STREAM") else {
+        return false;
+    };
+    rustix::fs::fstat(std::io::stderr())
+        .is_ok_and(|file| said.to_str() == Some(&format!("{}:{}", file.st_dev, file.st_ino)))
 }
 
 fn filter(level: &str) -> Result<EnvFilter, LogError> {

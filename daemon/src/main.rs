@@ -1,33 +1,30 @@
 //! The service as a program: command line, signals, log, systemd.
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
 use reliefd::logging::{self, LogHandle};
-use reliefd::{Config, Daemon};
-use sd_notify::NotifyState;
+use reliefd::systemd::{self, Inherited};
+use reliefd::{Arguments, Config, Daemon};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
-/// The Relief service: takes scans from a slide-table scanner and leaves CAD files in a
-/// spool folder.
-///
-/// SIGHUP reads the configuration again and takes over what may change in service.
-/// SIGTERM and SIGINT end the service in good order.
-#[derive(Debug, Parser)]
-#[command(version)]
-struct Arguments {
-    /// The configuration (TOML)
-    #[arg(long, value_name = "FILE", default_value = "/etc/relief/reliefd.toml")]
-    config: PathBuf,
-    /// Only look whether the configuration is sound
-    #[arg(long)]
-    check_config: bool,
-}
+/// "Configuration error" in sysexits.h: trying again does not help, and systemd is told so.
+const EX_CONFIG: u8 = 78;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    match run(&arguments) {
+    let config = match Config::load(&arguments.config) {
+        Ok(config) => config,
+        Err(error) => {
+            eprintln!("reliefd: {error}");
+            return ExitCode::from(EX_CONFIG);
+        }
+    };
+    if arguments.check_config {
+        println!("{}: sound", arguments.config.display());
+        return ExitCode::SUCCESS;
+    }
+    match run(&arguments, config) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("reliefd: {error}");
@@ -36,39 +33,43 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
-    let config = Config::load(&arguments.config)?;
-    if arguments.check_config {
-        println!("{}: sound", arguments.config.display());
-        return Ok(());
-    }
+fn run(arguments: &Arguments, config: Config) -> Result<(), Box<dyn std::error::Error>> {
+    // Before there is another thread: it changes the environment.
+    let inherited = Inherited::take()?;
     let log = logging::init(&config.log)?;
     tokio::runtime::Builder::new_multi_thread()
         // The API needs little; the processors are for the jobs.
         .worker_threads(2)
         .enable_all()
         .build()?
-        .block_on(serve(arguments, config, &log))
+        .block_on(serve(arguments, config, inherited, &log))
 }
 
 async fn serve(
     arguments: &Arguments,
     config: Config,
+    inherited: Inherited,
     log: &LogHandle,
 ) -> Result<(), Box<dyn std::error::Error>> {
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;
     let mut hangup = signal(SignalKind::hangup())?;
-    let daemon = Daemon::start(config).await?;
-    tell_systemd(&[NotifyState::Ready]);
+    let daemon = Daemon::start_activated(config, inherited).await?;
+    systemd::ready();
+    // A task, so that it depends on the threads that serve the API.
+    tokio::spawn(systemd::keep_alive(daemon.health()));
     loop {
         tokio::select! {
             () = received(&mut terminate) => break,
             () = received(&mut interrupt) => break,
-            () = received(&mut hangup) => reload(&daemon, arguments, log),
+            () = received(&mut hangup) => {
+                systemd::reloading();
+                reload(&daemon, arguments, log);
+                systemd::ready();
+            }
         }
     }
-    tell_systemd(&[NotifyState::Stopping]);
+    systemd::stopping();
     daemon.shutdown().await;
     Ok(())
 }
@@ -99,12 +100,5 @@ fn reload(daemon: &Daemon, arguments: &Arguments, log: &LogHandle) {
             sections = ?outcome.needs_restart,
             "these changes only hold after a restart of reliefd"
         );
-    }
-}
-
-fn tell_systemd(states: &[NotifyState<'_>]) {
-    // Without systemd there is nobody to tell, and that is no error.
-    if let Err(error) = sd_notify::notify(states) {
-        tracing::debug!(%error, "cannot tell systemd");
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 
 use relief_api::{Event, Scan, ScanState, ScannerLink, StartScan};
-use scan_record::JournalReader;
+use scanner_driver::ScannerError;
 
 use crate::acquisition::{AbortRequest, Ticket, resolve, run};
 use crate::error::ServiceError;
@@ -56,6 +56,7 @@ impl Service {
         })?;
         self.note_identity(&identity);
         let plan = resolve(&request.plan.or(&config.scan), &identity)?;
+        self.check_room(plan.plan.columns, plan.plan.samples)?;
         let id = self.ids.next(&request.name, |id| {
             self.spool.has(id) || self.journal_path(id).exists()
         });
@@ -73,6 +74,7 @@ impl Service {
             columns: 0,
             settings: request.settings.clone(),
             jobs: Vec::new(),
+            removed_at: None,
         };
         let abort = Arc::new(AbortRequest::default());
         let ticket = Ticket {
@@ -88,6 +90,7 @@ impl Service {
             let mut slot = lock(&self.slot);
             self.check_running()?;
             self.store.put_scan(&scan)?;
+            self.laser.scan_begins(&scan.id);
             let service = Arc::clone(self);
             let thread = std::thread::Builder::new()
                 .name("scan".into())
@@ -99,8 +102,9 @@ impl Service {
                 abort,
             };
             reservation.used = true;
+            // Before the lock goes, so that nobody hears of what follows first.
+            self.hub.tell(Event::Scan(scan.clone()));
         }
-        self.hub.tell(Event::Scan(scan.clone()));
         Ok(scan)
     }
 
@@ -145,10 +149,38 @@ impl Service {
                 }
             }
         };
+        // First the reason: whoever takes the scan stops the scanner as soon as it is asked to.
+        self.laser.stop_asked(reason);
         abort.ask(reason);
         if let Err(error) = self.scanner.abort() {
             tracing::warn!(%error, "cannot tell the scanner to stop");
         }
+        self.scan(&scan.id)
+    }
+
+    /// Lets the paused scan, or that of this id, go on: somebody has looked. Whether it does go
+    /// on is told by events.
+    pub(crate) fn resume_scan(&self, id: Option<&str>) -> Result<Scan, ServiceError> {
+        let paused = self
+            .active_scan()
+            .filter(|scan| scan.state == ScanState::Paused && id.is_none_or(|id| id == scan.id));
+        let Some(scan) = paused else {
+            if let Some(id) = id {
+                // One that is not there is another mistake.
+                self.scan(id)?;
+            }
+            return Err(ServiceError::NothingToResume {
+                scan: id.map(str::to_owned),
+            });
+        };
+        tracing::info!(scan = %scan.id, "asked to go on");
+        self.scanner.resume_scan().map_err(|error| match error {
+            // It has gone on by itself in this very moment.
+            ScannerError::NothingPaused => ServiceError::NothingToResume {
+                scan: Some(scan.id.clone()),
+            },
+            error => ServiceError::Scanner(error),
+        })?;
         self.scan(&scan.id)
     }
 
@@ -204,6 +236,7 @@ impl Service {
     /// Notes how the scan under way ended, queues its job if it is complete, and makes
     /// room for the next.
     pub(crate) fn end_scan(&self, id: &str, state: ScanState, reason: Option<String>) {
+        self.laser.scan_ended(state, reason.as_deref());
         let scan = self.update_active(|scan| {
             scan.state = state;
             scan.reason = reason;
@@ -212,13 +245,9 @@ impl Service {
         let Some(mut scan) = scan.filter(|scan| scan.id == id) else {
             return;
         };
-        let kept = if state == ScanState::Complete {
-            self.queue_first_job(&mut scan).map(drop)
-        } else {
-            self.store.put_scan(&scan).map_err(ServiceError::from)
-        };
-        if let Err(error) = kept {
-            tracing::error!(scan = id, %error, "cannot keep the record of a scan");
+        if let Err(error) = self.keep_ended(&mut scan) {
+            tracing::error!(scan = id, %error, "cannot keep the record of a scan now; its columns are safe");
+            lock(&self.unkept).push(scan.clone());
         }
         *lock(&self.slot) = Slot::Free;
         match (state, &scan.reason) {
@@ -235,6 +264,13 @@ impl Service {
         if let Some(scan) = self.active_scan().filter(|scan| scan.id == id) {
             return Ok(scan);
         }
+        let unkept = lock(&self.unkept)
+            .iter()
+            .find(|scan| scan.id == id)
+            .cloned();
+        if let Some(scan) = unkept {
+            return Ok(scan);
+        }
         self.store
             .scan(id)?
             .ok_or_else(|| ServiceError::NoSuchScan { id: id.to_owned() })
@@ -242,39 +278,19 @@ impl Service {
 
     /// All scans, newest first.
     pub(crate) fn scans(&self) -> Result<Vec<Scan>, ServiceError> {
-        let active = self.active_scan();
+        let newer: Vec<Scan> = lock(&self.unkept)
+            .iter()
+            .cloned()
+            .chain(self.active_scan())
+            .collect();
         let mut scans = self.store.scans()?;
         scans.reverse();
-        if let Some(active) = active
-            && let Some(kept) = scans.iter_mut().find(|scan| scan.id == active.id)
-        {
-            *kept = active;
+        for newer in newer {
+            if let Some(kept) = scans.iter_mut().find(|scan| scan.id == newer.id) {
+                *kept = newer;
+            }
         }
         Ok(scans)
-    }
-
-    /// After a restart: notes scans that were cut short, and what was kept of them.
-    pub(crate) fn recover_scans(&self) -> Result<(), ServiceError> {
-        for mut scan in self.store.scans()? {
-            if scan.state.is_over() {
-                continue;
-            }
-            let (columns, found) = match JournalReader::open(&self.journal_path(&scan.id)) {
-                Ok(mut reader) => {
-                    while let Ok(Some(_)) = reader.next_column() {}
-                    let ending = reader.ending().map(ToString::to_string);
-                    (reader.columns(), ending.unwrap_or_default())
-                }
-                Err(error) => (0, error.to_string()),
-            };
-            scan.columns = columns;
-            scan.state = ScanState::Interrupted;
-            scan.reason = Some(format!("the service ended during the scan ({found})"));
-            scan.ended_at = Some(now());
-            tracing::warn!(scan = %scan.id, columns, "a scan was cut short when the service last ended");
-            self.store.put_scan(&scan)?;
-        }
-        Ok(())
     }
 }
 
@@ -282,12 +298,16 @@ impl Service {
 mod tests {
     use super::*;
     use crate::config::Config;
+    use crate::laser::Laser;
+    use crate::service::Kept;
     use crate::spool::Spool;
     use crate::store::Store;
+    use crate::tokens::Tokens;
     use range_image::{Calibration, calibration::Head};
     use scan_record::{Header, JournalWriter, RawColumn};
-    use scanner_driver::{DeviceStatus, ScanStream, Scanner, ScannerError};
+    use scanner_driver::{DeviceStatus, ScanStream, Scanner};
     use scanner_protocol::{Identity, ScanPlan};
+    use storage::LocalDisk;
 
     /// Nothing is attached.
     struct Absent;
@@ -316,8 +336,13 @@ mod tests {
         let service = Service::new(
             Config::default(),
             Arc::new(Absent),
-            Store::open(&folder.path().join("store")).unwrap(),
-            Spool::open(&folder.path().join("spool")).unwrap(),
+            Kept {
+                disk: Arc::new(LocalDisk),
+                store: Store::open(Arc::new(LocalDisk), &folder.path().join("store")).unwrap(),
+                spool: Spool::open(Arc::new(LocalDisk), &folder.path().join("spool")).unwrap(),
+                tokens: Tokens::open(&folder.path().join("tokens.json")).unwrap(),
+                laser: Laser::open(&folder.path().join("laser.jsonl")).unwrap(),
+            },
             folder.path().to_owned(),
         );
         let scan = Scan {
@@ -334,6 +359,7 @@ mod tests {
             columns: 0,
             settings: relief_api::SettingOverrides::new(),
             jobs: Vec::new(),
+            removed_at: None,
         };
         service.store.put_scan(&scan).unwrap();
         let header = Header {

@@ -7,9 +7,10 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use regrid::RegridSettings;
-use relief_api::{Event, ScannerLink, ScannerStatus, Status};
+use relief_api::{Event, Scan, ScannerLink, ScannerStatus, Status};
 use scanner_driver::Scanner;
 use scanner_protocol::Identity;
+use storage::Disk;
 
 use crate::acquisition::describe_trouble;
 use crate::config::{Config, Reloaded};
@@ -17,18 +18,35 @@ use crate::error::ServiceError;
 use crate::events::Hub;
 use crate::ids::{Ids, now};
 use crate::jobs::Queue;
+use crate::laser::{Laser, Watched};
+use crate::liveness::Liveness;
 use crate::scans::Slot;
 use crate::spool::Spool;
 use crate::store::Store;
+use crate::tokens::Tokens;
+
+/// What outlives the process, and where it is kept.
+pub(crate) struct Kept {
+    pub(crate) disk: Arc<dyn Disk>,
+    pub(crate) store: Store,
+    pub(crate) spool: Spool,
+    pub(crate) tokens: Tokens,
+    pub(crate) laser: Laser,
+}
 
 /// What all parts of the service share.
 pub(crate) struct Service {
     pub(crate) scanner: Arc<dyn Scanner>,
+    /// Where everything is kept that must survive.
+    pub(crate) disk: Arc<dyn Disk>,
     pub(crate) store: Store,
     pub(crate) spool: Spool,
+    pub(crate) tokens: Tokens,
+    pub(crate) laser: Arc<Laser>,
     pub(crate) hub: Hub,
     pub(crate) ids: Ids,
     pub(crate) queue: Queue,
+    pub(crate) liveness: Liveness,
     /// The scan under way, if any.
     pub(crate) slot: Mutex<Slot>,
     /// Threads of scans; all but the last are about to end, if they have not yet.
@@ -37,6 +55,10 @@ pub(crate) struct Service {
     scans_dir: PathBuf,
     scanner_status: Mutex<ScannerStatus>,
     grids: Mutex<BTreeMap<String, KeptGrid>>,
+    /// Scans that are over and whose records the disk refused.
+    pub(crate) unkept: Mutex<Vec<Scan>>,
+    /// Bytes of kept scans and of results, as of the last look.
+    pub(crate) kept_bytes: Mutex<(u64, u64)>,
     started_at: String,
     stopping: Mutex<bool>,
     stop_told: Condvar,
@@ -53,18 +75,29 @@ impl Service {
     pub(crate) fn new(
         config: Config,
         scanner: Arc<dyn Scanner>,
-        store: Store,
-        spool: Spool,
+        kept: Kept,
         scans_dir: PathBuf,
     ) -> Self {
-        let endpoint = config.scanner.place();
-        Self {
-            scanner,
+        let Kept {
+            disk,
             store,
             spool,
+            tokens,
+            laser,
+        } = kept;
+        let endpoint = config.scanner.place();
+        let laser = Arc::new(laser);
+        Self {
+            scanner: Arc::new(Watched::new(scanner, Arc::clone(&laser))),
+            disk,
+            store,
+            spool,
+            tokens,
+            laser,
             hub: Hub::default(),
             ids: Ids::default(),
             queue: Queue::default(),
+            liveness: Liveness::default(),
             slot: Mutex::new(Slot::Free),
             scan_threads: Mutex::default(),
             config: RwLock::new(Arc::new(config)),
@@ -78,6 +111,8 @@ impl Service {
                 problem: None,
             }),
             grids: Mutex::default(),
+            unkept: Mutex::default(),
+            kept_bytes: Mutex::default(),
             started_at: now(),
             stopping: Mutex::new(false),
             stop_told: Condvar::new(),
@@ -104,11 +139,18 @@ impl Service {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             started_at: self.started_at.clone(),
             scanner: self.scanner_status(),
+            laser: self.laser.latest().map(Box::new),
             scan: self.active_scan(),
             jobs_queued,
             jobs_running,
             spool: self.spool.root().display().to_string(),
+            storage: Some(Box::new(self.storage_status())),
         }
+    }
+
+    /// Folder of the kept scans.
+    pub(crate) fn scans_dir(&self) -> &Path {
+        &self.scans_dir
     }
 
     /// Where a scan's columns are kept.
@@ -135,6 +177,14 @@ impl Service {
     pub(crate) fn forget_grid(&self, scan: &str) {
         lock(&self.grids).remove(scan);
         remove_if_there(&self.grid_path(scan));
+    }
+
+    /// Removes every range image that was put aside.
+    pub(crate) fn forget_grids(&self) {
+        let grids = std::mem::take(&mut *lock(&self.grids));
+        for scan in grids.keys() {
+            remove_if_there(&self.grid_path(scan));
+        }
     }
 
     /// What is known of the scanner.

@@ -3,8 +3,12 @@
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use relief_api::{SpoolEntry, SpoolFile};
+use rustix::fs::{self as fs_at, Mode, OFlags};
+use rustix::io::Errno;
+use storage::{Disk, create_dir_all, remove_dir_if_there};
 
 /// Begins the name of a folder that is still being filled.
 const INCOMING: &str = ".incoming-";
@@ -52,22 +56,25 @@ impl SpoolError {
 #[derive(Debug, Clone)]
 pub(crate) struct Spool {
     root: PathBuf,
+    disk: Arc<dyn Disk>,
 }
 
 impl Spool {
     /// Makes the folder if need be, proves that it can be written, and removes what an
     /// earlier run left unfinished.
-    pub(crate) fn open(root: &Path) -> Result<Self, SpoolError> {
-        fs::create_dir_all(root).map_err(error("make the folder", root))?;
+    pub(crate) fn open(disk: Arc<dyn Disk>, root: &Path) -> Result<Self, SpoolError> {
+        create_dir_all(&*disk, root).map_err(error("make the folder", root))?;
         // Results are told to clients that may run elsewhere in the tree.
         let root = root
             .canonicalize()
             .map_err(error("find the folder", root))?;
-        let spool = Self { root };
+        let spool = Self { root, disk };
         spool.remove_unfinished()?;
         let probe = spool.root.join(format!("{INCOMING}probe"));
-        fs::create_dir(&probe)
-            .and_then(|()| fs::remove_dir(&probe))
+        spool
+            .disk
+            .create_dir(&probe)
+            .and_then(|()| spool.disk.remove_dir_all(&probe))
             .map_err(error("write", &spool.root))?;
         Ok(spool)
     }
@@ -82,35 +89,33 @@ impl Spool {
         self.root.join(result)
     }
 
-    /// True when the result is there, and thus whole.
+    /// True when the result is there, and thus whole. A symbolic link is none: it could
+    /// lead anywhere.
     pub(crate) fn has(&self, result: &str) -> bool {
-        self.directory(result).is_dir()
+        let found = self.directory(result).symlink_metadata();
+        found.is_ok_and(|metadata| metadata.is_dir())
     }
 
     /// A new empty folder for the making of a result.
     pub(crate) fn begin(&self, result: &str) -> Result<PathBuf, SpoolError> {
         let incoming = self.root.join(format!("{INCOMING}{result}"));
-        match fs::remove_dir_all(&incoming) {
-            Err(e) if e.kind() != io::ErrorKind::NotFound => {
-                return Err(error("remove an unfinished result", &self.root)(e));
-            }
-            _ => {}
-        }
-        fs::create_dir(&incoming).map_err(error("make a folder", &self.root))?;
+        remove_dir_if_there(&*self.disk, &incoming)
+            .map_err(error("remove an unfinished result", &self.root))?;
+        self.disk
+            .create_dir(&incoming)
+            .map_err(error("make a folder", &self.root))?;
         Ok(incoming)
     }
 
     /// Gives up the making of a result.
     pub(crate) fn discard(&self, result: &str) {
         let incoming = self.root.join(format!("{INCOMING}{result}"));
-        if let Err(error) = fs::remove_dir_all(&incoming)
-            && error.kind() != io::ErrorKind::NotFound
-        {
+        if let Err(error) = remove_dir_if_there(&*self.disk, &incoming) {
             tracing::warn!(folder = %incoming.display(), %error, "cannot remove an unfinished result");
         }
     }
 
-    /// Syncs everything in the new folder and puts it in its place. Publishing what is
+    /// Puts the new folder, whose files are synced, in its place. Publishing what is
     /// published already changes nothing.
     pub(crate) fn publish(&self, result: &str) -> Result<PathBuf, SpoolError> {
         let directory = self.directory(result);
@@ -119,18 +124,25 @@ impl Spool {
             return Ok(directory);
         }
         let incoming = self.root.join(format!("{INCOMING}{result}"));
-        let sync = || -> io::Result<()> {
-            for entry in fs::read_dir(&incoming)? {
-                File::open(entry?.path())?.sync_all()?;
-            }
-            File::open(&incoming)?.sync_all()
-        };
-        sync().map_err(error("sync a result", &self.root))?;
-        fs::rename(&incoming, &directory).map_err(error("put a result in place", &self.root))?;
-        File::open(&self.root)
-            .and_then(|folder| folder.sync_all())
+        self.disk
+            .sync_dir(&incoming)
+            .map_err(error("sync a result", &self.root))?;
+        self.disk
+            .rename(&incoming, &directory)
+            .map_err(error("put a result in place", &self.root))?;
+        self.disk
+            .sync_dir(&self.root)
             .map_err(error("sync the folder", &self.root))?;
         Ok(directory)
+    }
+
+    /// Removes a result. It is gone at once, and never half.
+    pub(crate) fn remove(&self, result: &str) -> Result<(), SpoolError> {
+        let gone = self.root.join(format!("{INCOMING}removed-{result}"));
+        self.disk
+            .rename(&self.directory(result), &gone)
+            .and_then(|()| self.disk.remove_dir_all(&gone))
+            .map_err(error("remove a result", &self.root))
     }
 
     /// What is in a result's folder; `None` when there is none of that name.
@@ -161,25 +173,40 @@ impl Spool {
         }))
     }
 
-    /// Path of a file of a result. `None` for names that are not plain, and for what is
-    /// not a regular file of the spool itself: a symbolic link could lead anywhere.
-    pub(crate) fn file(&self, result: &str, file: &str) -> Option<PathBuf> {
+    /// A file of a result, for reading. `None` for names that are not plain, and for what
+    /// is not a regular file of the spool itself: a symbolic link could lead anywhere.
+    pub(crate) fn file(&self, result: &str, file: &str) -> io::Result<Option<File>> {
         if !is_plain_name(result) || !is_plain_name(file) {
-            return None;
+            return Ok(None);
         }
-        let path = self.directory(result).join(file);
-        let is_own = |path: &Path, want_file: bool| {
-            path.symlink_metadata()
-                .is_ok_and(|m| if want_file { m.is_file() } else { m.is_dir() })
+        // Step by step from a folder that is held, so that nothing can be put in the way
+        // between a check and its use. A pipe must not keep the reader waiting either.
+        let opened = || -> rustix::io::Result<File> {
+            let here = OFlags::NOFOLLOW | OFlags::CLOEXEC | OFlags::NONBLOCK;
+            let root = fs_at::open(
+                &self.root,
+                OFlags::DIRECTORY | OFlags::CLOEXEC,
+                Mode::empty(),
+            )?;
+            let folder = fs_at::openat(&root, result, here | OFlags::DIRECTORY, Mode::empty())?;
+            fs_at::openat(&folder, file, here, Mode::empty()).map(File::from)
         };
-        (is_own(&self.directory(result), false) && is_own(&path, true)).then_some(path)
+        match opened() {
+            Ok(file) if file.metadata()?.is_file() => Ok(Some(file)),
+            Ok(_) => Ok(None),
+            Err(Errno::NOENT | Errno::NOTDIR | Errno::LOOP | Errno::NAMETOOLONG | Errno::NXIO) => {
+                Ok(None)
+            }
+            Err(error) => Err(error.into()),
+        }
     }
 
     fn remove_unfinished(&self) -> Result<(), SpoolError> {
         for entry in fs::read_dir(&self.root).map_err(error("list the folder", &self.root))? {
             let entry = entry.map_err(error("list the folder", &self.root))?;
             if entry.file_name().to_string_lossy().starts_with(INCOMING) {
-                fs::remove_dir_all(entry.path())
+                self.disk
+                    .remove_dir_all(&entry.path())
                     .map_err(error("remove an unfinished result", &self.root))?;
             }
         }
@@ -206,11 +233,16 @@ fn error(action: &'static str, path: &Path) -> impl Fn(io::Error) -> SpoolError 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use storage::LocalDisk;
+
+    fn open(root: &Path) -> Result<Spool, SpoolError> {
+        Spool::open(Arc::new(LocalDisk), root)
+    }
 
     #[test]
     fn a_result_appears_whole_and_once() {
         let folder = tempfile::tempdir().unwrap();
-        let spool = Spool::open(folder.path()).unwrap();
+        let spool = open(folder.path()).unwrap();
         let incoming = spool.begin("a").unwrap();
         fs::write(incoming.join("x.igs"), "first").unwrap();
         assert!(!spool.has("a"));
@@ -233,9 +265,9 @@ mod tests {
     #[test]
     fn what_a_crash_left_is_removed_at_the_next_start() {
         let folder = tempfile::tempdir().unwrap();
-        let spool = Spool::open(folder.path()).unwrap();
+        let spool = open(folder.path()).unwrap();
         fs::write(spool.begin("b").unwrap().join("half"), "").unwrap();
-        Spool::open(folder.path()).unwrap();
+        open(folder.path()).unwrap();
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 
@@ -243,12 +275,15 @@ mod tests {
     fn names_cannot_leave_the_spool() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("secret"), "s").unwrap();
-        let spool = Spool::open(&folder.path().join("spool")).unwrap();
+        let spool = open(&folder.path().join("spool")).unwrap();
         fs::write(spool.begin("a").unwrap().join("x"), "").unwrap();
         spool.publish("a").unwrap();
         std::os::unix::fs::symlink(folder.path().join("secret"), spool.directory("a").join("l"))
             .unwrap();
-        assert!(spool.file("a", "x").is_some());
+        std::os::unix::fs::symlink(folder.path(), spool.directory("out")).unwrap();
+        rustix::fs::mkfifoat(rustix::fs::CWD, spool.directory("a").join("p"), Mode::RUSR).unwrap();
+        assert!(spool.file("a", "x").unwrap().is_some());
+        let long = "x".repeat(300);
         for (result, file) in [
             ("..", "secret"),
             ("a", "../../secret"),
@@ -257,10 +292,23 @@ mod tests {
             ("a", ""),
             ("a", "l"),
             (".", "a"),
+            ("a", "p"),
+            ("a", "."),
+            ("out", "secret"),
+            ("a", "x\0"),
+            ("a", &long),
+            ("a", "absent"),
+            ("absent", "x"),
         ] {
-            assert_eq!(spool.file(result, file), None, "{result}/{file}");
+            let found = spool.file(result, file).unwrap();
+            assert!(found.is_none(), "{result}/{file}");
         }
-        assert!(spool.entry("..").unwrap().is_none());
+        for result in ["..", ".", "out", "a/..", ""] {
+            assert!(spool.entry(result).unwrap().is_none(), "{result}");
+        }
+        let listed = spool.entry("a").unwrap().unwrap();
+        let names: Vec<&str> = listed.files.iter().map(|f| f.name.as_str()).collect();
+        assert_eq!(names, ["x"], "neither link nor pipe");
     }
 
     #[test]
@@ -268,7 +316,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         fs::write(&path, "").unwrap();
-        let error = Spool::open(&path).unwrap_err();
+        let error = open(&path).unwrap_err();
         assert_eq!(
             error.to_string(),
             format!(

@@ -11,7 +11,7 @@ use crate::status::{ScannerStatus, Status};
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Event {
     /// First on every stream, so that nothing is missed between asking and listening.
-    Status(Status),
+    Status(Box<Status>),
     /// The scanner was reached, lost, or got into trouble.
     Scanner(ScannerStatus),
     /// A scan began or changed its state.

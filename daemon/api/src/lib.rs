@@ -1,12 +1,14 @@
 //! The HTTP types of the Relief service, shared by server and clients.
 //!
-//! The service speaks HTTP/1.1 on a Unix socket, and on a loopback address if configured.
+//! The service speaks HTTP/1.1 on a Unix socket, and on a loopback address if configured;
+//! there every request needs a token (`Authorization: Bearer TOKEN`).
 //! Bodies are JSON; errors are [`Problem`] (`application/problem+json`); events are
 //! server-sent events whose data is one [`Event`] each.
 //!
 //! | method and path | request | reply |
 //! | --- | --- | --- |
 //! | `GET /v1/status` | | [`Status`] |
+//! | `GET /v1/laser` | | [`LaserLog`], the latest 1000 |
 //! | `GET /v1/scans` | | [`ScanList`], newest first |
 //! | `POST /v1/scans` | [`StartScan`] | 202 [`Scan`] |
 //! | `GET /v1/scans/{scan}` | | [`Scan`] |
@@ -20,6 +22,9 @@
 //! | `POST /v1/jobs/{job}/cancel` | | [`Job`] |
 //! | `GET /v1/spool/{result}` | | [`SpoolEntry`] |
 //! | `GET /v1/spool/{result}/{file}` | | the file |
+//! | `GET /v1/tokens` | | [`TokenList`], oldest first; on the socket only, as the next two |
+//! | `POST /v1/tokens` | [`CreateToken`] | 201 [`NewToken`] |
+//! | `POST /v1/tokens/{token}/revoke` | | [`Token`] |
 //! | `GET /v1/events` | | server-sent [`Event`]s, first [`Event::Status`] |
 //!
 //! Within `/v1`, fields and event kinds are only ever added; clients ignore those they do
@@ -27,15 +32,19 @@
 
 mod event;
 mod job;
+mod laser;
 pub mod path;
 mod problem;
 mod scan;
 mod status;
+mod token;
 
 pub use event::{Event, LiveColumn};
 pub use job::{Job, JobId, JobList, JobState, Rerun, SpoolEntry, SpoolFile, StageTiming};
+pub use laser::{LaserEntry, LaserLog, LaserState};
 pub use problem::Problem;
 pub use scan::{
     MAX_NAME_CHARS, PlanRequest, Scan, ScanList, ScanState, SettingOverrides, StartScan,
 };
-pub use status::{ScannerLink, ScannerStatus, Status};
+pub use status::{ScannerLink, ScannerStatus, Status, StorageStatus};
+pub use token::{CreateToken, MAX_TOKEN_NAME_CHARS, NewToken, Token, TokenList};

@@ -8,12 +8,16 @@ pub const SCANS: &str = "/v1/scans";
 pub const SCAN: &str = "/v1/scans/{scan}";
 /// Pattern of the abort of one scan.
 pub const SCAN_ABORT: &str = "/v1/scans/{scan}/abort";
+/// Pattern of letting one paused scan go on.
+pub const SCAN_RESUME: &str = "/v1/scans/{scan}/resume";
 /// Pattern of a scan's rerun.
 pub const SCAN_RERUN: &str = "/v1/scans/{scan}/rerun";
 /// Pattern of a scan's journal.
 pub const SCAN_JOURNAL: &str = "/v1/scans/{scan}/journal";
 /// Aborts whatever scan is running.
 pub const ABORT: &str = "/v1/abort";
+/// Lets whatever scan is paused go on.
+pub const RESUME: &str = "/v1/resume";
 /// The jobs.
 pub const JOBS: &str = "/v1/jobs";
 /// Pattern of one job.
@@ -26,6 +30,12 @@ pub const JOB_CANCEL: &str = "/v1/jobs/{job}/cancel";
 pub const SPOOL: &str = "/v1/spool/{result}";
 /// Pattern of one file of the spool.
 pub const SPOOL_FILE: &str = "/v1/spool/{result}/{file}";
+/// The log of the laser.
+pub const LASER: &str = "/v1/laser";
+/// The tokens; on the socket only.
+pub const TOKENS: &str = "/v1/tokens";
+/// Pattern of a token's revocation.
+pub const TOKEN_REVOKE: &str = "/v1/tokens/{token}/revoke";
 /// The event stream.
 pub const EVENTS: &str = "/v1/events";
 
@@ -39,6 +49,12 @@ pub fn scan(id: &str) -> String {
 #[must_use]
 pub fn scan_abort(id: &str) -> String {
     scan(id) + "/abort"
+}
+
+/// Letting one paused scan go on.
+#[must_use]
+pub fn scan_resume(id: &str) -> String {
+    scan(id) + "/resume"
 }
 
 /// Rerun of one scan.
@@ -81,6 +97,12 @@ pub fn spool(result: &str) -> String {
 #[must_use]
 pub fn spool_file(result: &str, file: &str) -> String {
     format!("{}/{}", spool(result), segment(file))
+}
+
+/// Revocation of one token.
+#[must_use]
+pub fn token_revoke(name: &str) -> String {
+    format!("{TOKENS}/{}/revoke", segment(name))
 }
 
 /// One segment of a path, escaped (RFC 3986, section 2.3).

@@ -113,6 +113,8 @@ pub enum ScanState {
     Starting,
     /// Columns are coming in.
     Scanning,
+    /// Stopped between two columns, with the laser off; the reason says why, and who ends it.
+    Paused,
     /// All columns are kept.
     Complete,
     /// Ended on request; the columns so far are kept.
@@ -127,7 +129,7 @@ impl ScanState {
     /// True once nothing more will come.
     #[must_use]
     pub fn is_over(self) -> bool {
-        !matches!(self, Self::Starting | Self::Scanning)
+        !matches!(self, Self::Starting | Self::Scanning | Self::Paused)
     }
 
     /// As it is spelt in JSON.
@@ -136,6 +138,7 @@ impl ScanState {
         match self {
             Self::Starting => "starting",
             Self::Scanning => "scanning",
+            Self::Paused => "paused",
             Self::Complete => "complete",
             Self::Aborted => "aborted",
             Self::Failed => "failed",
@@ -162,7 +165,7 @@ pub struct Scan {
     pub note: String,
     /// Where it stands.
     pub state: ScanState,
-    /// What went wrong, or who ended it.
+    /// What went wrong, or who ended it; of a paused scan, why.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
     /// Start, RFC 3339 in UTC.
@@ -182,6 +185,9 @@ pub struct Scan {
     /// Jobs that process or processed it, oldest first.
     #[serde(default)]
     pub jobs: Vec<JobId>,
+    /// When its columns were removed to make room, RFC 3339; it cannot be run again.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub removed_at: Option<String>,
 }
 
 /// The scans.

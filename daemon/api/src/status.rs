@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::laser::LaserEntry;
 use crate::scan::Scan;
 
 /// The service at a glance.
@@ -13,6 +14,9 @@ pub struct Status {
     pub started_at: String,
     /// The scanner.
     pub scanner: ScannerStatus,
+    /// The laser, since its latest change; absent until the scanner was first asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub laser: Option<Box<LaserEntry>>,
     /// The scan under way.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scan: Option<Scan>,
@@ -22,6 +26,24 @@ pub struct Status {
     pub jobs_running: usize,
     /// Where results appear on the service's machine.
     pub spool: String,
+    /// Room on the disk.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub storage: Option<Box<StorageStatus>>,
+}
+
+/// What is kept, and what is free.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct StorageStatus {
+    /// Bytes of the kept scans, as of the last look.
+    pub scans_bytes: u64,
+    /// Bytes free where scans are kept; `None` where the file system does not tell.
+    pub scans_free_bytes: Option<u64>,
+    /// Bytes of the results, as of the last look.
+    pub results_bytes: u64,
+    /// Bytes free where results appear; `None` where the file system does not tell.
+    pub results_free_bytes: Option<u64>,
+    /// Bytes that are to stay free in both places; a scan that would need them is refused.
+    pub reserve_bytes: u64,
 }
 
 /// How the service stands with its scanner.

@@ -6,7 +6,8 @@ use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    abort, change, convert, demo, doctor, fetch, jobs, rerun, scan, scans, status, watch,
+    abort, change, convert, demo, doctor, fetch, jobs, laser, manual, rerun, resume, scan, scans,
+    status, token, watch,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
@@ -31,6 +32,7 @@ pub(crate) enum Command {
     Convert(convert::Args),
     Scan(scan::Args),
     Abort(abort::Args),
+    Resume(resume::Args),
     Status(status::Args),
     Scans(scans::Args),
     Jobs(jobs::Args),
@@ -39,7 +41,10 @@ pub(crate) enum Command {
     Rerun(rerun::Args),
     Watch(watch::Args),
     Fetch(fetch::Args),
+    Laser(laser::Args),
+    Token(token::Args),
     Doctor(doctor::Args),
+    Manual(manual::Args),
 }
 
 /// Reads the command line; on wrong usage says so in one line and gives exit code 2.

@@ -34,6 +34,7 @@ pub(crate) async fn scan(
     let mut bar = Progress::counted("scan", 0, "columns");
     let mut asking = asking();
     let mut last_column = Instant::now();
+    let mut told: Option<String> = None;
     let scan = loop {
         let state = tokio::select! {
             event = events.next() => match event? {
@@ -52,7 +53,15 @@ pub(crate) async fn scan(
         match state {
             Some(scan) if scan.state == ScanState::Complete && scan.jobs.is_empty() => {}
             Some(scan) if scan.state.is_over() => break scan,
-            _ => {}
+            Some(scan) => {
+                // Said once for each pause: the service repeats it with every answer.
+                let pause = scan.reason.filter(|_| scan.state == ScanState::Paused);
+                if let Some(reason) = pause.as_ref().filter(|_| pause != told) {
+                    bar.note(&format!("paused: {reason}"));
+                }
+                told = pause;
+            }
+            None => {}
         }
     };
     if scan.state != ScanState::Complete {

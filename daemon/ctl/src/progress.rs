@@ -102,6 +102,14 @@ impl Progress {
         }
     }
 
+    /// Tells something worth a line of its own.
+    pub(crate) fn note(&self, message: &str) {
+        match &self.how {
+            How::Bar(bar) => bar.println(format!("{}: {message}", self.title)),
+            How::Lines { .. } => eprintln!("{}: {message}", self.title),
+        }
+    }
+
     /// Leaves the bar where it is, or says how it ended.
     pub(crate) fn finish(self, message: &str) {
         match self.how {

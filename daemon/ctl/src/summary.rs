@@ -84,13 +84,13 @@ fn regions(report: &Report) -> String {
     }
     output::table(
         &[
-            "REGION", "SURFACE", "NODES", "AREA MM2", "RMS MM", "MAX MM", "PSNR DB",
+            "REGION", "SHAPE", "NODES", "AREA MM2", "RMS MM", "MAX MM", "PSNR DB",
         ],
         &[0, 2, 3, 4, 5, 6],
         largest.into_iter().map(|region| {
             vec![
                 region.label.to_string(),
-                region.kind.clone(),
+                shape(region),
                 region.nodes.to_string(),
                 region
                     .area_mm2
@@ -101,6 +101,16 @@ fn regions(report: &Report) -> String {
             ]
         }),
     )
+}
+
+/// The shape of a region; of one without a face, that.
+fn shape(region: &RegionReport) -> String {
+    match &region.shape {
+        _ if region.faces.is_empty() => "no face".into(),
+        None => "-".into(),
+        Some(shape) if shape.hollow == Some(true) => format!("hollow {}", shape.family),
+        Some(shape) => shape.family.clone(),
+    }
 }
 
 /// What belongs to no region.

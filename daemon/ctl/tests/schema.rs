@@ -116,8 +116,8 @@ fn the_schemas_are_schemas() {
         assert!(schema["$schema"].as_str().unwrap().contains("2020-12"));
     }
     for command in [
-        "convert", "demo", "scan", "abort", "status", "scans", "jobs", "retry", "cancel", "rerun",
-        "watch", "fetch", "doctor",
+        "convert", "demo", "scan", "abort", "resume", "status", "scans", "jobs", "retry", "cancel",
+        "rerun", "watch", "fetch", "doctor", "token", "laser",
     ] {
         let reference = format!("commands.schema.json#/$defs/{command}");
         assert!(
@@ -246,6 +246,10 @@ async fn what_the_clients_of_the_service_tell() {
     check("commands.schema.json#/$defs/watch", &watched.await.unwrap());
     let status = told(&["status"]).await;
     assert_eq!(status["scanner"]["link"], "ready");
+    let laser = told(&["laser"]).await;
+    let entries = laser["entries"].as_array().unwrap();
+    assert!(entries.iter().any(|entry| entry["laser"] == "on"));
+    assert_eq!(entries.last().unwrap()["laser"], "off");
     told(&["fetch", "latest", "-o", "out"]).await;
     check("manifest.schema.json", &file(at.join("out/manifest.json")));
     check("report.schema.json", &file(at.join("out/report.json")));
@@ -273,5 +277,95 @@ async fn what_the_clients_of_the_service_tell() {
     assert!(second.get("job").is_none());
     told(&["abort"]).await;
     told(&["scans"]).await;
+    daemon.shutdown().await;
+}
+
+/// A command with an environment of its own, run while the service answers.
+async fn run(at: &Path, environment: &[(&str, &str)], arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_relief"));
+    command.current_dir(at).args(arguments);
+    for name in ["RELIEF_SOCKET", "RELIEF_TOKEN", "RELIEF_TOKEN_FILE"] {
+        command.env_remove(name);
+    }
+    command.envs(environment.iter().copied());
+    let output = tokio::task::spawn_blocking(move || command.output());
+    output.await.unwrap().unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn tokens_are_made_used_and_revoked() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let mut config = Config::default();
+    config.service.socket = at.join("s");
+    config.service.listen = Some("127.0.0.1:0".parse().unwrap());
+    config.service.state_dir = at.join("state");
+    config.service.spool_dir = at.join("spool");
+    config.scanner.port = at.join("none");
+    let daemon = Daemon::start(config).await.unwrap();
+    let url = format!("http://{}", daemon.listen().unwrap());
+    let token = async |arguments: &[&str]| {
+        let told = ask(at, daemon.socket(), &[&["token"], arguments].concat()).await;
+        check("commands.schema.json#/$defs/token", &told);
+        told
+    };
+    let shown = token(&["create", "shown"]).await;
+    let shown = shown["token"].as_str().unwrap();
+    let kept = token(&["create", "kept", "--out", "kept.token"]).await;
+    assert_eq!(kept["file"], "kept.token");
+    assert!(kept.get("token").is_none());
+    let listed = token(&["list"]).await;
+    assert_eq!(listed["tokens"][0]["name"], "shown");
+    assert_eq!(listed["tokens"][1]["name"], "kept");
+
+    let status = &["status", "--url", &url][..];
+    let with_file = &[status, &["--token-file", "kept.token"]].concat();
+    for (environment, arguments) in [
+        (&[("RELIEF_TOKEN", shown)][..], status),
+        (&[("RELIEF_TOKEN_FILE", "kept.token")], status),
+        (&[], with_file),
+    ] {
+        let output = run(at, environment, arguments).await;
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{told}");
+    }
+    let refused = async |environment: &[(&str, &str)], arguments: &[&str], why: &str| {
+        let output = run(at, environment, arguments).await;
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success(), "{told}");
+        assert!(told.contains(why), "{told}");
+        assert_eq!(told.lines().count(), 1, "{told}");
+        assert!(!told.contains("relief_"), "{told}");
+    };
+    refused(&[], status, "relief token create").await;
+    refused(&[("RELIEF_TOKEN", "relief_x")], status, "does not hold").await;
+    refused(
+        &[("RELIEF_TOKEN", "")],
+        status,
+        "RELIEF_TOKEN holds no token",
+    )
+    .await;
+    let listing = ["token", "list", "--url", &url];
+    refused(&[("RELIEF_TOKEN", shown)], &listing, "socket only").await;
+    // A file that is there is not written over, and no token is made for it.
+    let socket = daemon.socket().to_str().unwrap();
+    let again = [
+        "token",
+        "create",
+        "other",
+        "--out",
+        "kept.token",
+        "--socket",
+        socket,
+    ];
+    refused(&[], &again, "cannot make kept.token").await;
+    let twice = [
+        "token", "create", "kept", "--out", "new", "--socket", socket,
+    ];
+    refused(&[], &twice, "there is a token kept already").await;
+    assert!(!at.join("new").exists());
+
+    token(&["revoke", "kept"]).await;
+    refused(&[], with_file, "does not hold").await;
     daemon.shutdown().await;
 }

@@ -17,7 +17,7 @@ use range_image::Calibration;
 use regrid::Regridder;
 use relief_api::{Event, LiveColumn, Scan, ScanState, ScannerLink};
 use scan_record::{EndCause, Header, JournalWriter, RawColumn, RawSample};
-use scanner_driver::{ScanStream, ScannerError};
+use scanner_driver::{ScanProgress, ScanStream, Scanner, ScannerError};
 use scanner_protocol::Identity;
 
 use super::grid_file::GridFile;
@@ -25,7 +25,11 @@ use super::plan::ResolvedPlan;
 use super::{AbortRequest, calibration};
 use crate::config::{JournalConfig, Processing};
 use crate::error::panic_text;
+use crate::liveness::Pulse;
 use crate::service::{KeptGrid, Service};
+
+/// How often a scan is begun: a line that loses words may need more than one attempt.
+const START_ATTEMPTS: u32 = 3;
 
 /// Columns between the driver and the journal.
 const CHANNEL_COLUMNS: usize = 64;
@@ -43,10 +47,11 @@ pub(crate) struct Ticket {
 /// scan's state.
 pub(crate) fn run(service: &Arc<Service>, ticket: Ticket) {
     let id = ticket.scan.id.clone();
+    let pulse = service.liveness.begin("scan");
     // A defect in the taking of one scan must not keep the scanner busy for ever. What the
     // panic passes on its way drops the stream, which turns the laser off.
     let outcome =
-        catch_unwind(AssertUnwindSafe(|| take(service, &ticket))).unwrap_or_else(|panic| {
+        catch_unwind(AssertUnwindSafe(|| take(service, &ticket, &pulse))).unwrap_or_else(|panic| {
             Err(format!(
                 "the scan ended unexpectedly: {}; this is a defect of the program, please \
                  report it",
@@ -68,7 +73,9 @@ pub(crate) fn run(service: &Arc<Service>, ticket: Ticket) {
 }
 
 /// The text of an error is the scan's reason.
-fn take(service: &Arc<Service>, ticket: &Ticket) -> Result<(), String> {
+fn take(service: &Arc<Service>, ticket: &Ticket, pulse: &Pulse) -> Result<(), String> {
+    let longest = service.config().scanner.longest_wait();
+    pulse.work(longest);
     let text = |error: ScannerError| error.to_string();
     let check_abort = || match ticket.abort.reason() {
         Some(reason) => Err(reason),
@@ -76,11 +83,19 @@ fn take(service: &Arc<Service>, ticket: &Ticket) -> Result<(), String> {
     };
     let scanner = &*service.scanner;
     check_abort()?;
-    if !scanner.status().map_err(text)?.homed {
-        scanner.home().map_err(text)?;
-    }
-    check_abort()?;
-    let stream = scanner.start_scan(&ticket.plan.plan).map_err(text)?;
+    let mut attempts = 1;
+    let stream = loop {
+        match begin(scanner, ticket) {
+            Ok(stream) => break stream,
+            Err(error) if error.may_pass() && attempts < START_ATTEMPTS => {
+                tracing::warn!(scan = %ticket.scan.id, %error, "the scan is begun anew");
+                attempts += 1;
+            }
+            Err(error) => return Err(text(error)),
+        }
+        check_abort()?;
+        pulse.beat();
+    };
     // Once more: an abort that came just before the start found nothing to stop. Dropping
     // the stream turns the laser off.
     check_abort()?;
@@ -97,7 +112,18 @@ fn take(service: &Arc<Service>, ticket: &Ticket) -> Result<(), String> {
     let header = header(ticket, f64::from(info.spacing_um) * 1e-3);
     // Dropped on the way out if there is no place to keep its columns, the stream itself
     // turns the laser off.
-    Keeper::new(service, ticket, &header)?.keep_all(stream)
+    Keeper::new(service, ticket, &header)?.keep_all(stream, pulse)
+}
+
+/// Homes the table if need be, and starts.
+fn begin(scanner: &dyn Scanner, ticket: &Ticket) -> Result<ScanStream, ScannerError> {
+    if !scanner.status()?.homed {
+        scanner.home()?;
+    }
+    if ticket.abort.reason().is_some() {
+        return Err(ScannerError::Aborted);
+    }
+    scanner.start_scan(&ticket.plan.plan)
 }
 
 /// What stands at the head of the journal.
@@ -149,6 +175,9 @@ struct Live {
 
 enum Fed {
     Column(RawColumn),
+    /// The scan stands still, for this reason.
+    Paused(String),
+    Resumed,
     End(Result<(), ScannerError>),
 }
 
@@ -156,7 +185,11 @@ impl<'a> Keeper<'a> {
     fn new(service: &'a Service, ticket: &'a Ticket, header: &Header) -> Result<Self, String> {
         let id = ticket.scan.id.as_str();
         let path = service.journal_path(id);
-        let journal = JournalWriter::create(&path, header)
+        let journal = JournalWriter::create_on(&*service.disk, &path, header)
+            .and_then(|mut journal| {
+                journal.reserve(ticket.plan.plan.columns, ticket.plan.plan.samples.into())?;
+                Ok(journal)
+            })
             .map_err(|error| format!("{}: {error}", path.display()))?;
         let settings = ticket
             .processing
@@ -184,15 +217,16 @@ impl<'a> Keeper<'a> {
         })
     }
 
-    fn keep_all(mut self, stream: ScanStream) -> Result<(), String> {
+    fn keep_all(mut self, stream: ScanStream, pulse: &Pulse) -> Result<(), String> {
+        let service = self.service;
         let acknowledger = stream.acknowledger();
         let (sender, receiver) = sync_channel(CHANNEL_COLUMNS);
         let result = std::thread::scope(|scope| {
             let feeder = std::thread::Builder::new()
                 .name("scan-feed".into())
-                .spawn_scoped(scope, move || feed(stream, &sender))
+                .spawn_scoped(scope, move || feed(service, stream, &sender))
                 .map_err(|error| format!("cannot start a thread: {error}"))?;
-            let result = self.drain(&receiver, &|index| acknowledger.acknowledge(index));
+            let result = self.drain(&receiver, pulse, &|index| acknowledger.acknowledge(index));
             // With the receiver gone the feeder ends at its next column; an abort wakes a
             // feeder that waits for one.
             drop(receiver);
@@ -219,15 +253,23 @@ impl<'a> Keeper<'a> {
 
     /// Keeps column after column until the end. One sync serves all columns that came
     /// while the one before was under way, or within the configured interval.
-    fn drain(&mut self, receiver: &Receiver<Fed>, acknowledge: &dyn Fn(u32)) -> Result<(), String> {
+    fn drain(
+        &mut self,
+        receiver: &Receiver<Fed>,
+        pulse: &Pulse,
+        acknowledge: &dyn Fn(u32),
+    ) -> Result<(), String> {
+        let longest = self.service.config().scanner.longest_wait();
         let mut batch: Vec<RawColumn> = Vec::new();
         let mut due = Instant::now();
         loop {
             let fed = if batch.is_empty() {
+                pulse.rest();
                 receiver.recv().map_err(|_| RecvTimeoutError::Disconnected)
             } else {
                 receiver.recv_timeout(due.saturating_duration_since(Instant::now()))
             };
+            pulse.work(longest);
             match fed {
                 Ok(Fed::Column(column)) => {
                     if batch.is_empty() {
@@ -239,6 +281,18 @@ impl<'a> Keeper<'a> {
                         self.commit(&mut batch, acknowledge)?;
                     }
                 }
+                Ok(Fed::Paused(reason)) => {
+                    self.commit(&mut batch, acknowledge)?;
+                    tracing::warn!(scan = self.id, %reason, "scan paused");
+                    self.service.laser.scan_paused(&reason);
+                    self.note_pause(Some(reason));
+                }
+                Ok(Fed::Resumed) => {
+                    self.commit(&mut batch, acknowledge)?;
+                    tracing::info!(scan = self.id, "scan goes on");
+                    self.service.laser.scan_goes_on();
+                    self.note_pause(None);
+                }
                 Ok(Fed::End(end)) => {
                     self.commit(&mut batch, acknowledge)?;
                     return end.map_err(|e| e.to_string());
@@ -249,6 +303,23 @@ impl<'a> Keeper<'a> {
                     return Err("the scanner's driver ended without a word".into());
                 }
             }
+        }
+    }
+
+    /// Tells all who look on that the scan stands still, or goes on.
+    fn note_pause(&self, reason: Option<String>) {
+        let (state, link) = match reason {
+            Some(_) => (ScanState::Paused, ScannerLink::Trouble),
+            None => (ScanState::Scanning, ScannerLink::Scanning),
+        };
+        self.service.note_scanner(link, reason.clone());
+        let scan = self.service.update_active(|scan| {
+            scan.state = state;
+            scan.reason = reason;
+        });
+        // The record of a pause is for those who look; the columns do not hang on it.
+        if let Some(Err(error)) = scan.map(|scan| self.service.keep_scan(&scan)) {
+            tracing::error!(scan = self.id, %error, "cannot keep the record of a scan");
         }
     }
 
@@ -335,14 +406,33 @@ fn finish_live(service: &Service, id: &str, mut live: Live, wanted: bool) {
 }
 
 /// Moves columns from the driver to the channel until either ends.
-fn feed(mut stream: ScanStream, sender: &SyncSender<Fed>) {
+fn feed(service: &Service, mut stream: ScanStream, sender: &SyncSender<Fed>) {
+    let pulse = service.liveness.begin("scan-feed");
+    let longest = service.config().scanner.longest_wait();
+    let mut paused = false;
     loop {
-        let fed = match stream.next() {
-            Ok(Some(column)) => Fed::Column(raw(column)),
+        // The driver answers in time, if only with an error; a pause lasts as long as it does.
+        if paused {
+            pulse.rest();
+        } else {
+            pulse.work(longest);
+        }
+        let fed = match stream.next_progress() {
+            Ok(Some(ScanProgress::Column(column))) => Fed::Column(raw(column)),
+            Ok(Some(ScanProgress::Paused(pause))) => {
+                paused = true;
+                Fed::Paused(pause.to_string())
+            }
+            Ok(Some(ScanProgress::Resumed)) => {
+                paused = false;
+                Fed::Resumed
+            }
             Ok(None) => Fed::End(Ok(())),
             Err(error) => Fed::End(Err(error)),
         };
         let last = matches!(fed, Fed::End(_));
+        // The journal may take its time: then the table waits.
+        pulse.rest();
         if sender.send(fed).is_err() || last {
             return;
         }

@@ -13,9 +13,12 @@ const INTERVAL: Duration = Duration::from_secs(2);
 
 /// Looks at the scanner until the service stops. Runs on a thread of its own.
 pub(crate) fn watch(service: &Arc<Service>) {
+    let pulse = service.liveness.begin("scanner-watch");
     loop {
         if !service.is_scanning() {
+            pulse.work(service.config().scanner.longest_wait());
             look(service);
+            pulse.rest();
         }
         if service.wait_for_stop(INTERVAL) {
             return;

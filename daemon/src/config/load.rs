@@ -1,8 +1,14 @@
 //! From a file's text to a configuration, or to an error that a person can act on.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::{Config, Transport};
+use crate::error::bounded;
+
+/// A hundred times what every key with its comment takes.
+const MOST_BYTES: u64 = 1 << 20;
 
 /// The configuration cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -14,6 +20,15 @@ pub enum ConfigError {
         path: PathBuf,
         /// Why not.
         source: std::io::Error,
+    },
+    /// The file is something else.
+    #[error(
+        "{} has more than {MOST_BYTES} bytes, and is no configuration",
+        path.display()
+    )]
+    Long {
+        /// The file.
+        path: PathBuf,
     },
     /// Something in the file is wrong.
     #[error("{}, line {line}, column {column}: {message}", path.display())]
@@ -45,10 +60,21 @@ impl Config {
     /// # Errors
     /// Any [`ConfigError`].
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Read {
+        let failed = |source| ConfigError::Read {
             path: path.to_owned(),
             source,
-        })?;
+        };
+        let mut bytes = Vec::new();
+        File::open(path)
+            .and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes))
+            .map_err(failed)?;
+        if bytes.len() as u64 > MOST_BYTES {
+            return Err(ConfigError::Long {
+                path: path.to_owned(),
+            });
+        }
+        let text = String::from_utf8(bytes)
+            .map_err(|error| failed(std::io::Error::new(std::io::ErrorKind::InvalidData, error)))?;
         Self::parse(&text, path)
     }
 
@@ -72,13 +98,13 @@ impl Config {
                 path: path.to_owned(),
                 line: before.matches('\n').count() + 1,
                 column: before[line_start..].chars().count() + 1,
-                message,
+                message: bounded(message),
             }
         })?;
         let inconsistent = |(section, message)| ConfigError::Inconsistent {
             path: path.to_owned(),
             section,
-            message,
+            message: bounded(message),
         };
         other_transport(text, config.scanner.transport).map_err(inconsistent)?;
         config.processing().check().map_err(inconsistent)?;

@@ -3,9 +3,11 @@
 //! A key that does not exist, or a value that cannot be, is refused with its line and a
 //! way out; nothing is silently ignored.
 
+mod http;
 mod load;
 mod processing;
 mod reload;
+mod storage;
 mod value;
 
 use std::net::{IpAddr, SocketAddr};
@@ -13,16 +15,18 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use relief_api::PlanRequest;
-use scanner_driver::{LinkSettings, SerialSettings, UsbSettings};
+use scanner_driver::{LinkSettings, ResumeSettings, SerialSettings, UsbSettings};
 use scanner_protocol::usb;
 use serde::{Deserialize, Serialize};
 
+pub use http::HttpConfig;
 pub use load::ConfigError;
 pub use processing::{
     DeliverablesConfig, Estimator, Method, OverrideError, Processing, ReconstructConfig,
     RegridConfig, SegmentConfig,
 };
 pub use reload::Reloaded;
+pub use storage::{Limits, StorageConfig};
 
 /// The whole configuration.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
@@ -30,12 +34,16 @@ pub use reload::Reloaded;
 pub struct Config {
     /// Where the service is found and keeps its things.
     pub service: ServiceConfig,
+    /// What clients may ask of the API at most.
+    pub http: HttpConfig,
     /// How the scanner is attached.
     pub scanner: ScannerConfig,
     /// What a scan measures unless it is asked for something else.
     pub scan: PlanRequest,
     /// How scans are kept on disk.
     pub journal: JournalConfig,
+    /// Room on the disk.
+    pub storage: StorageConfig,
     /// From samples to the uniform range image.
     pub regrid: RegridConfig,
     /// From the range image to regions.
@@ -56,7 +64,13 @@ pub struct Config {
 pub struct ServiceConfig {
     /// Unix socket of the HTTP API.
     pub socket: PathBuf,
-    /// Loopback address on which the API is offered too; none unless set.
+    /// Group whose users may use the socket; that of the service unless set.
+    #[serde(deserialize_with = "value::group")]
+    pub socket_group: Option<String>,
+    /// Permissions of the socket's file, in octal: never for everybody.
+    #[serde(deserialize_with = "value::socket_mode")]
+    pub socket_mode: u32,
+    /// Loopback address on which the API is offered to bearers of a token; none unless set.
     #[serde(deserialize_with = "value::loopback")]
     pub listen: Option<SocketAddr>,
     /// Folder of the kept scans and of the job queue.
@@ -69,6 +83,8 @@ impl Default for ServiceConfig {
     fn default() -> Self {
         Self {
             socket: "/run/relief/reliefd.sock".into(),
+            socket_group: None,
+            socket_mode: 0o660,
             listen: None,
             state_dir: "/var/lib/relief".into(),
             spool_dir: "/var/spool/relief".into(),
@@ -112,6 +128,11 @@ pub struct ScannerConfig {
     /// Columns the scanner may send ahead of their acknowledgement.
     #[serde(deserialize_with = "value::credits")]
     pub credits: Option<u32>,
+    /// Whether a scan goes on after an interruption; otherwise the first trouble ends it.
+    pub resume: bool,
+    /// Longest pause, in seconds, after which a scan may go on without a person's word.
+    #[serde(deserialize_with = "value::seconds")]
+    pub resume_unattended_s: Option<u32>,
 }
 
 /// Kind of link to the scanner.
@@ -139,6 +160,8 @@ impl Default for ScannerConfig {
             column_timeout_ms: None,
             dead_man_ms: None,
             credits: None,
+            resume: true,
+            resume_unattended_s: None,
         }
     }
 }
@@ -173,6 +196,13 @@ impl ScannerConfig {
         }
     }
 
+    /// Longer than the driver may take for anything before it gives up.
+    pub(crate) fn longest_wait(&self) -> Duration {
+        const RESERVE: Duration = Duration::from_secs(60);
+        let link = self.link();
+        2 * (link.motion_timeout + link.column_timeout + link.silence) + RESERVE
+    }
+
     fn link(&self) -> LinkSettings {
         let mut link = LinkSettings::default();
         let ms = |ms: Option<u32>, default: Duration| {
@@ -192,6 +222,13 @@ impl ScannerConfig {
         if let Some(credits) = self.credits {
             link.credits = u16::try_from(credits).unwrap_or(u16::MAX);
         }
+        link.resume = self.resume.then(|| {
+            let mut resume = ResumeSettings::default();
+            if let Some(seconds) = self.resume_unattended_s {
+                resume.unattended = Duration::from_secs(seconds.into());
+            }
+            resume
+        });
         link
     }
 }

@@ -32,8 +32,16 @@ impl Config {
                 }
             )*};
         }
-        take!(scan, journal, regrid, segment, reconstruct, deliverables);
-        leave!(service, scanner, queue);
+        take!(
+            scan,
+            journal,
+            storage,
+            regrid,
+            segment,
+            reconstruct,
+            deliverables
+        );
+        leave!(service, http, scanner, queue);
         if self.log.level != new.log.level {
             merged.log.level.clone_from(&new.log.level);
             outcome.applied.push("log");

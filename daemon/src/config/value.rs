@@ -45,6 +45,10 @@ pub(super) fn milliseconds<'de, D: Deserializer<'de>>(
     bounded(deserializer, 10, 600_000, " ms").map(Some)
 }
 
+pub(super) fn seconds<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u32>, D::Error> {
+    bounded(deserializer, 0, 604_800, " s").map(Some)
+}
+
 pub(super) fn attempts<'de, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Option<u32>, D::Error> {
@@ -61,6 +65,58 @@ pub(super) fn sync_columns<'de, D: Deserializer<'de>>(deserializer: D) -> Result
 
 pub(super) fn sync_ms<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
     bounded(deserializer, 0, 1_000, " ms")
+}
+
+pub(super) fn reserve_mb<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    bounded(deserializer, 0, 1_000_000, " MB")
+}
+
+pub(super) fn megabytes<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<u32>, D::Error> {
+    bounded(deserializer, 1, 1_000_000_000, " MB").map(Some)
+}
+
+pub(super) fn days<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u32>, D::Error> {
+    bounded(deserializer, 1, 36_500, " days").map(Some)
+}
+
+pub(super) fn connections<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
+    bounded(deserializer, 1, 1_024, "").map(|n| n as usize)
+}
+
+pub(super) fn http_milliseconds<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<u32, D::Error> {
+    bounded(deserializer, 100, 600_000, " ms")
+}
+
+/// Name of a group; whether there is one is seen when the socket is made.
+pub(super) fn group<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<String>, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    if text.is_empty() || text.contains(['\0', '/', ':']) {
+        return Err(D::Error::custom(format!("{text:?} is no name of a group")));
+    }
+    Ok(Some(text))
+}
+
+/// Permissions as `chmod` takes them: for the service's user, and for the group or not.
+pub(super) fn socket_mode<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    let mode = match text.as_str() {
+        "0600" | "600" => 0o600,
+        "0660" | "660" => 0o660,
+        _ => {
+            return Err(D::Error::custom(format!(
+                "\"{text}\" is out of range: \"0660\" (the service's user and the group) and \
+                 \"0600\" (its user alone) are possible, since who may use the socket may turn \
+                 the laser on"
+            )));
+        }
+    };
+    Ok(mode)
 }
 
 pub(super) fn workers<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
@@ -87,7 +143,7 @@ pub(super) fn positive<'de, D: Deserializer<'de>>(
     }
 }
 
-/// An address that only this machine can reach: the API knows no passwords.
+/// An address that only this machine can reach: tokens go over it in plain text.
 pub(super) fn loopback<'de, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Option<SocketAddr>, D::Error> {
@@ -103,7 +159,7 @@ pub(super) fn loopback<'de, D: Deserializer<'de>>(
         Ok(Some(address))
     } else {
         Err(D::Error::custom(format!(
-            "{address} can be reached from other machines, and the API asks for no password: \
+            "{address} can be reached from other machines, and tokens go over it in plain text: \
              use a loopback address such as \"127.0.0.1:{}\"",
             address.port()
         )))

@@ -1,6 +1,6 @@
 //! Files over HTTP: the spool's and the journals.
 
-use std::path::PathBuf;
+use std::io;
 
 use axum::body::Body;
 use axum::extract::{Path, State};
@@ -32,16 +32,16 @@ pub(super) async fn file(
     Path((result, file)): Path<(String, String)>,
 ) -> Result<Response, Refusal> {
     let name = file.clone();
-    let path = blocking(context, move |service| {
-        service
-            .spool
-            .file(&result, &file)
-            .ok_or_else(|| ServiceError::NotInSpool {
-                what: format!("{result}/{file}"),
-            })
+    let what = format!("{result}/{file}");
+    let file = blocking(context, move |service| {
+        match service.spool.file(&result, &file) {
+            Ok(Some(file)) => Ok(file),
+            Ok(None) => Err(ServiceError::NotInSpool { what }),
+            Err(source) => Err(ServiceError::Io { what, source }),
+        }
     })
     .await?;
-    download(path, &name).await
+    download(file, &name).await
 }
 
 pub(super) async fn journal(
@@ -49,36 +49,34 @@ pub(super) async fn journal(
     Path(id): Path<String>,
 ) -> Result<Response, Refusal> {
     // By way of the record, so that only ids that were given out become paths.
-    let path = blocking(context, move |service| {
+    let file = blocking(context, move |service| {
         let scan = service.scan(&id)?;
         let path = service.journal_path(&scan.id);
-        if path.is_file() {
-            Ok(path)
-        } else {
-            Err(ServiceError::NothingKept {
+        std::fs::File::open(&path).map_err(|source| match source.kind() {
+            io::ErrorKind::NotFound => ServiceError::NothingKept {
                 id: scan.id,
                 why: "it has no journal".into(),
-            })
-        }
+            },
+            _ => ServiceError::Io {
+                what: path.display().to_string(),
+                source,
+            },
+        })
     })
     .await?;
-    let name = path
-        .file_name()
-        .map(|name| name.to_string_lossy().into_owned())
-        .unwrap_or_default();
-    download(path, &name).await
+    download(file, "journal.scan").await
 }
 
 /// Streams a file, which may be larger than memory.
-async fn download(path: PathBuf, name: &str) -> Result<Response, Refusal> {
-    let io = |source| {
-        Refusal::from(ServiceError::Io {
-            what: path.display().to_string(),
+async fn download(file: std::fs::File, name: &str) -> Result<Response, Refusal> {
+    let file = tokio::fs::File::from_std(file);
+    let metadata = file.metadata().await;
+    let bytes = metadata
+        .map_err(|source| ServiceError::Io {
+            what: name.to_owned(),
             source,
-        })
-    };
-    let file = tokio::fs::File::open(&path).await.map_err(io)?;
-    let bytes = file.metadata().await.map_err(io)?.len();
+        })?
+        .len();
     // The length is promised before; a journal that grows meanwhile must not exceed it.
     let reader = tokio::io::AsyncReadExt::take(file, bytes);
     let headers = [

@@ -1,49 +1,110 @@
-//! Keeping web pages out of the loopback listener.
+//! Who may ask on the loopback listener: bearers of a token, and no web page.
 //!
 //! Any page in a browser on this machine can send requests to a loopback address. Pages
-//! of other sites name themselves in `Origin`; pages that had their own name resolve to
-//! the loopback address (DNS rebinding) name themselves in `Host`.
+//! of other sites name themselves in `Origin`, or the browser says so in `Sec-Fetch-Site`;
+//! pages that had their own name resolve to the loopback address (DNS rebinding) name
+//! themselves in `Host`. Any user of this machine can connect as well; the token tells
+//! those who may.
 
-use axum::extract::Request;
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
+use super::Context;
 use super::problem::Refusal;
 
-/// Refuses requests that do not speak to this machine by one of its own names.
-pub(crate) async fn local_callers_only(request: Request, next: Next) -> Response {
-    match check(request.headers()) {
-        Ok(()) => next.run(request).await,
-        Err(refusal) => refusal.into_response(),
+const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
+
+/// Refuses requests of web pages, and those without a token that holds.
+pub(crate) async fn bearers_only(
+    State(context): State<Context>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let admitted = check_place(request.uri(), request.headers()).and_then(|()| {
+        let token = token(request.headers())?;
+        let bearer = context.service.tokens.bearer(token);
+        bearer.ok_or_else(|| unauthorized("the token of the request does not hold"))
+    });
+    match admitted {
+        Ok(bearer) => {
+            tracing::debug!(bearer, method = %request.method(), path = request.uri().path(), "request");
+            next.run(request).await
+        }
+        Err(refusal) => {
+            tracing::warn!(reason = refusal.detail(), "refused a request on loopback");
+            let challenge = refusal.status() == StatusCode::UNAUTHORIZED;
+            let mut response = refusal.into_response();
+            if challenge {
+                response
+                    .headers_mut()
+                    .insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+            }
+            response
+        }
     }
 }
 
-fn check(headers: &HeaderMap) -> Result<(), Refusal> {
-    let host = headers
-        .get(header::HOST)
-        .and_then(|host| host.to_str().ok());
-    if !host.is_some_and(is_local) {
-        return Err(forbidden(format!(
-            "the request is for the host {}",
-            host.unwrap_or("(none)")
-        )));
+/// The request speaks to this machine by one of its own names, and for no web page.
+fn check_place(uri: &Uri, headers: &HeaderMap) -> Result<(), Refusal> {
+    let host = single(headers, header::HOST)?;
+    // A request line may name a host of its own, which then is the one that is meant.
+    let named = [host, uri.authority().map(|authority| authority.as_str())];
+    for name in named.into_iter().flatten() {
+        if !is_local(name) {
+            return Err(not_local(format!("the request is for the host {name}")));
+        }
     }
-    let Some(origin) = headers.get(header::ORIGIN) else {
-        return Ok(());
+    let Some(host) = host else {
+        return Err(not_local("the request is for the host (none)".into()));
     };
-    let local = origin
-        .to_str()
-        .ok()
-        .and_then(|origin| origin.split_once("://"))
-        .is_some_and(|(_, host)| is_local(host));
-    if local {
-        Ok(())
-    } else {
-        Err(forbidden(
-            "the request comes from a page of another site".into(),
-        ))
+    if let Some(origin) = single(headers, header::ORIGIN)? {
+        let own = origin
+            .strip_prefix("http://")
+            .is_some_and(|authority| authority.eq_ignore_ascii_case(host));
+        if !own {
+            return Err(not_local(format!(
+                "the request comes from a page of another site, {origin}"
+            )));
+        }
     }
+    match single(headers, SEC_FETCH_SITE)? {
+        None | Some("same-origin" | "none") => Ok(()),
+        Some(site) => Err(not_local(format!(
+            "the browser says that the request comes from a page of another site ({site})"
+        ))),
+    }
+}
+
+/// The token that is sent along, of whatever worth.
+fn token(headers: &HeaderMap) -> Result<&str, Refusal> {
+    let sent = single(headers, header::AUTHORIZATION)?
+        .ok_or_else(|| unauthorized("the request bears no token"))?;
+    sent.split_once(' ')
+        .filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"))
+        .map(|(_, token)| token.trim())
+        .ok_or_else(|| unauthorized("the request's Authorization is no bearer token"))
+}
+
+/// The value of a field that may be there once: of two, others might read the second.
+fn single(headers: &HeaderMap, name: HeaderName) -> Result<Option<&str>, Refusal> {
+    let mut values = headers.get_all(&name).iter();
+    let value = values.next();
+    let unclear = |what| {
+        Refusal::new(
+            StatusCode::BAD_REQUEST,
+            "unclear-request",
+            format!("the header field {name} {what}"),
+            None,
+        )
+    };
+    if values.next().is_some() {
+        return Err(unclear("is there more than once"));
+    }
+    value
+        .map(|value| value.to_str().map_err(|_| unclear("is not ASCII")))
+        .transpose()
 }
 
 /// `localhost`, 127.x.x.x or ::1, with or without a port.
@@ -62,7 +123,7 @@ fn is_local(authority: &str) -> bool {
             .is_ok_and(|address| address.is_loopback())
 }
 
-fn forbidden(detail: String) -> Refusal {
+fn not_local(detail: String) -> Refusal {
     Refusal::new(
         StatusCode::FORBIDDEN,
         "not-local",
@@ -71,9 +132,21 @@ fn forbidden(detail: String) -> Refusal {
     )
 }
 
+fn unauthorized(detail: &str) -> Refusal {
+    Refusal::new(
+        StatusCode::UNAUTHORIZED,
+        "no-token",
+        detail,
+        Some(
+            "make one with `relief token create NAME` on the service's socket, and send it as \
+             `Authorization: Bearer TOKEN` (relief: --token-file or RELIEF_TOKEN)",
+        ),
+    )
+}
+
 #[cfg(test)]
 mod tests {
-    use super::is_local;
+    use super::*;
 
     #[test]
     fn only_this_machines_own_names_are_local() {
@@ -97,6 +170,51 @@ mod tests {
             "[::1].example.org",
         ] {
             assert!(!is_local(other), "{other}");
+        }
+    }
+
+    fn place(uri: &str, fields: &[(&'static str, &'static str)]) -> Result<(), String> {
+        let mut headers = HeaderMap::new();
+        for &(name, value) in fields {
+            headers.append(name, HeaderValue::from_static(value));
+        }
+        check_place(&uri.parse().unwrap(), &headers).map_err(|refusal| refusal.detail().to_owned())
+    }
+
+    #[test]
+    fn web_pages_are_told_from_programs() {
+        let host = ("host", "127.0.0.1:7437");
+        for fields in [
+            &[host][..],
+            &[host, ("origin", "http://127.0.0.1:7437")],
+            &[host, ("sec-fetch-site", "none")],
+            &[host, ("sec-fetch-site", "same-origin")],
+        ] {
+            assert_eq!(place("/v1/status", fields), Ok(()), "{fields:?}");
+        }
+        assert_eq!(place("http://localhost/v1/status", &[host]), Ok(()));
+        for (uri, fields, why) in [
+            ("/", &[][..], "(none)"),
+            ("/", &[("host", "a.example")], "a.example"),
+            ("http://a.example/", &[host], "a.example"),
+            ("/", &[host, ("host", "a.example")], "more than once"),
+            ("/", &[host, ("origin", "http://a.example")], "a.example"),
+            ("/", &[host, ("origin", "null")], "null"),
+            (
+                "/",
+                &[host, ("origin", "http://127.0.0.1:80")],
+                "another site",
+            ),
+            (
+                "/",
+                &[host, ("origin", "https://127.0.0.1:7437")],
+                "another site",
+            ),
+            ("/", &[host, ("sec-fetch-site", "cross-site")], "cross-site"),
+            ("/", &[host, ("sec-fetch-site", "same-site")], "same-site"),
+        ] {
+            let refused = place(uri, fields).unwrap_err();
+            assert!(refused.contains(why), "{refused}");
         }
     }
 }

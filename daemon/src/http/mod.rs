@@ -3,6 +3,7 @@
 //! Handlers only translate; what is done, the service does. What may block runs on
 //! tokio's blocking threads.
 
+mod body;
 mod events;
 mod files;
 mod guard;
@@ -10,25 +11,27 @@ mod jobs;
 mod listen;
 mod problem;
 mod scans;
+mod serve;
+mod stall;
+mod tokens;
 
 use std::sync::Arc;
 
 use axum::Router;
-use axum::extract::{DefaultBodyLimit, State};
+use axum::extract::State;
+use axum::middleware::from_fn_with_state;
 use axum::response::Json;
-use axum::routing::{get, post};
-use relief_api::{Status, path};
+use axum::routing::{any, get, post};
+use relief_api::{LaserLog, Status, path};
+use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
-pub(crate) use guard::local_callers_only;
 pub use listen::ListenError;
 pub(crate) use listen::{bind_loopback, bind_socket};
+pub(crate) use serve::serve;
 
 use crate::service::Service;
 use problem::Refusal;
-
-/// Largest body of a request: a note of some pages, not more.
-const MAX_BODY_BYTES: usize = 256 * 1024;
 
 /// What handlers need.
 #[derive(Clone)]
@@ -36,18 +39,38 @@ pub(crate) struct Context {
     pub(crate) service: Arc<Service>,
     /// Ends the event streams, which would otherwise keep their connections for ever.
     pub(crate) stop: CancellationToken,
+    /// Places for those who listen to events.
+    pub(crate) listeners: Arc<Semaphore>,
 }
 
-/// All endpoints.
-pub(crate) fn router(context: Context) -> Router {
-    Router::new()
+/// All endpoints, as they are offered on the socket, whose file mode tells who may ask.
+pub(crate) fn on_socket(context: &Context) -> Router {
+    let tokens = Router::new()
+        .route(path::TOKENS, get(tokens::list).post(tokens::create))
+        .route(path::TOKEN_REVOKE, post(tokens::revoke));
+    complete(tokens, context)
+}
+
+/// The endpoints for bearers of a token, as they are offered on a loopback address.
+pub(crate) fn on_loopback(context: &Context) -> Router {
+    let tokens = Router::new()
+        .route(path::TOKENS, any(tokens::only_on_the_socket))
+        .route(path::TOKEN_REVOKE, any(tokens::only_on_the_socket));
+    complete(tokens, context).layer(from_fn_with_state(context.clone(), guard::bearers_only))
+}
+
+fn complete(tokens: Router<Context>, context: &Context) -> Router {
+    tokens
         .route(path::STATUS, get(status))
+        .route(path::LASER, get(laser))
         .route(path::SCANS, get(scans::list).post(scans::start))
         .route(path::SCAN, get(scans::get))
         .route(path::SCAN_ABORT, post(scans::abort))
+        .route(path::SCAN_RESUME, post(scans::resume))
         .route(path::SCAN_RERUN, post(scans::rerun))
         .route(path::SCAN_JOURNAL, get(files::journal))
         .route(path::ABORT, post(scans::abort_any))
+        .route(path::RESUME, post(scans::resume_any))
         .route(path::JOBS, get(jobs::list))
         .route(path::JOB, get(jobs::get))
         .route(path::JOB_RETRY, post(jobs::retry))
@@ -57,12 +80,18 @@ pub(crate) fn router(context: Context) -> Router {
         .route(path::EVENTS, get(events::stream))
         .fallback(problem::no_such_path)
         .method_not_allowed_fallback(problem::no_such_method)
-        .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
-        .with_state(context)
+        .layer(from_fn_with_state(context.clone(), body::taken_whole))
+        .with_state(context.clone())
 }
 
 async fn status(State(context): State<Context>) -> Json<Status> {
     Json(context.service.status())
+}
+
+async fn laser(State(context): State<Context>) -> Json<LaserLog> {
+    Json(LaserLog {
+        entries: context.service.laser.entries(),
+    })
 }
 
 /// Runs something that may block where blocking is allowed.

@@ -1,5 +1,7 @@
 //! From the service's refusals to HTTP: the only place that knows both.
 
+use std::time::Duration;
+
 use axum::extract::rejection::JsonRejection;
 use axum::extract::{FromRequest, Request};
 use axum::http::{HeaderValue, Method, StatusCode, Uri, header};
@@ -8,8 +10,9 @@ use relief_api::Problem;
 use scanner_driver::ScannerError;
 use serde::de::DeserializeOwned;
 
-use crate::error::ServiceError;
+use crate::error::{ServiceError, bounded};
 use crate::store::StoreError;
+use crate::tokens::TokenError;
 
 /// A refused request.
 #[derive(Debug)]
@@ -33,9 +36,17 @@ impl Refusal {
             kind: kind.to_owned(),
             title,
             status: status.as_u16(),
-            detail: detail.into(),
+            detail: bounded(detail.into()),
             hint: hint.map(str::to_owned),
         })
+    }
+
+    pub(crate) fn status(&self) -> StatusCode {
+        StatusCode::from_u16(self.0.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR)
+    }
+
+    pub(crate) fn detail(&self) -> &str {
+        &self.0.detail
     }
 
     pub(crate) fn internal(detail: impl Into<String>) -> Self {
@@ -50,9 +61,7 @@ impl Refusal {
 
 impl IntoResponse for Refusal {
     fn into_response(self) -> Response {
-        let status =
-            StatusCode::from_u16(self.0.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-        let mut response = (status, Json(self.0)).into_response();
+        let mut response = (self.status(), Json(self.0)).into_response();
         response.headers_mut().insert(
             header::CONTENT_TYPE,
             HeaderValue::from_static(Problem::MEDIA_TYPE),
@@ -95,6 +104,7 @@ impl From<ServiceError> for Refusal {
             ),
             ServiceError::NothingKept { .. } => (S::CONFLICT, "nothing-kept", None),
             ServiceError::NothingToAbort => (S::CONFLICT, "nothing-to-abort", None),
+            ServiceError::NothingToResume { .. } => (S::CONFLICT, "nothing-to-resume", None),
             ServiceError::NoSuchJob { .. } => (
                 S::NOT_FOUND,
                 "no-such-job",
@@ -102,16 +112,55 @@ impl From<ServiceError> for Refusal {
             ),
             ServiceError::WrongJobState { .. } => (S::CONFLICT, "wrong-job-state", None),
             ServiceError::NotInSpool { .. } => (S::NOT_FOUND, "not-in-spool", None),
-            ServiceError::Store(_) => (S::INTERNAL_SERVER_ERROR, "records-unusable", None),
+            ServiceError::NoRoom { .. } => (
+                S::INSUFFICIENT_STORAGE,
+                "no-room",
+                Some(
+                    "remove results or kept scans that are no longer needed, or let [storage] do \
+                     so by age and size"
+                        .into(),
+                ),
+            ),
+            ServiceError::Store(_) => (
+                S::INTERNAL_SERVER_ERROR,
+                "records-unusable",
+                Some("see that the disk is mounted, writable and has room, then try again".into()),
+            ),
             ServiceError::Spool(spool) => (
                 S::INTERNAL_SERVER_ERROR,
                 "spool-unusable",
                 Some(spool.hint()),
             ),
             ServiceError::Io { .. } => (S::INTERNAL_SERVER_ERROR, "file-unreadable", None),
+            ServiceError::Token(token) => token_problem(token),
             ServiceError::Thread(_) => (S::INTERNAL_SERVER_ERROR, "no-thread", None),
         };
         Self::new(status, kind, error.to_string(), hint.as_deref())
+    }
+}
+
+fn token_problem(error: &TokenError) -> (StatusCode, &'static str, Option<String>) {
+    use StatusCode as S;
+    match error {
+        TokenError::Name { .. } => (S::BAD_REQUEST, "wrong-token-name", None),
+        TokenError::Taken { .. } => (
+            S::CONFLICT,
+            "token-name-taken",
+            Some("revoke that one first, or take another name".into()),
+        ),
+        TokenError::NoSuch { .. } => (
+            S::NOT_FOUND,
+            "no-such-token",
+            Some("`relief token list` lists the tokens there are".into()),
+        ),
+        TokenError::TooMany => (
+            S::CONFLICT,
+            "too-many-tokens",
+            Some("revoke those that nobody uses".into()),
+        ),
+        TokenError::File { .. } | TokenError::Damaged { .. } | TokenError::Random(_) => {
+            (S::INTERNAL_SERVER_ERROR, "tokens-unusable", None)
+        }
     }
 }
 
@@ -235,13 +284,49 @@ fn wrong_body(rejection: &JsonRejection) -> Refusal {
             StatusCode::UNSUPPORTED_MEDIA_TYPE,
             Some("send JSON with `Content-Type: application/json`"),
         ),
-        other => (
-            match other.status() {
-                StatusCode::PAYLOAD_TOO_LARGE => StatusCode::PAYLOAD_TOO_LARGE,
-                _ => StatusCode::BAD_REQUEST,
-            },
-            None,
-        ),
+        _ => (StatusCode::BAD_REQUEST, None),
     };
     Refusal::new(status, "wrong-body", rejection.body_text(), hint)
+}
+
+pub(super) fn long_body(limit: usize) -> Refusal {
+    let text = format!("the body exceeds the length limit of {limit} bytes");
+    Refusal::new(StatusCode::PAYLOAD_TOO_LARGE, "wrong-body", text, None)
+}
+
+pub(super) fn slow_body(longest: Duration) -> Refusal {
+    let text = format!("the body did not arrive within {} ms", longest.as_millis());
+    Refusal::new(StatusCode::REQUEST_TIMEOUT, "slow-request", text, None)
+}
+
+pub(super) fn broken_body(error: &axum::Error) -> Refusal {
+    let text = format!("the body cannot be read: {error}");
+    Refusal::new(StatusCode::BAD_REQUEST, "wrong-body", text, None)
+}
+
+pub(super) fn too_many_listeners(limit: usize) -> Refusal {
+    Refusal::new(
+        StatusCode::SERVICE_UNAVAILABLE,
+        "too-many-listeners",
+        format!("{limit} clients listen to the events, and no more may"),
+        Some("end a `relief watch` that nobody needs, or raise http.listeners"),
+    )
+}
+
+/// A whole reply, for whoever finds no place: nothing of the request has been read.
+pub(super) fn too_many_connections(limit: usize) -> Vec<u8> {
+    let Refusal(problem) = Refusal::new(
+        StatusCode::SERVICE_UNAVAILABLE,
+        "too-many-connections",
+        format!("{limit} clients are connected, and no more may"),
+        Some("try again in a moment, or raise http.connections"),
+    );
+    let body = serde_json::to_string(&problem).unwrap_or_default();
+    format!(
+        "HTTP/1.1 503 Service Unavailable\r\nContent-Type: {}\r\nContent-Length: {}\r\n\
+         Connection: close\r\nRetry-After: 1\r\n\r\n{body}",
+        Problem::MEDIA_TYPE,
+        body.len()
+    )
+    .into_bytes()
 }

@@ -48,6 +48,21 @@ pub(super) async fn abort_any(State(context): State<Context>) -> Result<Json<Sca
         .map(Json)
 }
 
+pub(super) async fn resume(
+    State(context): State<Context>,
+    Path(id): Path<String>,
+) -> Result<Json<Scan>, Refusal> {
+    blocking(context, move |service| service.resume_scan(Some(&id)))
+        .await
+        .map(Json)
+}
+
+pub(super) async fn resume_any(State(context): State<Context>) -> Result<Json<Scan>, Refusal> {
+    blocking(context, |service| service.resume_scan(None))
+        .await
+        .map(Json)
+}
+
 pub(super) async fn rerun(
     State(context): State<Context>,
     Path(id): Path<String>,

@@ -3,6 +3,7 @@
 //! A job is begun at least once and published exactly once: the records say what is
 //! waiting, and the result's folder, which appears by one rename, says what is done.
 
+mod fit;
 mod process;
 mod progress;
 mod queue;
@@ -44,6 +45,11 @@ impl Service {
             id: id.to_owned(),
             why,
         };
+        if let Some(at) = &scan.removed_at {
+            return Err(nothing(format!(
+                "its columns were removed at {at}, by the limits of [storage]"
+            )));
+        }
         let mut journal =
             JournalReader::open(&self.journal_path(id)).map_err(|e| nothing(e.to_string()))?;
         // Refuses wrong settings now and not when the job's turn comes.
@@ -127,32 +133,6 @@ impl Service {
     pub(crate) fn keep_job(&self, job: &Job) -> Result<(), ServiceError> {
         self.store.put_job(job)?;
         self.hub.tell(Event::Job(job.clone()));
-        Ok(())
-    }
-
-    /// After a restart: queues what waited or was under way, and notes as done what was
-    /// published just before the service ended.
-    pub(crate) fn recover_jobs(&self) -> Result<(), ServiceError> {
-        for mut job in self.store.jobs()? {
-            if job.state.is_over() {
-                continue;
-            }
-            if self.spool.has(&job.result) {
-                job.state = JobState::Done;
-                job.stage = None;
-                job.ended_at = Some(now());
-                job.directory = Some(self.spool.directory(&job.result).display().to_string());
-                self.store.put_job(&job)?;
-                continue;
-            }
-            if job.state == JobState::Running {
-                tracing::info!(job = job.id, scan = %job.scan, "taking up a job that was cut short");
-                job.state = JobState::Queued;
-                job.stage = None;
-                self.store.put_job(&job)?;
-            }
-            self.queue.add(job.id);
-        }
         Ok(())
     }
 }

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use deliverables::{CadOptions, DeliverError, Entities, Inputs, ScanReport, Stopwatch};
+use deliverables::{CadOptions, DeliverError, Entities, Inputs, Pictures, ScanReport, Stopwatch};
 use pipeline::{Observer, PipelineError, Stage, View};
 use range_image::{Cancelled, Lattice, Monitor, RangeImage};
 use relief_api::{Job, Scan};
 use scan_record::{Ending, Header, JournalReader, ReadError};
 
+use super::fit::Fit;
 use super::kept_processing;
 use super::progress::Progress;
 use super::worker::JobOutcome;
@@ -111,7 +112,15 @@ fn attempt(
         Some(image) => (image, count(&mut journal, &header, progress)?),
         None => {
             watch.stage(Stage::Regrid);
-            regrid(&mut journal, &header, &settings.regrid, &scan, &watch)?
+            let mut fit = Fit::new(&settings.regrid, &service.journal_path(&job.scan));
+            regrid(
+                &mut journal,
+                &header,
+                &settings.regrid,
+                &mut fit,
+                &scan,
+                &watch,
+            )?
         }
     };
     let outcome = pipeline::process_in_view(&image, &kept.view, &settings, &watch)
@@ -133,7 +142,12 @@ fn attempt(
         warnings: kept.warnings,
         versions: versions(&header),
     };
-    deliverables::write(&incoming, &inputs, &watch)?;
+    let pictures = if service.is_short_of_room(service.spool.root()) {
+        Pictures::LeftOut
+    } else {
+        Pictures::Drawn
+    };
+    deliverables::write(&*service.disk, &incoming, &inputs, pictures, &watch)?;
     // The last moment at which a cancelled job leaves nothing behind.
     progress.check()?;
     progress.begin("publish");
@@ -252,6 +266,7 @@ fn regrid(
     journal: &mut Journal,
     header: &Header,
     settings: &regrid::RegridSettings,
+    fit: &mut Fit,
     scan: &Scan,
     watch: &Stopwatch<'_>,
 ) -> Result<(RangeImage, Kept), Stop> {
@@ -264,9 +279,15 @@ fn regrid(
     // Column by column, so that no second copy of the scan is ever in memory.
     let columns = std::iter::from_fn(|| match journal.next_column() {
         _ if watch.is_cancelled() => None,
-        Ok(column) => column.map(|raw| {
+        Ok(column) => column.and_then(|raw| {
             kept.add(&raw, header);
-            raw.calibrated(&header.calibration)
+            let column = raw.calibrated(&header.calibration);
+            fit.add(&column);
+            if fit.is_missed() {
+                reading.broken.store(true, Ordering::Relaxed);
+                return None;
+            }
+            Some(column)
         }),
         Err(error) => {
             reading.broken.store(true, Ordering::Relaxed);
@@ -278,6 +299,9 @@ fn regrid(
     if let Some(error) = failure {
         return Err(error.into());
     }
+    if fit.is_missed() {
+        return Err(missed(journal, header, fit, scan, watch));
+    }
     let image = image.map_err(|error| {
         if watch.is_cancelled() {
             Stop::Asked
@@ -288,6 +312,26 @@ fn regrid(
     kept.end(journal.ending());
     tracing::debug!(scan = %scan.id, columns = kept.columns, "regridded");
     Ok((image, kept))
+}
+
+/// The grid is too fine: how far the samples spread, those included that were not reached.
+fn missed(
+    journal: &mut Journal,
+    header: &Header,
+    fit: &mut Fit,
+    scan: &Scan,
+    watch: &Stopwatch<'_>,
+) -> Stop {
+    loop {
+        match journal.next_column() {
+            _ if watch.is_cancelled() => return Stop::Asked,
+            Ok(Some(raw)) => fit.add(&raw.calibrated(&header.calibration)),
+            Ok(None) => break,
+            Err(error) => return error.into(),
+        }
+    }
+    let (error, hint) = fit.told().unwrap_or_default();
+    Stop::failed(format!("scan {}: {error}", scan.id), Some(&hint))
 }
 
 fn cad_options(processing: &Processing, scan: &Scan) -> CadOptions {

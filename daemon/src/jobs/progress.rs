@@ -9,6 +9,7 @@ use relief_api::{Event, Job, StageTiming};
 
 use super::queue::StopFlag;
 use crate::events::Hub;
+use crate::liveness::Pulse;
 use crate::service::lock;
 
 /// Progress is told in steps of this share of a stage.
@@ -19,6 +20,7 @@ pub(crate) struct Progress<'a> {
     hub: &'a Hub,
     job: &'a Job,
     flag: &'a StopFlag,
+    pulse: &'a Pulse,
     state: Mutex<State>,
 }
 
@@ -35,11 +37,12 @@ struct Running {
 }
 
 impl<'a> Progress<'a> {
-    pub(crate) fn new(hub: &'a Hub, job: &'a Job, flag: &'a StopFlag) -> Self {
+    pub(crate) fn new(hub: &'a Hub, job: &'a Job, flag: &'a StopFlag, pulse: &'a Pulse) -> Self {
         Self {
             hub,
             job,
             flag,
+            pulse,
             state: Mutex::default(),
         }
     }
@@ -87,10 +90,12 @@ impl<'a> Progress<'a> {
 
 impl Monitor for Progress<'_> {
     fn is_cancelled(&self) -> bool {
+        self.pulse.beat();
         self.flag.is_set()
     }
 
     fn progress(&self, fraction: f64) {
+        self.pulse.beat();
         let mut state = lock(&self.state);
         if let Some(running) = &mut state.running
             && fraction >= running.told + STEP

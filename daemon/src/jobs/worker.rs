@@ -3,6 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 use relief_api::{Event, Job, JobState};
 
@@ -11,6 +12,7 @@ use super::progress::Progress;
 use super::queue::StopFlag;
 use crate::error::panic_text;
 use crate::ids::now;
+use crate::liveness::Pulse;
 use crate::service::Service;
 
 /// What became of an attempt.
@@ -32,19 +34,34 @@ pub(crate) enum JobOutcome {
 /// By how much jobs are nicer than the taking of scans.
 const NICER: i32 = 10;
 
+/// How long a job waits whose record the disk refused.
+const RETRY: Duration = Duration::from_secs(2);
+/// A job looks whether it should stop far more often than this, on any machine; one that
+/// does not is stuck.
+const LONGEST_SILENCE: Duration = Duration::from_secs(15 * 60);
+
 /// Works until the service stops. Runs on a thread of its own.
 pub(crate) fn work(service: &Arc<Service>) {
     // On Linux this holds for this thread, and for those that it starts.
     if let Err(error) = rustix::process::nice(NICER) {
         tracing::warn!(%error, "jobs run with the priority of scans");
     }
+    let name = std::thread::current().name().unwrap_or("worker").to_owned();
+    let pulse = service.liveness.begin(name);
     while let Some((id, flag)) = service.queue.take() {
-        if let Err(error) = attempt(service, id, &flag) {
-            // The record still says that the job waits or runs, so the next start of the
-            // service takes it up again.
-            tracing::error!(job = id, %error, "cannot keep the record of a job");
-        }
+        pulse.work(LONGEST_SILENCE);
+        let kept = attempt(service, id, &flag, &pulse);
         service.queue.end(id, &flag);
+        pulse.rest();
+        if let Err(error) = kept {
+            // The record still says that the job waits or runs. A result that is in its place
+            // is not made again.
+            tracing::error!(job = id, %error, "cannot keep the record of a job; trying again");
+            if service.wait_for_stop(RETRY) {
+                return;
+            }
+            service.queue.add(id);
+        }
     }
 }
 
@@ -52,6 +69,7 @@ fn attempt(
     service: &Service,
     id: relief_api::JobId,
     flag: &Arc<StopFlag>,
+    pulse: &Pulse,
 ) -> Result<(), crate::error::ServiceError> {
     let mut job = {
         let _order = service.queue.changing();
@@ -65,7 +83,7 @@ fn attempt(
     };
     tracing::info!(job = id, scan = %job.scan, attempt = job.attempts, "job begins");
     let (outcome, timings) = {
-        let progress = Progress::new(&service.hub, &job, flag);
+        let progress = Progress::new(&service.hub, &job, flag, pulse);
         // A defect in the processing of one scan must not end the service.
         let outcome = catch_unwind(AssertUnwindSafe(|| process(service, &job, &progress)))
             .unwrap_or_else(|panic| JobOutcome::Failed {

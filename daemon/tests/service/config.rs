@@ -48,12 +48,31 @@ fn faults_are_told_with_their_line_and_a_way_out() {
             "[scanner]\ntransport = \"usb\"\nserial = \"1\"\n",
             "relief.toml, line 3, column 1: in [scanner] unknown key `serial`; known are: \
              transport, port, baud, vendor_id, product_id, serial_number, request_timeout_ms, \
-             request_attempts, motion_timeout_ms, column_timeout_ms, dead_man_ms, credits",
+             request_attempts, motion_timeout_ms, column_timeout_ms, dead_man_ms, credits, \
+             resume, resume_unattended_s",
         ),
         (
             "[service]\nlisten = \"0.0.0.0:80\"\n",
             "relief.toml, line 2, column 10: 0.0.0.0:80 can be reached from other machines, and \
-             the API asks for no password: use a loopback address such as \"127.0.0.1:80\"",
+             tokens go over it in plain text: use a loopback address such as \"127.0.0.1:80\"",
+        ),
+        (
+            "[service]\nsocket_mode = \"0666\"\n",
+            "relief.toml, line 2, column 15: \"0666\" is out of range: \"0660\" (the service's \
+             user and the group) and \"0600\" (its user alone) are possible, since who may use \
+             the socket may turn the laser on",
+        ),
+        (
+            "[service]\nsocket_group = \"\"\n",
+            "relief.toml, line 2, column 16: \"\" is no name of a group",
+        ),
+        (
+            "[http]\nconnections = 0\n",
+            "relief.toml, line 2, column 15: 0 is out of range: 1 to 1024 are possible",
+        ),
+        (
+            "[http]\nstall_timeout_ms = 99\n",
+            "relief.toml, line 2, column 20: 99 is out of range: 100 to 600000 ms are possible",
         ),
         (
             "[service]\nlisten = \"localhost\"\n",
@@ -95,6 +114,32 @@ fn faults_are_told_with_their_line_and_a_way_out() {
     );
 }
 
+#[test]
+fn what_is_no_configuration_takes_neither_memory_nor_time() {
+    let endless = Config::load(Path::new("/dev/zero")).unwrap_err();
+    assert_eq!(
+        endless.to_string(),
+        "/dev/zero has more than 1048576 bytes, and is no configuration"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("c.toml");
+    std::fs::write(&path, b"a = \"\xff\"").unwrap();
+    let binary = Config::load(&path).unwrap_err().to_string();
+    assert!(binary.contains("utf-8"), "{binary}");
+    // As deep and as long as a file may be.
+    for text in [
+        format!("a = {}", "[".repeat(500_000)),
+        format!("a = {}", "{a=".repeat(300_000)),
+        "a.".repeat(500_000),
+        "[a]\n".repeat(250_000),
+        format!("[log]\nlevel = \"{}\"", "a=b,".repeat(200_000)),
+    ] {
+        let message = refused(&text);
+        assert!(message.starts_with("relief.toml, line"), "{message:.200}");
+        assert!(message.len() < 1_100, "{} bytes", message.len());
+    }
+}
+
 /// An example with every key that is commented out put in force: nothing is refused.
 fn in_force(path: &Path) -> Config {
     let text = std::fs::read_to_string(path).unwrap();
@@ -131,6 +176,11 @@ fn the_examples_are_sound_and_show_the_defaults() {
     assert_eq!(all.regrid.neighbours, Some(49));
     assert_eq!(all.journal, Config::default().journal);
     assert_eq!(all.queue, Config::default().queue);
+    assert_eq!(all.http, Config::default().http);
+    assert_eq!(
+        all.service.socket_mode,
+        Config::default().service.socket_mode
+    );
     assert_eq!(all.log, Config::default().log);
     let defaults = Config::default().processing().pipeline_settings(0.5, 0.5);
     let mut shown = all.processing().pipeline_settings(0.5, 0.5);

@@ -78,6 +78,11 @@ impl FakeScanner {
         self.change(|state| state.fault_after = Some(columns));
     }
 
+    /// By hand, as for adjustment.
+    pub(crate) fn switch_laser(&self, on: bool) {
+        self.change(|state| state.laser_on = on);
+    }
+
     pub(crate) fn laser_is_on(&self) -> bool {
         self.state.lock().unwrap().laser_on
     }

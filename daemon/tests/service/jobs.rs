@@ -216,3 +216,31 @@ async fn an_unwritable_spool_fails_the_job_and_a_retry_mends_it() {
     );
     rig.daemon.shutdown().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_grid_that_is_absurdly_fine_is_refused_before_the_work() {
+    let rig = Rig::new().await;
+    let (scan, _) = rig.scan_to_result("a").await;
+    let mut events = rig.client.events().await;
+    let rerun = Rerun {
+        settings: [("regrid.pitch_mm".to_owned(), json!(0.002))].into(),
+        ..Rerun::default()
+    };
+    let job: Job = rig.client.post(&path::scan_rerun(&scan.id), &rerun).await;
+    let job = job_over(&mut events, &rig, job.id).await;
+    assert_eq!(job.state, JobState::Failed);
+    assert_eq!(
+        job.error.unwrap(),
+        format!(
+            "scan {}: a grid of 0.002 mm is too fine for its 3600 samples, which spread over \
+             29.5 x 29.5 mm",
+            scan.id
+        )
+    );
+    let hint = job.hint.unwrap();
+    let least = hint.split("regrid.pitch_mm=").nth(1).unwrap();
+    let least: f64 = least.split(' ').next().unwrap().parse().unwrap();
+    // 2^24 nodes on 29.5 x 29.5 mm.
+    assert!((least - 29.5 / 4096.0).abs() < 1e-4, "{hint}");
+    rig.daemon.shutdown().await;
+}

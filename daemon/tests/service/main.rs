@@ -6,11 +6,17 @@
     reason = "a test that cannot go on says where"
 )]
 
+mod access;
+mod ailing;
 mod client;
 mod config;
 mod events;
 mod fake;
+mod hostile;
 mod jobs;
+mod laser;
+mod old_state;
+mod power;
 mod refusals;
 mod rig;
 mod scans;

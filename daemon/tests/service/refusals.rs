@@ -2,9 +2,8 @@ use relief_api::{Problem, Scan, ScannerLink, StartScan, Status, path};
 use reliefd::Daemon;
 use scanner_driver::ScannerError;
 use serde_json::json;
-use tokio::net::TcpStream;
 
-use crate::client::{Client, exchange};
+use crate::client::Client;
 use crate::fake::FakeScanner;
 use crate::rig::{Rig, config, ended};
 
@@ -269,30 +268,6 @@ async fn a_socket_left_by_a_dead_service_is_taken_over() {
     assert_eq!(mode & 0o777, 0o660);
     rig.daemon.shutdown().await;
     assert!(!path.exists());
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn only_local_names_are_answered_on_loopback() {
-    let folder = tempfile::tempdir().unwrap();
-    let rig = Rig::start(folder, |config| {
-        config.service.listen = Some("127.0.0.1:0".parse().unwrap());
-    })
-    .await;
-    let address = rig.daemon.listen().unwrap();
-    for (host, status) in [
-        (address.to_string(), 200),
-        ("localhost".to_owned(), 200),
-        ("rebound.example.org".to_owned(), 403),
-    ] {
-        let stream = TcpStream::connect(address).await.unwrap();
-        let reply = exchange(stream, &host, "GET", path::STATUS, None).await;
-        assert_eq!(reply.status, status, "{host}");
-    }
-    let stream = TcpStream::connect(address).await.unwrap();
-    let host = "localhost\r\nOrigin: http://evil.example.org";
-    let reply = exchange(stream, host, "POST", path::ABORT, None).await;
-    assert_eq!(reply.problem().kind, "not-local");
-    rig.daemon.shutdown().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use relief_api::{Event, Job, JobId, JobState, Scan, ScanState, StartScan, path};
 use reliefd::{Config, Daemon};
+use storage::{Disk, LocalDisk};
 use tempfile::TempDir;
 
 use crate::client::{Client, Events};
@@ -32,10 +33,20 @@ impl Rig {
     }
 
     pub(crate) async fn start(folder: TempDir, change: impl FnOnce(&mut Config)) -> Self {
+        Self::start_on(folder, Arc::new(LocalDisk), change).await
+    }
+
+    pub(crate) async fn start_on(
+        folder: TempDir,
+        disk: Arc<dyn Disk>,
+        change: impl FnOnce(&mut Config),
+    ) -> Self {
         let mut config = config(folder.path());
         change(&mut config);
         let scanner = FakeScanner::new();
-        let daemon = Daemon::start_with(config, scanner.clone()).await.unwrap();
+        let daemon = Daemon::start_on(config, scanner.clone(), disk)
+            .await
+            .unwrap();
         Self {
             client: Client::new(daemon.socket()),
             daemon,
@@ -46,8 +57,12 @@ impl Rig {
 
     /// Ends the service and starts another on what it left.
     pub(crate) async fn restart(self) -> Self {
+        self.restart_with(|_| {}).await
+    }
+
+    pub(crate) async fn restart_with(self, change: impl FnOnce(&mut Config)) -> Self {
         self.daemon.shutdown().await;
-        Self::start(self.folder, |_| {}).await
+        Self::start(self.folder, change).await
     }
 
     pub(crate) fn journal(&self, scan: &str) -> PathBuf {

@@ -4,7 +4,7 @@ use relief_api::{Scan, path};
 
 use crate::failure::Failure;
 use crate::output;
-use crate::service::{Client, EndpointArgs};
+use crate::service::EndpointArgs;
 
 /// End the running scan: laser off, table stopped; the columns so far are kept
 #[derive(Debug, clap::Args)]
@@ -17,7 +17,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
-    let client = Client::new(args.endpoint.endpoint());
+    let client = args.endpoint.client()?;
     let path = args
         .scan
         .map_or_else(|| path::ABORT.to_owned(), |scan| path::scan_abort(&scan));

@@ -4,7 +4,7 @@ use relief_api::{Job, JobId, path};
 
 use crate::failure::Failure;
 use crate::output;
-use crate::service::{Client, EndpointArgs};
+use crate::service::EndpointArgs;
 
 /// Give up a queued or running job; its scan is kept
 #[derive(Debug, clap::Args)]
@@ -43,7 +43,7 @@ pub(crate) async fn retry(args: RetryArgs, json: bool) -> Result<(), Failure> {
 }
 
 async fn change(args: JobArgs, path: fn(JobId) -> String, json: bool) -> Result<(), Failure> {
-    let client = Client::new(args.endpoint.endpoint());
+    let client = args.endpoint.client()?;
     let job: Job = client.post(&path(args.job), &serde_json::json!({})).await?;
     output::either(json, &job, |job| {
         format!(

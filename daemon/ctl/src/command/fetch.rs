@@ -39,7 +39,7 @@ pub(crate) struct Fetched {
 }
 
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
-    let client = Client::new(args.endpoint.endpoint());
+    let client = args.endpoint.client()?;
     let result = named::result(&client, args.scan).await?;
     let directory = args.output.unwrap_or_else(|| PathBuf::from(&result));
     let fetched = into_directory(&client, &result, directory).await?;

@@ -7,13 +7,17 @@ pub(crate) mod demo;
 pub(crate) mod doctor;
 pub(crate) mod fetch;
 pub(crate) mod jobs;
+pub(crate) mod laser;
+pub(crate) mod manual;
 mod named;
 mod part;
 pub(crate) mod rerun;
+pub(crate) mod resume;
 pub(crate) mod scan;
 pub(crate) mod scans;
 mod setting;
 pub(crate) mod status;
+pub(crate) mod token;
 pub(crate) mod watch;
 
 use std::future::Future;
@@ -29,6 +33,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Convert(args) => block_on(convert::run(args, json)),
         Command::Scan(args) => block_on(scan::run(args, json)),
         Command::Abort(args) => block_on(abort::run(args, json)),
+        Command::Resume(args) => block_on(resume::run(args, json)),
         Command::Status(args) => block_on(status::run(args, json)),
         Command::Scans(args) => block_on(scans::run(args, json)),
         Command::Jobs(args) => block_on(jobs::run(args, json)),
@@ -38,6 +43,9 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Watch(args) => block_on(watch::run(args, json)),
         Command::Doctor(args) => block_on(doctor::run(args, json)),
         Command::Fetch(args) => block_on(fetch::run(args, json)),
+        Command::Laser(args) => block_on(laser::run(args, json)),
+        Command::Token(args) => block_on(token::run(args, json)),
+        Command::Manual(args) => manual::run(&args, json),
     }
 }
 

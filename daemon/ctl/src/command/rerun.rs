@@ -8,7 +8,7 @@ use super::setting::{self, Setting};
 use crate::failure::Failure;
 use crate::follow;
 use crate::output;
-use crate::service::{Client, EndpointArgs};
+use crate::service::EndpointArgs;
 
 /// Process a kept scan again, with other settings if wanted
 #[derive(Debug, clap::Args)]
@@ -38,7 +38,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
-    let client = Client::new(args.endpoint.endpoint());
+    let client = args.endpoint.client()?;
     let events = if args.wait {
         Some(client.events().await?)
     } else {

@@ -8,7 +8,7 @@ use super::setting::{self, Setting};
 use crate::failure::Failure;
 use crate::follow;
 use crate::output;
-use crate::service::{Client, EndpointArgs};
+use crate::service::EndpointArgs;
 
 /// Start a scan
 #[derive(Debug, clap::Args)]
@@ -105,7 +105,7 @@ struct Told {
 }
 
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
-    let client = Client::new(args.endpoint.endpoint());
+    let client = args.endpoint.client()?;
     // Listening begins before the scan, so that none of its events is missed.
     let events = if args.wait {
         Some(client.events().await?)

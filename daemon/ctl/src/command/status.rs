@@ -40,10 +40,23 @@ fn told(status: &Status) -> String {
     if let Some(problem) = &scanner.problem {
         lines.push(format!("          {problem}"));
     }
+    lines.push(match &status.laser {
+        Some(laser) => format!(
+            "laser     {} since {}: {}",
+            laser.laser.as_str(),
+            laser.at,
+            laser.cause
+        ),
+        None => "laser     not known yet".into(),
+    });
     lines.push(match &status.scan {
         Some(scan) => format!(
-            "scan      {} ({}): {} of {} columns",
-            scan.id, scan.name, scan.columns, scan.columns_planned
+            "scan      {} ({}): {}, {} of {} columns",
+            scan.id,
+            scan.name,
+            scan.state.as_str(),
+            scan.columns,
+            scan.columns_planned
         ),
         None => "scan      none".into(),
     });
@@ -53,5 +66,25 @@ fn told(status: &Status) -> String {
         counted(status.jobs_queued, "job")
     ));
     lines.push(format!("spool     {}", status.spool));
+    if let Some(storage) = &status.storage {
+        let least = [storage.scans_free_bytes, storage.results_free_bytes]
+            .into_iter()
+            .flatten()
+            .min();
+        lines.push(format!(
+            "storage   scans {}, results {}; {} free",
+            size(storage.scans_bytes),
+            size(storage.results_bytes),
+            least.map_or_else(|| "unknown room".into(), size),
+        ));
+    }
     lines.join("\n")
+}
+
+/// A size for people.
+fn size(bytes: u64) -> String {
+    match bytes {
+        0..1_000_000_000 => format!("{:.1} MB", bytes as f64 * 1e-6),
+        _ => format!("{:.1} GB", bytes as f64 * 1e-9),
+    }
 }

@@ -6,7 +6,7 @@ use relief_api::Event;
 
 use crate::failure::Failure;
 use crate::output;
-use crate::service::{Client, EndpointArgs};
+use crate::service::EndpointArgs;
 
 /// Show what the service does, as it happens, until Ctrl-C
 #[derive(Debug, clap::Args)]
@@ -19,7 +19,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
-    let client = Client::new(args.endpoint.endpoint());
+    let client = args.endpoint.client()?;
     let mut events = client.events().await?;
     let mut told = 0;
     let ended = loop {

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::{Serialize, de::DeserializeOwned};
 
 use super::Client;
+use super::token::{self, Token};
 use crate::failure::Failure;
 use crate::output;
 
@@ -18,17 +19,31 @@ pub(crate) struct EndpointArgs {
     /// Address of the service on this machine, such as http://127.0.0.1:7437, instead of
     /// the socket
     #[arg(long, value_name = "URL", value_parser = parse_url)]
-    url: Option<Endpoint>,
+    url: Option<Address>,
+    /// File with the token that --url needs (see `relief token`); or the token itself in the
+    /// environment variable RELIEF_TOKEN
+    #[arg(long, value_name = "FILE", env = "RELIEF_TOKEN_FILE")]
+    token_file: Option<PathBuf>,
 }
 
 /// Where a packaged service listens.
 pub(crate) const DEFAULT_SOCKET: &str = "/run/relief/reliefd.sock";
 
 impl EndpointArgs {
-    pub(crate) fn endpoint(&self) -> Endpoint {
-        self.url
-            .clone()
-            .unwrap_or_else(|| Endpoint::Socket(self.socket.clone()))
+    pub(crate) fn endpoint(&self) -> Result<Endpoint, Failure> {
+        Ok(match self.url.clone() {
+            // The socket needs no token, so that one that is not there is no trouble.
+            None => Endpoint::Socket(self.socket.clone()),
+            Some(address) => Endpoint::Loopback {
+                address,
+                token: token::find(self.token_file.as_deref())?,
+            },
+        })
+    }
+
+    /// The service to ask.
+    pub(crate) fn client(&self) -> Result<Client, Failure> {
+        Ok(Client::new(self.endpoint()?))
     }
 
     /// Asks the service for something and prints it, as JSON or as it is told to people.
@@ -38,7 +53,7 @@ impl EndpointArgs {
         json: bool,
         told: impl FnOnce(&T) -> String,
     ) -> Result<(), Failure> {
-        let answer: T = Client::new(self.endpoint()).get(path).await?;
+        let answer: T = self.client()?.get(path).await?;
         output::either(json, &answer, told)
     }
 }
@@ -47,7 +62,28 @@ impl EndpointArgs {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Endpoint {
     Socket(PathBuf),
-    Loopback { host: String, port: u16 },
+    Loopback {
+        address: Address,
+        token: Option<Token>,
+    },
+}
+
+/// A port of this machine.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Address {
+    pub(crate) host: String,
+    pub(crate) port: u16,
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { host, port } = self;
+        if host.contains(':') {
+            write!(f, "[{host}]:{port}")
+        } else {
+            write!(f, "{host}:{port}")
+        }
+    }
 }
 
 impl Endpoint {
@@ -55,8 +91,7 @@ impl Endpoint {
     pub(crate) fn host(&self) -> String {
         match self {
             Self::Socket(_) => "localhost".into(),
-            Self::Loopback { host, port } if host.contains(':') => format!("[{host}]:{port}"),
-            Self::Loopback { host, port } => format!("{host}:{port}"),
+            Self::Loopback { address, .. } => address.to_string(),
         }
     }
 }
@@ -70,7 +105,7 @@ impl fmt::Display for Endpoint {
     }
 }
 
-fn parse_url(text: &str) -> Result<Endpoint, String> {
+fn parse_url(text: &str) -> Result<Address, String> {
     const EXAMPLE: &str = "expected something like http://127.0.0.1:7437";
     let Some(rest) = text.strip_prefix("http://") else {
         return Err(format!(
@@ -92,7 +127,7 @@ fn parse_url(text: &str) -> Result<Endpoint, String> {
     {
         return Err(format!("`{host}` is not a host; {EXAMPLE}"));
     }
-    Ok(Endpoint::Loopback {
+    Ok(Address {
         host: host.to_owned(),
         port,
     })
@@ -109,8 +144,9 @@ mod tests {
             "http://127.0.0.1:7437/",
             "http://[::1]:80",
         ] {
-            let endpoint = parse_url(text).unwrap();
-            assert_eq!(endpoint.to_string(), text.trim_end_matches('/'));
+            let address = parse_url(text).unwrap();
+            let shown = format!("http://{address}");
+            assert_eq!(shown, text.trim_end_matches('/'));
         }
         for text in [
             "https://a:1",

@@ -2,6 +2,7 @@
 
 mod endpoint;
 mod events;
+mod token;
 
 use std::time::Duration;
 
@@ -114,8 +115,8 @@ impl Client {
                     let stream = UnixStream::connect(path_of_socket).await;
                     self.exchange(stream, method, path, body, accept).await
                 }
-                Endpoint::Loopback { host, port } => {
-                    let stream = TcpStream::connect((host.as_str(), *port)).await;
+                Endpoint::Loopback { address, .. } => {
+                    let stream = TcpStream::connect((address.host.as_str(), address.port)).await;
                     self.exchange(stream, method, path, body, accept).await
                 }
             }
@@ -149,7 +150,14 @@ impl Client {
         // The connection ends by itself when the reply has been read or dropped; its own
         // errors come out at the reply.
         tokio::spawn(connection);
-        let request = Request::builder()
+        let mut request = Request::builder();
+        if let Endpoint::Loopback {
+            token: Some(token), ..
+        } = &self.endpoint
+        {
+            request = request.header(header::AUTHORIZATION, token.header());
+        }
+        let request = request
             .method(method)
             .uri(path)
             .header(header::HOST, self.endpoint.host())

@@ -11,6 +11,8 @@ pub(crate) fn relief(directory: &Path, arguments: &[&str]) -> Output {
         .current_dir(directory)
         .env_remove("SOURCE_DATE_EPOCH")
         .env_remove("RELIEF_SOCKET")
+        .env_remove("RELIEF_TOKEN")
+        .env_remove("RELIEF_TOKEN_FILE")
         .args(arguments)
         .output()
         .expect("the program starts")

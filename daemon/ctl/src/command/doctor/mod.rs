@@ -90,7 +90,7 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
         &config.service.spool_dir,
     ));
     findings.push(machine::clock());
-    findings.push(reach::check(args.endpoint.endpoint()).await);
+    findings.push(reach::check(args.endpoint.endpoint()?).await);
 
     let bad = findings
         .iter()

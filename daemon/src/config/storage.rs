@@ -1,0 +1,80 @@
+//! The section `[storage]`: room on the disk.
+
+use serde::Deserialize;
+
+use super::value;
+
+/// Room on the disk: how much stays free, and what goes to make some.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StorageConfig {
+    /// Megabytes that stay free on the disks of kept scans and results; a scan that would need
+    /// some of them is refused.
+    #[serde(deserialize_with = "value::reserve_mb")]
+    pub reserve_mb: u32,
+    /// Most megabytes that kept scans may take; the oldest go first.
+    #[serde(deserialize_with = "value::megabytes")]
+    pub scans_mb: Option<u32>,
+    /// Days for which scans are kept.
+    #[serde(deserialize_with = "value::days")]
+    pub scans_days: Option<u32>,
+    /// Most megabytes that results may take; the oldest go first.
+    #[serde(deserialize_with = "value::megabytes")]
+    pub results_mb: Option<u32>,
+    /// Days for which results are kept.
+    #[serde(deserialize_with = "value::days")]
+    pub results_days: Option<u32>,
+}
+
+/// Bytes of a megabyte.
+const MB: u64 = 1_000_000;
+
+impl StorageConfig {
+    /// Bytes that stay free.
+    #[must_use]
+    pub fn reserve_bytes(&self) -> u64 {
+        u64::from(self.reserve_mb) * MB
+    }
+
+    /// Most bytes and days of kept scans.
+    #[must_use]
+    pub fn scans(&self) -> Limits {
+        Limits::new(self.scans_mb, self.scans_days)
+    }
+
+    /// Most bytes and days of results.
+    #[must_use]
+    pub fn results(&self) -> Limits {
+        Limits::new(self.results_mb, self.results_days)
+    }
+}
+
+impl Default for StorageConfig {
+    fn default() -> Self {
+        Self {
+            reserve_mb: 256,
+            scans_mb: None,
+            scans_days: None,
+            results_mb: None,
+            results_days: None,
+        }
+    }
+}
+
+/// How much is kept, and for how long; without a limit, everything for ever.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Limits {
+    /// Bytes in all.
+    pub bytes: Option<u64>,
+    /// Seconds since the end.
+    pub age_s: Option<u64>,
+}
+
+impl Limits {
+    fn new(megabytes: Option<u32>, days: Option<u32>) -> Self {
+        Self {
+            bytes: megabytes.map(|megabytes| u64::from(megabytes) * MB),
+            age_s: days.map(|days| u64::from(days) * 86_400),
+        }
+    }
+}

@@ -1,0 +1,375 @@
+//! The laser: whether it is on, and a log of every change with its cause.
+//!
+//! The log is `laser.jsonl` in the state folder: one JSON object a line, only ever appended
+//! to. A line that says `on` is on disk before the scanner is asked.
+
+use std::collections::VecDeque;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+use relief_api::{LaserEntry, LaserState, ScanState};
+use scanner_driver::{DeviceStatus, ScanStream, Scanner, ScannerError};
+use scanner_protocol::{Identity, ScanPlan};
+
+use crate::ids::now;
+use crate::service::lock;
+
+/// Entries that are kept for showing; the file has all.
+const MOST_SHOWN: usize = 1_000;
+/// How much of the file's end is read at the start: more than that many entries take.
+const TAIL_BYTES: u64 = 512 * 1024;
+/// For the service's user to write, and for its group to read.
+const FILE_MODE: u32 = 0o640;
+
+/// The log of the laser cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "cannot use the log of the laser, {}: {source}; the folder service.state_dir must be \
+     writable for the user of reliefd",
+    path.display()
+)]
+pub struct LaserLogError {
+    /// The file.
+    pub path: PathBuf,
+    /// What the system says.
+    pub source: io::Error,
+}
+
+/// What is known of the laser, and its log.
+#[derive(Debug)]
+pub(crate) struct Laser {
+    known: Mutex<Known>,
+}
+
+#[derive(Debug)]
+struct Known {
+    file: File,
+    entries: VecDeque<LaserEntry>,
+    /// The scan that is about to begin.
+    next_scan: Option<String>,
+    /// The scan for whose sake the laser is on.
+    scan: Option<String>,
+    /// Why the scanner is about to be stopped.
+    reason: Option<String>,
+    /// Counts what the service did, so that an answer to an older question is told.
+    acts: u64,
+}
+
+impl Laser {
+    /// Opens the log, and notes if the service last ended with the laser on.
+    pub(crate) fn open(path: &Path) -> Result<Self, LaserLogError> {
+        let failed = |source| LaserLogError {
+            path: path.to_owned(),
+            source,
+        };
+        let mut file = OpenOptions::new()
+            .read(true)
+            .append(true)
+            .create(true)
+            .mode(FILE_MODE)
+            .open(path)
+            .map_err(failed)?;
+        let entries = read_tail(&mut file).map_err(failed)?;
+        let laser = Self {
+            known: Mutex::new(Known {
+                file,
+                entries,
+                next_scan: None,
+                scan: None,
+                reason: None,
+                acts: 0,
+            }),
+        };
+        if laser.state() == Some(LaserState::On) {
+            laser.note(
+                LaserState::Unknown,
+                "the service ended while the laser was on; the scanner turns it off by itself \
+                 when it hears nothing (dead-man time)",
+            );
+        }
+        Ok(laser)
+    }
+
+    /// The latest entry.
+    pub(crate) fn latest(&self) -> Option<LaserEntry> {
+        lock(&self.known).entries.back().cloned()
+    }
+
+    /// The latest entries, oldest first.
+    pub(crate) fn entries(&self) -> Vec<LaserEntry> {
+        lock(&self.known).entries.iter().cloned().collect()
+    }
+
+    fn state(&self) -> Option<LaserState> {
+        self.latest().map(|entry| entry.laser)
+    }
+
+    /// A scan is about to begin.
+    pub(crate) fn scan_begins(&self, scan: &str) {
+        lock(&self.known).next_scan = Some(scan.to_owned());
+    }
+
+    /// The scanner is about to be stopped for this reason.
+    pub(crate) fn stop_asked(&self, reason: &str) {
+        lock(&self.known).reason = Some(reason.to_owned());
+    }
+
+    /// The scan under way stands still: what the laser does is not known until the scanner
+    /// says so, or measures again.
+    pub(crate) fn scan_paused(&self, reason: &str) {
+        self.note(LaserState::Unknown, reason);
+    }
+
+    /// The scan measures again.
+    pub(crate) fn scan_goes_on(&self) {
+        self.note(LaserState::On, "the scan goes on");
+    }
+
+    /// The scan under way has ended. A device that ended it by itself has turned the laser
+    /// off; one that was lost, or has a fault, must be asked first.
+    pub(crate) fn scan_ended(&self, state: ScanState, reason: Option<&str>) {
+        if self.state() == Some(LaserState::On) {
+            match state {
+                ScanState::Complete => self.note(LaserState::Off, "the scan is complete"),
+                _ => self.note(
+                    LaserState::Unknown,
+                    reason.unwrap_or("the scan ended early"),
+                ),
+            }
+        }
+        let mut known = lock(&self.known);
+        known.next_scan = None;
+        known.scan = None;
+        known.reason = None;
+    }
+
+    fn note(&self, laser: LaserState, cause: &str) {
+        lock(&self.known).note(laser, cause);
+    }
+
+    /// The same of what the scanner answered, unless the service has acted since it asked:
+    /// an answer from before says nothing about what is now.
+    fn note_answer(&self, acts: u64, laser: LaserState, cause: &str) {
+        let mut known = lock(&self.known);
+        if known.acts == acts {
+            known.note(laser, cause);
+        }
+    }
+
+    /// The scanner is about to be told to begin.
+    fn begin(&self) {
+        let mut known = lock(&self.known);
+        known.acts += 1;
+        known.scan = known.next_scan.take();
+        known.note(LaserState::On, "a scan begins");
+    }
+
+    /// Why the scanner is to be stopped, if that is known.
+    fn reason(&self) -> Option<String> {
+        lock(&self.known).reason.clone()
+    }
+
+    /// The scanner was told to stop.
+    fn stopped(&self) {
+        lock(&self.known).acts += 1;
+    }
+}
+
+impl Known {
+    /// Notes a state; one that is known already is not noted again.
+    fn note(&mut self, laser: LaserState, cause: &str) {
+        if self.entries.back().is_some_and(|last| last.laser == laser) {
+            return;
+        }
+        let entry = LaserEntry {
+            at: now(),
+            laser,
+            cause: cause.to_owned(),
+            scan: self.scan.clone(),
+        };
+        match laser {
+            LaserState::On => tracing::info!(cause, scan = entry.scan, "laser on"),
+            LaserState::Off => tracing::info!(cause, scan = entry.scan, "laser off"),
+            LaserState::Unknown => tracing::warn!(cause, scan = entry.scan, "laser unknown"),
+        }
+        if let Err(error) = append(&mut self.file, &entry) {
+            tracing::error!(%error, "the log of the laser cannot be written");
+        }
+        self.entries.push_back(entry);
+        if self.entries.len() > MOST_SHOWN {
+            self.entries.pop_front();
+        }
+    }
+}
+
+fn append(file: &mut File, entry: &LaserEntry) -> io::Result<()> {
+    let mut line = serde_json::to_vec(entry)?;
+    line.push(b'\n');
+    // In one piece, so that no line is ever mixed with another.
+    file.write_all(&line)?;
+    file.sync_data()
+}
+
+/// The last entries of the log. A line that a crash cut short is passed over, and ended.
+fn read_tail(file: &mut File) -> io::Result<VecDeque<LaserEntry>> {
+    let bytes = file.seek(SeekFrom::End(0))?;
+    file.seek(SeekFrom::Start(bytes.saturating_sub(TAIL_BYTES)))?;
+    let mut tail = Vec::new();
+    file.take(TAIL_BYTES).read_to_end(&mut tail)?;
+    if tail.last().is_some_and(|&last| last != b'\n') {
+        file.write_all(b"\n")?;
+    }
+    let mut entries: VecDeque<LaserEntry> = tail
+        .split(|&b| b == b'\n')
+        .filter_map(|line| serde_json::from_slice(line).ok())
+        .collect();
+    entries.drain(..entries.len().saturating_sub(MOST_SHOWN));
+    Ok(entries)
+}
+
+/// A scanner whose laser is watched: every call that may switch it is noted.
+pub(crate) struct Watched {
+    scanner: Arc<dyn Scanner>,
+    laser: Arc<Laser>,
+}
+
+impl Watched {
+    pub(crate) fn new(scanner: Arc<dyn Scanner>, laser: Arc<Laser>) -> Self {
+        Self { scanner, laser }
+    }
+}
+
+impl Scanner for Watched {
+    fn identify(&self) -> Result<Identity, ScannerError> {
+        self.scanner.identify()
+    }
+
+    fn home(&self) -> Result<(), ScannerError> {
+        self.scanner.home()
+    }
+
+    fn status(&self) -> Result<DeviceStatus, ScannerError> {
+        let acts = lock(&self.laser.known).acts;
+        let status = self.scanner.status();
+        let answer = |laser, cause: &str| self.laser.note_answer(acts, laser, cause);
+        match &status {
+            Ok(status) if status.laser_on => {
+                answer(LaserState::On, "the scanner says that it is on");
+            }
+            Ok(_) => answer(LaserState::Off, "the scanner says that it is off"),
+            Err(error) if self.laser.state() == Some(LaserState::On) => {
+                answer(LaserState::Unknown, &error.to_string());
+            }
+            Err(_) => {}
+        }
+        status
+    }
+
+    fn start_scan(&self, plan: &ScanPlan) -> Result<ScanStream, ScannerError> {
+        self.laser.begin();
+        let started = self.scanner.start_scan(plan);
+        if let Err(error) = &started {
+            self.laser.note(LaserState::Unknown, &error.to_string());
+        }
+        started
+    }
+
+    fn resume_scan(&self) -> Result<(), ScannerError> {
+        // To see whether it has moved, the part is measured again.
+        self.laser.scan_goes_on();
+        let resumed = self.scanner.resume_scan();
+        if let Err(error) = &resumed {
+            self.laser.note(LaserState::Unknown, &error.to_string());
+        }
+        resumed
+    }
+
+    fn abort(&self) -> Result<(), ScannerError> {
+        // Before: a scan that ends meanwhile takes its reason with it.
+        let reason = self.laser.reason();
+        let stopped = self.scanner.abort();
+        self.laser.stopped();
+        match &stopped {
+            Ok(()) => {
+                let cause = reason.as_deref().unwrap_or("the scanner was told to stop");
+                self.laser.note(LaserState::Off, cause);
+            }
+            Err(error) if self.laser.state() == Some(LaserState::On) => {
+                self.laser.note(LaserState::Unknown, &error.to_string());
+            }
+            Err(_) => {}
+        }
+        stopped
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_log_is_appended_to_and_survives_torn_lines() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("laser.jsonl");
+        let laser = Laser::open(&path).unwrap();
+        assert_eq!(laser.latest(), None);
+        laser.scan_begins("s");
+        laser.begin();
+        laser.note(LaserState::On, "again");
+        drop(laser);
+        // As a crash in the middle of a line leaves it.
+        let mut file = OpenOptions::new().append(true).open(&path).unwrap();
+        file.write_all(b"{\"at\":\"2026").unwrap();
+
+        let laser = Laser::open(&path).unwrap();
+        laser.note(LaserState::Off, "the scanner says that it is off");
+        let states: Vec<LaserState> = laser.entries().iter().map(|e| e.laser).collect();
+        let expected = [LaserState::On, LaserState::Unknown, LaserState::Off];
+        assert_eq!(states, expected);
+        assert_eq!(laser.entries()[0].scan.as_deref(), Some("s"));
+        assert!(laser.entries()[1].cause.contains("dead-man"));
+        let again = Laser::open(&path).unwrap();
+        assert_eq!(again.entries(), laser.entries());
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(text.lines().count(), 4, "{text}");
+    }
+
+    #[test]
+    fn nobody_knows_of_a_pause_whether_the_laser_is_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let laser = Laser::open(&folder.path().join("laser.jsonl")).unwrap();
+        laser.scan_begins("s");
+        laser.begin();
+        laser.scan_paused("the cable was pulled");
+        laser.scan_goes_on();
+        laser.scan_ended(ScanState::Complete, None);
+        let entries = laser.entries();
+        let states: Vec<LaserState> = entries.iter().map(|e| e.laser).collect();
+        use LaserState::{Off, On, Unknown};
+        assert_eq!(states, [On, Unknown, On, Off]);
+        assert!(entries.iter().all(|e| e.scan.as_deref() == Some("s")));
+        assert_eq!(entries[1].cause, "the cable was pulled");
+    }
+
+    #[test]
+    fn only_the_latest_entries_are_kept_in_memory() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("laser.jsonl");
+        let entry = |number: u32| LaserEntry {
+            at: number.to_string(),
+            laser: LaserState::Off,
+            cause: "c".repeat(100),
+            scan: None,
+        };
+        let text: String = (0..9_000)
+            .map(|n| serde_json::to_string(&entry(n)).unwrap() + "\n")
+            .collect();
+        std::fs::write(&path, text).unwrap();
+        let laser = Laser::open(&path).unwrap();
+        assert_eq!(laser.entries().len(), MOST_SHOWN);
+        assert_eq!(laser.latest(), Some(entry(8_999)));
+    }
+}

@@ -1,0 +1,185 @@
+//! Taking up what an earlier run left, and what the disk refused to keep.
+
+use std::fs;
+use std::path::Path;
+
+use relief_api::{Event, JobState, Scan, ScanState};
+use scan_record::{EndCause, Ending, JournalReader};
+
+use crate::error::ServiceError;
+use crate::ids::now;
+use crate::service::{Service, lock};
+
+/// What a journal tells of its scan, whatever became of the service meanwhile.
+#[derive(Debug)]
+struct Found {
+    /// The record as it stood when the scan began; none if it cannot be read.
+    begun: Option<Scan>,
+    columns: u32,
+    state: ScanState,
+    reason: Option<String>,
+}
+
+impl Found {
+    fn in_journal(path: &Path) -> Self {
+        let interrupted = |begun, columns, what: String| Self {
+            begun,
+            columns,
+            state: ScanState::Interrupted,
+            reason: Some(format!("the service ended during the scan ({what})")),
+        };
+        let mut reader = match JournalReader::open(path) {
+            Ok(reader) => reader,
+            Err(error) => return interrupted(None, 0, error.to_string()),
+        };
+        let begun = serde_json::from_slice(&reader.header().metadata).ok();
+        let failed = loop {
+            match reader.next_column() {
+                Ok(Some(_)) => {}
+                Ok(None) => break None,
+                Err(error) => break Some(error.to_string()),
+            }
+        };
+        let columns = reader.columns();
+        let (state, reason) = match reader.ending() {
+            Some(Ending::Closed(EndCause::Complete)) => (ScanState::Complete, None),
+            Some(Ending::Closed(EndCause::Aborted(by))) => (ScanState::Aborted, Some(by.clone())),
+            Some(Ending::Closed(EndCause::Fault(what))) => (ScanState::Failed, Some(what.clone())),
+            Some(damaged) => return interrupted(begun, columns, damaged.to_string()),
+            None => return interrupted(begun, columns, failed.unwrap_or_default()),
+        };
+        Self {
+            begun,
+            columns,
+            state,
+            reason,
+        }
+    }
+
+    /// The scan as it ended.
+    fn end(self, scan: &mut Scan) {
+        scan.columns = self.columns;
+        scan.state = self.state;
+        scan.reason = self.reason;
+        scan.ended_at = Some(now());
+    }
+}
+
+impl Service {
+    /// After a restart: notes how scans ended that were under way, and what was kept of
+    /// them. One that had its last column is complete, and is processed.
+    pub(crate) fn recover_scans(&self) -> Result<(), ServiceError> {
+        for mut scan in self.store.scans()? {
+            if scan.state.is_over() {
+                continue;
+            }
+            Found::in_journal(&self.journal_path(&scan.id)).end(&mut scan);
+            if scan.state == ScanState::Complete {
+                tracing::info!(scan = %scan.id, "a scan was complete when the service last ended");
+            } else {
+                tracing::warn!(
+                    scan = %scan.id,
+                    columns = scan.columns,
+                    "a scan was cut short when the service last ended"
+                );
+            }
+            self.keep_ended(&mut scan)?;
+        }
+        Ok(())
+    }
+
+    /// After a restart: makes records of scans that have none, from their journals. That is
+    /// so where the records were damaged, or a journal was put back from elsewhere.
+    pub(crate) fn adopt_journals(&self) -> Result<(), ServiceError> {
+        let mut names = Vec::new();
+        for entry in fs::read_dir(self.scans_dir()).into_iter().flatten() {
+            let Ok(entry) = entry else { continue };
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if let Some(id) = name.strip_suffix(".scan") {
+                names.push(id.to_owned());
+            }
+        }
+        names.sort();
+        for id in names {
+            if self.store.scan(&id)?.is_some() {
+                continue;
+            }
+            let mut found = Found::in_journal(&self.journal_path(&id));
+            let Some(mut scan) = found.begun.take().filter(|scan| scan.id == id) else {
+                tracing::error!(
+                    journal = %self.journal_path(&id).display(),
+                    reason = found.reason.unwrap_or_default(),
+                    "a journal has no record, and none can be made of it: `relief convert` may \
+                     still read it"
+                );
+                continue;
+            };
+            // What the header says of jobs and settings is of the scan's beginning.
+            scan.jobs.clear();
+            found.end(&mut scan);
+            tracing::warn!(
+                scan = %scan.id,
+                columns = scan.columns,
+                state = scan.state.as_str(),
+                "the record of a scan was made anew from its journal"
+            );
+            self.keep_ended(&mut scan)?;
+        }
+        Ok(())
+    }
+
+    /// Keeps the record of a scan that is over, with its job if it is complete. Where the
+    /// result is in the spool already, the job is found to be done.
+    pub(crate) fn keep_ended(&self, scan: &mut Scan) -> Result<(), ServiceError> {
+        if scan.state == ScanState::Complete && scan.jobs.is_empty() {
+            self.queue_first_job(scan).map(drop)
+        } else {
+            Ok(self.store.put_scan(scan)?)
+        }
+    }
+
+    /// Tries again what the disk refused to keep.
+    pub(crate) fn keep_unkept(&self) {
+        // While this works on them, nobody finds them missing.
+        let unkept = lock(&self.unkept).clone();
+        for mut scan in unkept {
+            match self.keep_ended(&mut scan) {
+                Ok(()) => {
+                    lock(&self.unkept).retain(|other| other.id != scan.id);
+                    tracing::info!(scan = %scan.id, "the record of a scan is kept at last");
+                    self.hub.tell(Event::Scan(scan));
+                }
+                Err(error) => {
+                    tracing::debug!(scan = %scan.id, %error, "the record of a scan is still not kept");
+                }
+            }
+        }
+    }
+
+    /// After a restart: queues what waited or was under way, and notes as done what was
+    /// published just before the service ended.
+    pub(crate) fn recover_jobs(&self) -> Result<(), ServiceError> {
+        for mut job in self.store.jobs()? {
+            if job.state.is_over() {
+                continue;
+            }
+            if self.spool.has(&job.result) {
+                self.queue.remove(job.id);
+                job.state = JobState::Done;
+                job.stage = None;
+                job.ended_at = Some(now());
+                job.directory = Some(self.spool.directory(&job.result).display().to_string());
+                self.store.put_job(&job)?;
+                continue;
+            }
+            if job.state == JobState::Running {
+                tracing::info!(job = job.id, scan = %job.scan, "taking up a job that was cut short");
+                job.state = JobState::Queued;
+                job.stage = None;
+                self.store.put_job(&job)?;
+            }
+            self.queue.add(job.id);
+        }
+        Ok(())
+    }
+}
