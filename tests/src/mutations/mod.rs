@@ -5,6 +5,7 @@
 mod dice;
 mod mutate;
 mod seeds;
+mod small;
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -19,6 +20,7 @@ use scan_record::JournalReader;
 pub use dice::Dice;
 pub use mutate::{Mutant, mutant};
 pub use seeds::{Seed, seeds};
+pub use small::{MOST_SMALL_BYTES, Small, small};
 
 /// Longest time that all readers together may take for one file. They need milliseconds;
 /// the rest is for machines with other work.
