@@ -1,7 +1,7 @@
 //! The short form of `cargo xtask study mutations`.
 
 use peak_alloc::PeakAlloc;
-use relief_tests::mutations::{self, MOST_BYTES, Meter, Wanted};
+use relief_tests::mutations::{self, MOST_BYTES, MOST_SMALL_BYTES, MOST_TIME, Meter, Wanted};
 
 #[global_allocator]
 static ALLOCATOR: PeakAlloc = PeakAlloc;
@@ -50,4 +50,15 @@ fn damaged_files_end_no_reader_and_take_no_memory() {
         "{taken} of {files}"
     );
     assert!(figures.through.1 > 0, "{:?}", figures.through);
+
+    for small in mutations::small(&Memory).unwrap() {
+        assert!(small.bytes <= 250, "{small:?}");
+        let most = if small.packed {
+            MOST_BYTES
+        } else {
+            MOST_SMALL_BYTES
+        };
+        assert!(small.peak_bytes < most, "{small:?}");
+        assert!(small.took < MOST_TIME, "{small:?}");
+    }
 }

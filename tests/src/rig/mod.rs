@@ -9,14 +9,17 @@ mod object;
 mod wait;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use anyhow::{Context, Result, ensure};
 use relief_api::{Job, JobId, JobState, Rerun, Scan, StartScan, path};
 use reliefd::{Config, Daemon};
+use scanner_driver::SerialScanner;
 use sim_scanner::config::SimConfig;
 use sim_scanner::control::Control;
 use sim_scanner::endpoint::pty::PtyServer;
+use storage::{Disk, LocalDisk};
 use tempfile::TempDir;
 
 pub use client::{Client, Refused, Reply};
@@ -66,7 +69,21 @@ impl Rig {
     pub async fn start_with(scanner: &SimConfig, change: impl FnOnce(&mut Config)) -> Result<Self> {
         let scanner = scanner.serve_pty(None)?;
         let port = scanner.port().to_owned();
-        Self::around(Some(scanner), &port, change).await
+        Self::around(Some(scanner), &port, Arc::new(LocalDisk), change).await
+    }
+
+    /// As [`Rig::start_with`], with a service that keeps its things on this disk.
+    ///
+    /// # Errors
+    /// As [`Rig::start`].
+    pub async fn start_on(
+        scanner: &SimConfig,
+        disk: Arc<dyn Disk>,
+        change: impl FnOnce(&mut Config),
+    ) -> Result<Self> {
+        let scanner = scanner.serve_pty(None)?;
+        let port = scanner.port().to_owned();
+        Self::around(Some(scanner), &port, disk, change).await
     }
 
     /// Starts a service alone, for whatever is at `port`.
@@ -74,12 +91,13 @@ impl Rig {
     /// # Errors
     /// Whatever keeps the service from starting.
     pub async fn at_port(port: &Path) -> Result<Self> {
-        Self::around(None, port, |_| {}).await
+        Self::around(None, port, Arc::new(LocalDisk), |_| {}).await
     }
 
     async fn around(
         scanner: Option<PtyServer>,
         port: &Path,
+        disk: Arc<dyn Disk>,
         change: impl FnOnce(&mut Config),
     ) -> Result<Self> {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
@@ -89,7 +107,8 @@ impl Rig {
             .tempdir()?;
         let mut config = config(folder.path(), port);
         change(&mut config);
-        let daemon = Daemon::start(config.clone()).await?;
+        let driver = SerialScanner::open(config.scanner.serial())?;
+        let daemon = Daemon::start_on(config.clone(), Arc::new(driver), disk).await?;
         Ok(Self {
             client: Client::new(daemon.socket()),
             daemon,

@@ -117,7 +117,7 @@ async fn a_silent_port() -> Result<()> {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_fault_of_the_device_ends_the_scan_and_is_named() -> Result<()> {
-    let rig = Rig::start(&small_house()).await?;
+    let rig = Rig::start_with(&small_house(), |config| config.scanner.resume = false).await?;
     let control = rig.control()?;
     control.step_columns(Some(12));
     let mut events = rig.client().events().await?;

@@ -4,6 +4,7 @@ use anyhow::Result;
 use relief_tests::rig::{Rig, journal_columns, small_house};
 use sim_scanner::config::SimConfig;
 use sim_scanner::device::Event as Happened;
+use sim_scanner::fault::FaultSpec;
 use sim_scanner::line::LineFaults;
 
 async fn columns_over(line: LineFaults) -> Result<(Vec<scan_record::RawColumn>, usize)> {
@@ -33,7 +34,7 @@ async fn garbage_on_the_line_costs_repeats_and_no_sample() -> Result<()> {
         "lose=3e-4,to=host,seed=4",
         "garbage=3e-4,seed=5",
     ] {
-        let line = faults.parse::<LineFaults>()?;
+        let line = faults.parse::<FaultSpec>()?.line;
         let (columns, resent) = columns_over(line).await?;
         assert!(
             resent > 0,

@@ -4,11 +4,13 @@ mod abort;
 mod bad_input;
 mod errors;
 mod line;
+mod pause;
 mod queue;
 mod real_input;
 mod restart;
 mod same_bytes;
 mod scan;
+mod slow_disk;
 
 use relief_api::StartScan;
 
@@ -20,11 +22,12 @@ fn named(name: &str) -> StartScan {
     }
 }
 
-/// Settings with which a job of a small scan is at work for a second or so before its
+/// Settings with which a job of a small scan is at work for some seconds before its
 /// first result: it can be found at work and stopped there.
 fn slowly() -> Vec<(&'static str, serde_json::Value)> {
     vec![
         ("regrid.draws", 4_000.into()),
+        ("regrid.pitch_mm", 0.8.into()),
         ("regrid.neighbours", 64.into()),
     ]
 }

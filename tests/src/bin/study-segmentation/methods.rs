@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use range_image::{RangeImage, RegionMap, Unmonitored};
+use range_image::{RangeImage, Unmonitored};
 use relief_tests::scenes::View;
 use segment::SegmentSettings;
 
@@ -77,16 +77,11 @@ pub(crate) fn ours(method: Method, image: &RangeImage) -> Result<Vec<u16>> {
 /// The part's own faces by the default method. What stands around the part is taken off
 /// where a view shows it.
 pub(crate) fn part(image: &RangeImage, view: View) -> Result<Vec<u16>> {
-    let mut labels = ours(Method::Relief, image)?;
-    if view == View::Cluttered {
-        let regions = RegionMap::new(image, labels);
-        let found = segment::background(image, &regions, &segment::View::default());
-        labels = regions.raw_labels().to_vec();
-        for label in &mut labels {
-            if found.region(*label).is_some() {
-                *label = 0;
-            }
-        }
+    if view != View::Cluttered {
+        return ours(Method::Relief, image);
     }
-    Ok(labels)
+    let settings = pipeline::Settings::new(image.pitch_mm());
+    let frame = segment::View::default();
+    let part = pipeline::divide(image, &frame, &settings, &Unmonitored)?;
+    Ok(part.regions.raw_labels().to_vec())
 }
