@@ -118,9 +118,10 @@ struct Judges {
 impl Judges {
     fn judge(&self, case: &Case, folder: &Path) -> Result<()> {
         let out = folder.display().to_string();
-        let target = std::env::var_os("CARGO_TARGET_DIR")
-            .map_or_else(|| shell::root().join("target"), PathBuf::from);
-        let scan_scene = target.join("release/scan-scene").display().to_string();
+        let scan_scene = shell::target()
+            .join("release/scan-scene")
+            .display()
+            .to_string();
         let mut words: Vec<&str> = case.arguments.iter().map(String::as_str).collect();
         words.extend(["--within-s", SLOWEST_S, "--out", &out]);
         shell::run(&scan_scene, &words)?;

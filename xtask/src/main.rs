@@ -1,11 +1,18 @@
 //! The project's chores. `cargo xtask --help` lists them.
 
+mod apt;
+mod deb;
+mod fuzz;
 mod judge;
 mod reproduce;
 mod rules;
+mod safety;
 mod shell;
 mod study;
+mod units;
 mod vm;
+
+use std::ffi::OsString;
 
 use clap::{Parser, Subcommand};
 
@@ -19,7 +26,8 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Chore {
-    /// Check who depends on whom, how long files are, and that sources are ASCII.
+    /// Check who depends on whom, how long files are, that sources are ASCII, and that every
+    /// hazard in `docs/safety.md` has its tests.
     Rules,
     /// Scan the simulated objects and let OpenCASCADE judge the IGES files.
     ///
@@ -30,14 +38,33 @@ enum Chore {
     /// For the figures' pictures it needs Python 3, as `judge` does; `--check` and `--print`
     /// do without.
     Reproduce(reproduce::Options),
+    /// Run the fuzzers of everything that comes from outside.
+    ///
+    /// Installs cargo-fuzz into `target/tools` unless it is there; needs a C++ compiler.
+    Fuzz(fuzz::Options),
     /// Measure one part of the product at length.
     #[command(subcommand)]
     Study(study::Study),
+    /// Keep the service at work, and watch its memory, descriptors and threads.
+    #[command(disable_help_flag = true)]
+    Soak {
+        /// Options of the soak, such as `--minutes 60`; `--help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
+    /// Have systemd check the units: nothing to find fault with, and little exposed.
+    ///
+    /// Needs `systemd-analyze`, which it installs on Debian as root.
+    Units,
+    /// Make the Debian package of service, command line, units, manual pages and completions.
+    ///
+    /// Needs Debian's tools; installs `cargo-deb` below the target folder.
+    Deb(deb::Options),
     /// Check in a virtual machine what needs a kernel of its own.
     #[command(subcommand)]
     Vm(vm::Vm),
     /// Everything: tests, lints, rules, studies, judges with all seeds, FreeCAD, the virtual
-    /// machine.
+    /// machines, fuzzers for ten minutes each.
     Full,
 }
 
@@ -46,7 +73,14 @@ fn main() -> anyhow::Result<()> {
         Chore::Rules => rules::check(),
         Chore::Judge(options) => judge::run(&options),
         Chore::Reproduce(options) => reproduce::run(&options),
+        Chore::Fuzz(options) => fuzz::run(&options),
         Chore::Study(study) => study::run(&study),
+        Chore::Soak { options } => {
+            study::service()?;
+            study::program("soak", &options)
+        }
+        Chore::Units => units::check(),
+        Chore::Deb(options) => deb::run(&options),
         Chore::Vm(vm) => vm::run(&vm),
         Chore::Full => full(),
     }
@@ -66,6 +100,7 @@ fn full() -> anyhow::Result<()> {
         ],
     )?;
     rules::check()?;
+    units::check()?;
     shell::run("cargo", &["test", "--workspace"])?;
     judge::run(&judge::Options {
         seeds: 10,
@@ -73,9 +108,18 @@ fn full() -> anyhow::Result<()> {
         out: None,
     })?;
     vm::run(&vm::Vm::Usb(vm::Options::default()))?;
+    fuzz::run(&fuzz::Options {
+        seconds: 600,
+        targets: Vec::new(),
+    })?;
+    vm::run(&vm::Vm::Systemd(vm::SystemdOptions::default()))?;
     study::run(&study::Study::Mutations {
         options: Vec::new(),
     })?;
+    study::run(&study::Study::Crashes {
+        options: Vec::new(),
+    })?;
+    study::program("soak", &["--minutes".into(), "60".into()])?;
     study::run(&study::Study::Segmentation {
         options: ["--set", "judge", "--full", "--peers", "--check"]
             .map(Into::into)

@@ -24,18 +24,34 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("nurbs", &[]),
     ("regrid", &["range-image"]),
     ("segment", &["range-image"]),
+    ("shapes", &[]),
     ("reconstruct", &["nurbs", "range-image"]),
     ("cad-exchange", &["nurbs", "reconstruct"]),
     (
         "pipeline",
-        &["range-image", "reconstruct", "regrid", "segment"],
+        &["range-image", "reconstruct", "regrid", "segment", "shapes"],
     ),
-    ("scan-record", &["range-image", "scanner-protocol"]),
-    ("deliverables", &GEOMETRY),
+    ("storage", &[]),
+    (
+        "scan-record",
+        &["range-image", "scanner-protocol", "storage"],
+    ),
+    ("deliverables", &DELIVERABLES),
     ("relief-api", &[]),
     ("reliefd", &DAEMON),
     ("relief", &COMMAND_LINE),
+    (
+        "relief-faults",
+        &[
+            "range-image",
+            "scan-record",
+            "scanner-driver",
+            "scanner-protocol",
+            "sim-scanner",
+        ],
+    ),
     ("relief-tests", &EVERYTHING),
+    ("relief-vm-systemd", &["sim-scanner"]),
     (
         "relief-vm-usb",
         &["scanner-driver", "scanner-protocol", "sim-scanner"],
@@ -43,7 +59,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-const GEOMETRY: [&str; 7] = [
+const DELIVERABLES: [&str; 9] = [
     "cad-exchange",
     "nurbs",
     "pipeline",
@@ -51,9 +67,11 @@ const GEOMETRY: [&str; 7] = [
     "reconstruct",
     "regrid",
     "segment",
+    "shapes",
+    "storage",
 ];
 
-const DAEMON: [&str; 13] = [
+const DAEMON: [&str; 15] = [
     "cad-exchange",
     "deliverables",
     "nurbs",
@@ -67,9 +85,11 @@ const DAEMON: [&str; 13] = [
     "scanner-driver",
     "scanner-protocol",
     "segment",
+    "shapes",
+    "storage",
 ];
 
-const COMMAND_LINE: [&str; 14] = [
+const COMMAND_LINE: [&str; 16] = [
     "cad-exchange",
     "deliverables",
     "nurbs",
@@ -83,10 +103,12 @@ const COMMAND_LINE: [&str; 14] = [
     "scan-record",
     "scanner-driver",
     "segment",
+    "shapes",
     "sim-scanner",
+    "storage",
 ];
 
-const EVERYTHING: [&str; 16] = [
+const EVERYTHING: [&str; 18] = [
     "cad-exchange",
     "deliverables",
     "nurbs",
@@ -102,7 +124,9 @@ const EVERYTHING: [&str; 16] = [
     "scanner-driver",
     "scanner-protocol",
     "segment",
+    "shapes",
     "sim-scanner",
+    "storage",
 ];
 
 /// Libraries that computation must not link: clocks, files and runtimes come with them.
@@ -120,6 +144,7 @@ pub(crate) fn check() -> Result<()> {
     let mut broken = Vec::new();
     dependencies(&mut broken)?;
     sources(&mut broken)?;
+    crate::safety::check(&mut broken)?;
     if broken.is_empty() {
         println!("rules: all hold");
         return Ok(());

@@ -16,6 +16,13 @@ pub(crate) enum Study {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
+    /// Kill the service at random moments of scan and job, and see what it has kept.
+    #[command(disable_help_flag = true)]
+    Crashes {
+        /// Options of the study; `--help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
     /// Score the regridder on a plane pair with a step, among outliers.
     #[command(disable_help_flag = true)]
     Regrid {
@@ -37,6 +44,13 @@ pub(crate) enum Study {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
+    /// Scan under faults of every class, and under mixes of them, in simulated time.
+    #[command(disable_help_flag = true)]
+    Faults {
+        /// Options of the study; `--help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
     /// Score the segmentation on scenes whose true faces are known.
     #[command(disable_help_flag = true)]
     Segmentation {
@@ -48,6 +62,11 @@ pub(crate) enum Study {
 
 pub(crate) fn run(study: &Study) -> Result<()> {
     match study {
+        Study::Crashes { options } => {
+            service()?;
+            program("study-crashes", options)
+        }
+        Study::Faults { options } => program_of("relief-faults", "study-faults", options),
         Study::Mutations { options } => program("study-mutations", options),
         Study::Outline { options } => program("study-outline", options),
         Study::RealScans { options } => program("study-real-scans", options),
@@ -56,18 +75,20 @@ pub(crate) fn run(study: &Study) -> Result<()> {
     }
 }
 
+/// Builds the service, which those programs look for beside themselves that run it.
+pub(crate) fn service() -> Result<()> {
+    shell::run("cargo", &["build", "--release", "--package", "reliefd"])
+}
+
 /// Runs a program of the tests' crate, built for speed.
 pub(crate) fn program(name: &str, options: &[OsString]) -> Result<()> {
-    let mut words: Vec<String> = [
-        "run",
-        "--release",
-        "--package",
-        "relief-tests",
-        "--bin",
-        name,
-    ]
-    .map(String::from)
-    .to_vec();
+    program_of("relief-tests", name, options)
+}
+
+fn program_of(package: &str, name: &str, options: &[OsString]) -> Result<()> {
+    let mut words: Vec<String> = ["run", "--release", "--package", package, "--bin", name]
+        .map(String::from)
+        .to_vec();
     words.push("--".into());
     words.extend(options.iter().map(|o| o.to_string_lossy().into_owned()));
     let words: Vec<&str> = words.iter().map(String::as_str).collect();

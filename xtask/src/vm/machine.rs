@@ -8,9 +8,18 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
+/// A panic ends the machine; an emulated timer need not be proved.
+const ALWAYS: &str = "console=ttyS0 quiet panic=-1 no_timer_check";
+
 pub(super) struct Machine<'a> {
     pub(super) kernel: &'a Path,
     pub(super) initramfs: &'a Path,
+    /// Stays as it is: what the machine writes is forgotten with it.
+    pub(super) disk: Option<&'a Path>,
+    pub(super) memory_mb: u32,
+    pub(super) processors: u32,
+    /// For the kernel, besides those that all machines get.
+    pub(super) parameters: &'a str,
     pub(super) kvm: bool,
     pub(super) patience: Duration,
 }
@@ -74,7 +83,9 @@ impl Machine<'_> {
     fn command(&self) -> Command {
         let mut command = Command::new("qemu-system-x86_64");
         command
-            .args(["-machine", "pc", "-cpu", "max", "-m", "512", "-smp", "1"])
+            .args(["-machine", "pc", "-cpu", "max"])
+            .args(["-smp", &self.processors.to_string()])
+            .args(["-m", &self.memory_mb.to_string()])
             .args(["-accel", if self.kvm { "kvm" } else { "tcg" }])
             .args(["-nodefaults", "-no-user-config", "-no-reboot"])
             .args(["-display", "none", "-monitor", "none", "-serial", "stdio"])
@@ -82,10 +93,15 @@ impl Machine<'_> {
             .arg(self.kernel)
             .arg("-initrd")
             .arg(self.initramfs)
-            // A panic ends the machine; an emulated timer need not be proved.
-            .args(["-append", "console=ttyS0 quiet panic=-1 no_timer_check"])
+            .args(["-append", &format!("{ALWAYS} {}", self.parameters)])
             .stdin(Stdio::null())
             .stdout(Stdio::piped());
+        if let Some(disk) = self.disk {
+            // What is never kept need not be safe: each sync would wait for this machine's disk.
+            let manner = "if=virtio,format=raw,snapshot=on,cache=unsafe";
+            let drive = format!("file={},{manner}", disk.display());
+            command.args(["-drive", &drive]);
+        }
         command
     }
 }

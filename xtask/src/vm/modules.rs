@@ -6,6 +6,21 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
+use super::archive::Archive;
+
+/// Puts these modules and all that they need into an archive, named so that their order is that
+/// of loading.
+pub(super) fn add_in_order(archive: &mut Archive, folder: &Path, wanted: &[&str]) -> Result<()> {
+    for (number, module) in in_order(folder, wanted)?.iter().enumerate() {
+        let name = module
+            .file_name()
+            .context("a module without a name")?
+            .to_string_lossy();
+        archive.file(&format!("modules/{number:02}-{name}"), module)?;
+    }
+    Ok(())
+}
+
 /// The files of these modules and of all that they need, each after what it needs.
 pub(super) fn in_order(folder: &Path, wanted: &[&str]) -> Result<Vec<PathBuf>> {
     let mut files = BTreeMap::new();

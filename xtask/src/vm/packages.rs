@@ -6,6 +6,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
+use crate::apt::{apt_get, is_installed, is_root};
 use crate::shell;
 
 /// The emulator, which must be installed: it loads dozens of libraries.
@@ -101,20 +102,10 @@ impl Packages {
     }
 }
 
-fn is_installed(program: &str) -> bool {
-    Command::new(program).arg("--version").output().is_ok()
-}
-
-/// Asks nothing, as there may be nobody to answer.
-fn apt_get(words: &[&str]) -> Result<()> {
-    let silent = [("DEBIAN_FRONTEND", "noninteractive".to_owned())];
-    shell::run_with("apt-get", words, &silent)
-}
-
 /// Installs the emulator, where that is possible.
 fn install_emulator(home: &Path) -> Result<()> {
     let told = format!("{EMULATOR} is missing: `sudo apt-get install {EMULATOR_PACKAGE}`");
-    if shell::output("id", &["-u"])?.trim() != "0" {
+    if !is_root()? {
         bail!(told);
     }
     let install = ["install", "--yes", "--no-install-recommends"];
@@ -147,7 +138,7 @@ fn install_emulator(home: &Path) -> Result<()> {
 }
 
 /// The name of this Debian's release, such as `bookworm`.
-fn release() -> Result<String> {
+pub(super) fn release() -> Result<String> {
     let release = fs::read_to_string("/etc/os-release").context("which system is this?")?;
     release
         .lines()

@@ -2,9 +2,12 @@
 
 use std::fs;
 use std::path::Path;
+use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
-use scanner_driver::{Scanner, ScannerError, UsbScanner, UsbSettings};
+use scanner_driver::{
+    ResumeSettings, ScanProgress, Scanner, ScannerError, UsbScanner, UsbSettings,
+};
 use sim_scanner::endpoint::usb::{Attachment, Personality, UsbServer};
 
 use super::Check;
@@ -12,7 +15,7 @@ use crate::boot::load;
 use crate::client::said_by_another;
 use crate::scan::{self, LIMIT, config, listed, scan_is_cut, scan_is_exact, usb, wait_for};
 
-pub(crate) const CHECKS: [Check; 9] = [
+pub(crate) const CHECKS: [Check; 10] = [
     ("bulk: a scan is that in memory", whole),
     (
         "bulk: a second program is told who has the device",
@@ -35,6 +38,10 @@ pub(crate) const CHECKS: [Check; 9] = [
         two_of_a_kind,
     ),
     ("bulk: pulled in mid-scan, put back, scanned again", unplug),
+    (
+        "bulk: pulled in every tenth column, the scan goes on",
+        pulled_again_and_again,
+    ),
     ("bulk: a halted endpoint is set going again", halt),
     ("bulk: the device is kept awake", awake),
 ];
@@ -181,6 +188,57 @@ fn unplug() -> Result<()> {
         );
         scan_is_exact(&scanner)?;
     }
+    Ok(())
+}
+
+/// The scan goes on after each, and nothing is lost or taken twice.
+fn pulled_again_and_again() -> Result<()> {
+    const EVERY: usize = 10;
+    let server = serve()?;
+    let control = server.control();
+    let mut settings = usb();
+    settings.link.resume = Some(ResumeSettings::default());
+    // Few columns in flight, so that each pull cuts the scan and not what is here already.
+    settings.link.credits = 4;
+    let scanner = UsbScanner::open(settings)?;
+    wait_for(&scanner)?;
+    scanner.home()?;
+    let start = Instant::now();
+    let mut stream = scanner.start_scan(&scan::plan(&scanner)?)?;
+    let acknowledger = stream.acknowledger();
+    let mut columns = Vec::new();
+    let mut pauses = 0;
+    loop {
+        match stream.next_progress()? {
+            Some(ScanProgress::Column(column)) => {
+                // Without credit for the rest, the scan cannot end before the plug is out.
+                if columns.len() % EVERY == EVERY - 1 && columns.len() + 1 < scan::COLUMNS as usize
+                {
+                    control.unplug();
+                    control.wait_for_host(LIMIT, false)?;
+                    ensure!(!control.snapshot().laser_on, "the laser stays on");
+                    control.replug();
+                }
+                acknowledger.acknowledge(column.index);
+                columns.push(column);
+            }
+            Some(ScanProgress::Paused(pause)) => {
+                ensure!(!pause.needs_person, "{pause}");
+                pauses += 1;
+            }
+            Some(ScanProgress::Resumed) => {}
+            None => break,
+        }
+    }
+    let took = start.elapsed().as_secs_f64();
+    ensure!(columns == scan::reference()?, "the columns differ");
+    let pulls = (scan::COLUMNS as usize - 1) / EVERY;
+    ensure!(pauses >= pulls, "{pauses} pauses after {pulls} pulls");
+    let bytes: usize = columns.iter().map(|column| column.samples.len() * 6).sum();
+    println!(
+        "        {pauses} pauses; goodput {:.1} kB/s over {took:.1} s",
+        bytes as f64 / took / 1e3
+    );
     Ok(())
 }
 
