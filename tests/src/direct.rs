@@ -50,7 +50,7 @@ pub fn journal(path: &Path, label: &Label, threads: usize) -> Result<Vec<u8>> {
         columns.push(raw.calibrated(&header.calibration));
     }
     let pitch_mm = recommended_pitch_mm(header.column_pitch_mm, header.sample_spacing_mm);
-    columns_to_iges(columns, pitch_mm, label, threads)
+    columns_to_iges(&columns, pitch_mm, label, threads)
 }
 
 /// The CAD file of a scan file of another program, with the default settings.
@@ -61,19 +61,23 @@ pub fn scan_file(path: &Path, label: &Label, threads: usize) -> Result<Vec<u8>> 
     let name = path.display().to_string();
     let scan = scan_files::read_from(File::open(path)?, &name, &ReadOptions::default())?;
     let pitch_mm = recommended_pitch_mm(scan.column_pitch_mm, scan.sample_spacing_mm);
-    let columns = scan.columns.into_iter().map(|column| {
-        let samples = column.samples.into_iter().map(|sample| Sample {
-            y_mm: sample.y_mm,
-            z_mm: sample.z_mm,
-            intensity: sample.intensity,
-        });
-        Column::new(column.x_mm, samples.collect())
-    });
-    columns_to_iges(columns.collect(), pitch_mm, label, threads)
+    let columns: Vec<Column> = scan
+        .columns
+        .into_iter()
+        .map(|column| {
+            let samples = column.samples.into_iter().map(|sample| Sample {
+                y_mm: sample.y_mm,
+                z_mm: sample.z_mm,
+                intensity: sample.intensity,
+            });
+            Column::new(column.x_mm, samples.collect())
+        })
+        .collect();
+    columns_to_iges(&columns, pitch_mm, label, threads)
 }
 
 fn columns_to_iges(
-    columns: Vec<Column>,
+    columns: &[Column],
     pitch_mm: f64,
     label: &Label,
     threads: usize,

@@ -73,7 +73,7 @@ pub fn measure(config: &SimConfig) -> Result<Outlines> {
     let (columns, pitch_mm) = scan(&source, scanner)?;
     let mut settings = Settings::new(pitch_mm);
     settings.regrid.seed = config.seed;
-    let (_, outcome) = pipeline::process_columns(columns, &settings, &Unmonitored)?;
+    let (_, outcome) = pipeline::process_columns(&columns, &settings, &Unmonitored)?;
     let result = &outcome.reconstruction;
     Ok(Outlines {
         pitch_mm,

@@ -31,11 +31,12 @@ fn scanned(scene: Scene, seed: u64, policy: BackgroundPolicy) -> (RangeImage, Ou
     let (scanner, sweep) = Preset::Paper
         .set_up(scene, &overrides, seed)
         .expect("a built-in scene fits");
-    let columns =
-        (0..sweep.columns).map(|index| received(&scanner, &scanner.column(&sweep, 0, index)));
+    let columns: Vec<_> = (0..sweep.columns)
+        .map(|index| received(&scanner, &scanner.column(&sweep, 0, index)))
+        .collect();
     let mut settings = Settings::new(0.5).with_seed(seed);
     settings.background = policy;
-    process_columns(columns, &settings, &Unmonitored).expect("there is a part")
+    process_columns(&columns, &settings, &Unmonitored).expect("there is a part")
 }
 
 fn scene(name: &str) -> Scene {

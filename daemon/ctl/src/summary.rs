@@ -1,7 +1,7 @@
 //! A report told to people.
 
 use deliverables::Report;
-use deliverables::report::RegionReport;
+use deliverables::report::{Quantity, RegionReport};
 
 use crate::output;
 
@@ -103,14 +103,38 @@ fn regions(report: &Report) -> String {
     )
 }
 
-/// The shape of a region; of one without a face, that.
+/// The shape of a region and its size; of one without a face, that.
 fn shape(region: &RegionReport) -> String {
-    match &region.shape {
-        _ if region.faces.is_empty() => "no face".into(),
-        None => "-".into(),
-        Some(shape) if shape.hollow == Some(true) => format!("hollow {}", shape.family),
-        Some(shape) => shape.family.clone(),
+    let Some(shape) = &region.shape else {
+        return "-".into();
+    };
+    if region.faces.is_empty() {
+        return "no face".into();
     }
+    let hollow = if shape.hollow == Some(true) {
+        "hollow "
+    } else {
+        ""
+    };
+    let sizes = shape.numbers.as_ref().map(|numbers| {
+        [
+            ("R", numbers.radius_mm, ""),
+            ("r", numbers.tube_radius_mm, ""),
+            ("half angle", numbers.half_angle_deg, "°"),
+        ]
+        .into_iter()
+        .filter_map(|(name, size, unit)| Some(format!(" {name} {}{unit}", quantity(size?))))
+        .collect::<String>()
+    });
+    format!("{hollow}{}{}", shape.family, sizes.unwrap_or_default())
+}
+
+/// A quantity to the digits that mean something, its standard uncertainty to two.
+fn quantity(quantity: Quantity) -> String {
+    let leading = quantity.uncertainty.log10().floor();
+    let decimals = (1.0 - leading).clamp(0.0, 6.0) as usize;
+    let Quantity { value, uncertainty } = quantity;
+    format!("{value:.decimals$} ± {uncertainty:.decimals$}")
 }
 
 /// What belongs to no region.

@@ -155,7 +155,7 @@ pub struct RegionReport {
     pub label: u16,
     /// What its surface is; `none` where no face could be made of it.
     pub kind: String,
-    /// What shape its nodes speak for, whatever the faces in the CAD file are made of.
+    /// What shape its samples speak for, whatever the faces in the CAD file are made of.
     #[serde(default)]
     pub shape: Option<ShapeReport>,
     /// Names of its faces in the CAD file.
@@ -183,6 +183,44 @@ pub struct ShapeReport {
     /// Whether it is seen from within, as a bore or a fillet is; absent for a plane and a
     /// free form.
     pub hollow: Option<bool>,
+    /// Its numbers; absent for a free form, and where the samples were not at hand.
+    #[serde(default)]
+    pub numbers: Option<ShapeNumbers>,
+}
+
+/// The numbers of a shape, in the part frame, fitted to the samples of the scan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ShapeNumbers {
+    /// Samples that they rest on.
+    pub samples: usize,
+    /// Root mean square distance of those samples from the shape, along its normal.
+    pub rms_mm: f64,
+    /// A point of a plane amid the samples, or of a cylinder's axis beside them; the centre of
+    /// a sphere or torus; the apex of a cone.
+    pub point_mm: [f64; 3],
+    /// Standard uncertainty of the point where it is known least, of the ways that count: along
+    /// a plane's normal, across a cylinder's axis, all ways else.
+    pub point_uncertainty_mm: f64,
+    /// Unit normal of a plane towards the side that was seen; unit axis of a cylinder, cone or
+    /// torus.
+    pub direction: Option<[f64; 3]>,
+    /// Standard uncertainty of the direction, in the way in which it is known least.
+    pub direction_uncertainty_deg: Option<f64>,
+    /// Radius of a sphere or cylinder, or of the circle in the middle of a torus's tube.
+    pub radius_mm: Option<Quantity>,
+    /// Radius of a torus's tube.
+    pub tube_radius_mm: Option<Quantity>,
+    /// Angle between a cone's axis and surface.
+    pub half_angle_deg: Option<Quantity>,
+}
+
+/// A quantity, in the unit that its key names.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Quantity {
+    /// The best estimate.
+    pub value: f64,
+    /// Its standard uncertainty: the truth lies within twice as much in 95 of 100 cases.
+    pub uncertainty: f64,
 }
 
 /// What was removed as background.

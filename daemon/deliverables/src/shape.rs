@@ -1,28 +1,60 @@
 //! The shape of a region, for the report.
 
-use pipeline::RegionKind;
-use shapes::{Shape, Verdict};
+use pipeline::{Basis, RegionKind};
+use shapes::{Fit, Measured, Shape, Verdict};
 
-use crate::report::ShapeReport;
+use crate::report::{Quantity, ShapeNumbers, ShapeReport};
 
-/// `None` where a region has too few nodes to tell.
+/// `None` where a region has too little to tell by.
 pub(crate) fn shape(kind: &RegionKind) -> Option<ShapeReport> {
-    let told = |family: &str, hollow| ShapeReport {
-        family: family.into(),
-        hollow,
-    };
     match &kind.evidence.verdict {
         Verdict::Unknown => None,
-        Verdict::FreeForm => Some(told("free-form", None)),
-        Verdict::Shape(fit) => {
-            let hollow = match &fit.shape {
+        Verdict::FreeForm => Some(ShapeReport {
+            family: "free-form".into(),
+            hollow: None,
+            numbers: None,
+        }),
+        Verdict::Shape(fit) => Some(ShapeReport {
+            family: fit.shape.family().as_str().into(),
+            hollow: match &fit.shape {
                 Shape::Plane(_) => None,
                 Shape::Sphere(sphere) => Some(sphere.is_hollow),
                 Shape::Cylinder(cylinder) => Some(cylinder.is_hollow),
                 Shape::Cone(cone) => Some(cone.is_hollow),
                 Shape::Torus(torus) => Some(torus.is_hollow),
-            };
-            Some(told(fit.shape.family().as_str(), hollow))
-        }
+            },
+            numbers: match kind.basis {
+                Basis::Samples => Some(numbers(fit)),
+                Basis::Nodes => None,
+            },
+        }),
+    }
+}
+
+fn numbers(fit: &Fit) -> ShapeNumbers {
+    let (point, direction) = match &fit.shape {
+        Shape::Plane(plane) => (plane.point_mm, Some(plane.normal)),
+        Shape::Sphere(sphere) => (sphere.centre_mm, None),
+        Shape::Cylinder(cylinder) => (cylinder.point_mm, Some(cylinder.axis)),
+        Shape::Cone(cone) => (cone.apex_mm, Some(cone.axis)),
+        Shape::Torus(torus) => (torus.centre_mm, Some(torus.axis)),
+    };
+    let quantity = |measured: Measured, per_unit: f64| Quantity {
+        value: measured.value * per_unit,
+        uncertainty: measured.deviation * per_unit,
+    };
+    let mm = |measured| quantity(measured, 1.0);
+    let deg = |measured| quantity(measured, 1.0_f64.to_degrees());
+    let told = &fit.numbers;
+    ShapeNumbers {
+        samples: fit.held,
+        rms_mm: fit.rms_mm,
+        point_mm: point.into(),
+        point_uncertainty_mm: told.place_mm.most(),
+        direction: direction.map(Into::into),
+        direction_uncertainty_deg: told.direction_rad.map(|spread| spread.most().to_degrees()),
+        radius_mm: told.radius_mm.map(mm),
+        tube_radius_mm: told.tube_mm.map(mm),
+        half_angle_deg: told.half_angle_rad.map(deg),
     }
 }

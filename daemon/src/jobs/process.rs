@@ -1,11 +1,13 @@
 //! One attempt at a job: from the kept columns to a folder in the spool.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use deliverables::{CadOptions, DeliverError, Entities, Inputs, Pictures, ScanReport, Stopwatch};
-use pipeline::{Observer, PipelineError, Stage, View};
-use range_image::{Cancelled, Lattice, Monitor, RangeImage};
+use pipeline::{Columns, Observer, PipelineError, ReadAgainError, Stage, View};
+use range_image::calibration::Head;
+use range_image::{Cancelled, Column, Lattice, Monitor, RangeImage};
 use relief_api::{Job, Scan};
 use scan_record::{Ending, Header, JournalReader, ReadError};
 
@@ -123,7 +125,11 @@ fn attempt(
             )?
         }
     };
-    let outcome = pipeline::process_in_view(&image, &kept.view, &settings, &watch)
+    let columns = KeptColumns {
+        path: service.journal_path(&job.scan),
+        head: header.calibration.head,
+    };
+    let outcome = pipeline::process_in_view(&image, Some(&columns), &kept.view, &settings, &watch)
         .map_err(|error| explained(error, service, job, kept.samples))?;
     kept.warnings.extend(pipeline::unusual_size(&image));
     let timestamp = scan
@@ -152,6 +158,36 @@ fn attempt(
     progress.check()?;
     progress.begin("publish");
     Ok(service.spool.publish(&job.result)?)
+}
+
+/// The columns of a journal, read anew each time.
+struct KeptColumns {
+    path: PathBuf,
+    head: Head,
+}
+
+impl Columns for KeptColumns {
+    fn visit(&self, take: &mut dyn FnMut(&Column) -> bool) -> Result<(), ReadAgainError> {
+        let mut journal = JournalReader::open(&self.path)?;
+        let calibration = journal.header().calibration;
+        while let Some(raw) = journal.next_column()? {
+            if !take(&raw.calibrated(&calibration)) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn camera_mm(&self) -> Option<[f64; 2]> {
+        match self.head {
+            Head::Polar {
+                camera_y_mm,
+                camera_z_mm,
+                ..
+            } => Some([camera_y_mm, camera_z_mm]),
+            Head::Cartesian { .. } => None,
+        }
+    }
 }
 
 /// Larger scans than this are not read again to find out why there is no surface.

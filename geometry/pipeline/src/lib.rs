@@ -11,6 +11,7 @@
 //! [`Observer`] learns when each stage begins, so that time is measured outside.
 
 mod background;
+mod columns;
 mod extent;
 mod kinds;
 mod method;
@@ -20,8 +21,9 @@ mod process;
 mod settings;
 
 pub use background::{BackgroundPolicy, Crumb, NodeRole, UnknownPolicy};
+pub use columns::{Columns, ReadAgainError};
 pub use extent::{Extent, no_surface, unusual_size};
-pub use kinds::{RegionKind, kinds};
+pub use kinds::{Basis, RegionKind};
 pub use method::{Method, UnknownMethod};
 pub use observer::{Observer, Stage};
 pub use part::{Part, divide};

@@ -5,6 +5,7 @@ use reconstruct::{ReconstructError, Reconstruction};
 use regrid::RegridError;
 use segment::SegmentError;
 
+use crate::columns::{Columns, ReadAgainError};
 use crate::kinds::{RegionKind, kinds};
 use crate::part::divide;
 use crate::{Background, Crumb, NodeRole, View};
@@ -63,6 +64,9 @@ pub enum PipelineError {
         /// Regions found.
         regions: usize,
     },
+    /// The columns could not be gone through a second time.
+    #[error("the samples could not be read again: {0}")]
+    ReadAgain(ReadAgainError),
     /// The columns could not be regridded.
     #[error("regridding failed: {0}")]
     Regrid(RegridError),
@@ -143,51 +147,52 @@ impl From<Cancelled> for PipelineError {
     }
 }
 
-/// From columns to a model: [`regrid::regrid`], then [`process`].
+/// From columns to a model: [`regrid::regrid`], then [`process_in_view`].
 ///
 /// # Errors
-/// As [`process`], and [`PipelineError::Regrid`].
+/// As [`process_in_view`], and [`PipelineError::Regrid`].
 pub fn process_columns(
-    columns: impl IntoIterator<Item = Column>,
+    columns: &[Column],
     settings: &Settings,
     observer: &dyn Observer,
 ) -> Result<(RangeImage, Outcome), PipelineError> {
     settings.validate()?;
     observer.stage(Stage::Regrid);
     let mut x_mm: Option<(f64, f64)> = None;
-    let columns = columns.into_iter().inspect(|column| {
+    let each = columns.iter().cloned().inspect(|column| {
         let x = column.x_mm();
         let (low, high) = x_mm.unwrap_or((x, x));
         x_mm = Some((low.min(x), high.max(x)));
     });
-    let image = regrid::regrid(columns, &settings.regrid, observer)?;
+    let image = regrid::regrid(each, &settings.regrid, observer)?;
     let view = View { x_mm, y_mm: None };
-    let mut outcome = process_in_view(&image, &view, settings, observer)?;
+    let mut outcome = process_in_view(&image, Some(&columns), &view, settings, observer)?;
     outcome.stages.insert(0, Stage::Regrid);
     Ok((image, outcome))
 }
 
-/// From a range image to a model. The image need not come from `settings.regrid`; that
+/// From a range image alone to a model. The image need not come from `settings.regrid`; that
 /// part is only checked.
 ///
 /// # Errors
-/// Any [`PipelineError`] but [`PipelineError::Regrid`]. [`PipelineError::hint`] says what
-/// to do.
+/// As [`process_in_view`].
 pub fn process(
     image: &RangeImage,
     settings: &Settings,
     observer: &dyn Observer,
 ) -> Result<Outcome, PipelineError> {
-    process_in_view(image, &View::default(), settings, observer)
+    process_in_view(image, None, &View::default(), settings, observer)
 }
 
-/// As [`process`], told what the scanner looked at: a plane that ends before the view does
-/// is not cut off by it, so it is no table.
+/// As [`process`], with the columns that the image was made of, and told what the scanner
+/// looked at: a plane that ends before the view does is not cut off by it, so it is no table.
 ///
 /// # Errors
-/// As [`process`].
+/// Any [`PipelineError`] but [`PipelineError::Regrid`]. [`PipelineError::hint`] says what
+/// to do.
 pub fn process_in_view(
     image: &RangeImage,
+    columns: Option<&dyn Columns>,
     view: &View,
     settings: &Settings,
     observer: &dyn Observer,
@@ -212,7 +217,7 @@ pub fn process_in_view(
     let part_image = part.image.as_ref().unwrap_or(image);
     let reconstruction =
         reconstruct::reconstruct(part_image, &part.regions, &settings.reconstruct, observer)?;
-    let kinds = kinds(part_image, &part.regions, observer)?;
+    let kinds = kinds(part_image, &part.regions, columns, observer)?;
     Ok(Outcome {
         regions: part.regions,
         background: part.background,

@@ -62,7 +62,7 @@ fn a_roof_becomes_two_faces_that_share_its_ridge() {
         let notes = Notes::default();
         let settings = Settings::new(0.5).with_method(method);
         assert_eq!(settings.method(), method);
-        let (image, outcome) = process_columns(roof(), &settings, &notes).unwrap();
+        let (image, outcome) = process_columns(&roof(), &settings, &notes).unwrap();
         assert_eq!(
             *notes.stages.lock().unwrap(),
             [Stage::Regrid, Stage::Segment, Stage::Reconstruct]
@@ -81,7 +81,8 @@ fn a_roof_becomes_two_faces_that_share_its_ridge() {
 
 #[test]
 fn a_range_image_alone_is_not_regridded() {
-    let (image, with_columns) = process_columns(roof(), &Settings::new(0.5), &Unmonitored).unwrap();
+    let (image, with_columns) =
+        process_columns(&roof(), &Settings::new(0.5), &Unmonitored).unwrap();
     let from_image = process(&image, &Settings::new(0.5), &Unmonitored).unwrap();
     assert_eq!(from_image.stages, [Stage::Segment, Stage::Reconstruct]);
     assert_eq!(from_image.regions, with_columns.regions);
@@ -99,7 +100,7 @@ fn scans_without_a_part_say_what_to_do() {
     );
     assert!(nothing.hint().is_some());
 
-    let none = process_columns(Vec::new(), &settings, &Unmonitored).unwrap_err();
+    let none = process_columns(&[], &settings, &Unmonitored).unwrap_err();
     assert!(matches!(none, PipelineError::NothingMeasured), "{none:?}");
 
     let mut speck = empty;
@@ -120,7 +121,7 @@ fn a_cancelled_run_ends_in_whatever_stage_it_is() {
             cancel_at: Some(stage),
             ..Notes::default()
         };
-        let ended = process_columns(roof(), &Settings::new(0.5), &notes).unwrap_err();
+        let ended = process_columns(&roof(), &Settings::new(0.5), &notes).unwrap_err();
         assert!(
             matches!(ended, PipelineError::Cancelled),
             "{stage}: {ended:?}"

@@ -8,7 +8,7 @@
 
 use nalgebra::SVector;
 
-use crate::fit::{Fit, Sample, fit};
+use crate::fit::{ACROSS, Fit, Sample, fit};
 use crate::robust;
 use crate::shape::Family;
 use crate::start::Frame;
@@ -49,8 +49,6 @@ pub struct Evidence {
 const PER_NUMBER: f64 = 3.0;
 /// Distances count up to so many deviations.
 const MOST: f64 = 4.0;
-/// Scatter below this share of what samples are said to have is not believed.
-const LEAST_SCATTER: f64 = 0.3;
 /// How much better a polynomial must be than a shape not to be one by chance.
 const DOUBT: f64 = 5.0;
 /// What each number costs above its price, so that of a hundred planes not one gets a radius
@@ -111,11 +109,13 @@ impl Scale {
     /// Distances count up to this, in deviations of the samples.
     fn most(&self) -> f64 {
         let deviations = self.surfaces.iter().map(Surface::deviation);
-        MOST * deviations.fold(f64::INFINITY, f64::min).max(LEAST_SCATTER)
+        MOST * deviations
+            .fold(f64::INFINITY, f64::min)
+            .max(robust::LEAST_SCATTER)
     }
 
     fn score(&self, left: f64, freedom: usize) -> f64 {
-        let left = left.max(LEAST_SCATTER * LEAST_SCATTER);
+        let left = left.max(robust::LEAST_SCATTER * robust::LEAST_SCATTER);
         let price = libm::log(self.independent.max(2.0)) + CAUTION;
         self.independent * libm::log(left) + freedom as f64 * price
     }
@@ -207,16 +207,21 @@ fn polynomial<const N: usize>(
     };
     let equation = |sample: &Sample| {
         let ((u, _), (v, _), w) = place(sample);
-        (terms(&u, &v), w)
+        (terms(&u, &v) / sample.sigma_mm, w / sample.sigma_mm)
     };
     let equations: Vec<_> = samples.iter().map(equation).collect();
-    let (solved, _) = robust::solve(&equations)?;
+    let (near, _) = robust::solve(&equations)?;
+    let solved = robust::least_squares(&equations, &near)?;
     let off = samples.iter().map(|sample| {
         let ((u, du), (v, dv), w) = place(sample);
         let [along, across] = [terms(&du, &v), terms(&u, &dv)];
         let [along, across] = [along, across].map(|terms| terms.dot(&solved) / frame.reach);
-        let rise = (1.0 + along * along + across * across).sqrt();
-        (w - terms(&u, &v).dot(&solved)) / (rise * sample.sigma_mm)
+        // As the shapes have it, but of the height above in place of the distance.
+        let [ray_u, ray_v, ray_w] = frame.turned(&sample.ray);
+        let covered = ray_w - along * ray_u - across * ray_v;
+        let rise2 = 1.0 + along * along + across * across;
+        let deviation = (covered * covered + ACROSS * ACROSS * rise2).sqrt() * sample.sigma_mm;
+        (w - terms(&u, &v).dot(&solved)) / deviation
     });
     Some(Surface {
         off: off.collect(),

@@ -1,11 +1,14 @@
 //! A shape of a given family fitted to samples.
 
+use std::borrow::Cow;
+
 use nalgebra::{SMatrix, SVector, Vector3};
 
-use crate::jet::MOST_FREE;
+use crate::jet::{Jet, MOST_FREE};
 use crate::local::Local;
 use crate::robust;
 use crate::shape::{Family, Shape};
+use crate::spread::spread;
 use crate::start::starts;
 use crate::uncertainty::{Numbers, numbers};
 
@@ -14,16 +17,24 @@ use crate::uncertainty::{Numbers, numbers};
 pub struct Sample {
     /// The point in the part frame, millimetres.
     pub point_mm: Vector3<f64>,
-    /// Standard deviation of its distance from the surface, along the normal, millimetres.
+    /// Unit direction of the ray that measured it, either way: its noise lies along the ray. On
+    /// a slope that is not along the normal, and noise that moves samples down a slope would tilt
+    /// it if distances along the normal were what counts.
+    pub ray: Vector3<f64>,
+    /// Standard deviation along the ray, millimetres.
     pub sigma_mm: f64,
 }
+
+/// Deviation of samples across their rays, of that along them: what keeps rays that graze a
+/// shape from counting without bound.
+pub(crate) const ACROSS: f64 = 0.05;
 
 /// A fitted shape.
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// The shape.
     pub shape: Shape,
-    /// Root mean square distance of the samples held, millimetres.
+    /// Root mean square distance of the samples held, along the normal, millimetres.
     pub rms_mm: f64,
     /// Samples that the shape rests on; the rest lie too far off to be noise.
     pub held: usize,
@@ -33,27 +44,27 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// How far a sample lies off the shape, in its standard deviations.
+    /// How far a sample lies off the shape along its ray, in its standard deviations.
     #[must_use]
     pub fn off(&self, sample: &Sample) -> f64 {
-        self.local.distance(&sample.point_mm).value / sample.sigma_mm
+        off(&self.local, sample)
     }
 }
 
 /// Samples that starts are tried on, at most.
 const TRIED: usize = 300;
 /// Rounds of weighing samples in such a trial and steps in each, and steps in the fit itself.
-const TRIALS: usize = 4;
+const TRIALS: usize = 10;
 const TRIAL_STEPS: usize = 6;
 const STEPS: usize = 40;
 /// Robust scales at which a sample weighs half in a trial.
 const WIDE: f64 = 2.0;
-/// Starts that are followed to the end.
+/// Starts that are followed to their end, and the samples they are followed on, at most; all
+/// samples decide only where the best of them ends.
 const FOLLOWED: usize = 2;
+const FOLLOWED_ON: usize = 2000;
 /// Rounds of deciding which samples are held.
 const ROUNDS: usize = 3;
-/// Samples are held up to so many times the robust scale.
-const HELD: f64 = 4.0;
 /// A radius beyond so many times the samples' extent is no radius.
 const FLATTEST: f64 = 1e3;
 /// Relative change of the cost at which a fit has ended.
@@ -67,28 +78,40 @@ pub fn fit(family: Family, samples: &[Sample], area: f64) -> Option<Fit> {
     if samples.len() <= family.freedom() {
         return None;
     }
-    let stride = samples.len().div_ceil(TRIED);
-    let few: Vec<Sample> = samples.iter().step_by(stride).copied().collect();
-    let few = if few.len() > 2 * MOST_FREE {
-        &few
-    } else {
-        samples
-    };
+    let few = some_of(samples, TRIED);
     let mut tried: Vec<(f64, Local)> = starts(family, samples)?
         .into_iter()
         .filter_map(|start| {
-            let local = tried_on(start, few)?;
-            Some((scale(&local, few), local))
+            let local = tried_on(start, &few)?;
+            Some((scale(&local, &few), local))
         })
         .collect();
     // Stable, so that of equals the first stays first.
     tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-    tried
+    let some = some_of(samples, FOLLOWED_ON);
+    let local = tried
         .into_iter()
         .take(FOLLOWED)
-        .filter_map(|(_, local)| settle(local, samples, area))
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|(fit, _)| fit)
+        .filter_map(|(_, local)| {
+            let local = settled(local, &some)?;
+            Some((scale(&local, &some), local))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, local)| local)?;
+    if some.len() < samples.len() {
+        told(settled(local, samples)?, samples, area)
+    } else {
+        told(local, samples, area)
+    }
+}
+
+/// At most so many of the samples, from everywhere.
+fn some_of(samples: &[Sample], most: usize) -> Cow<'_, [Sample]> {
+    if samples.len() <= most {
+        return Cow::Borrowed(samples);
+    }
+    let taken = spread(samples.len(), most);
+    taken.map(|index| samples[index]).collect()
 }
 
 /// Follows a start for a while, the less drawn by a sample the farther off it lies.
@@ -104,41 +127,43 @@ fn tried_on(mut local: Local, samples: &[Sample]) -> Option<Local> {
     Some(local)
 }
 
-/// Follows a start to its end; the fit and its robust scale.
-fn settle(mut local: Local, samples: &[Sample], area: f64) -> Option<(Fit, f64)> {
-    let mut held = vec![1.0; samples.len()];
+/// Follows a start to its end.
+fn settled(mut local: Local, samples: &[Sample]) -> Option<Local> {
     for _ in 0..ROUNDS {
-        let most = HELD * scale(&local, samples).max(f64::MIN_POSITIVE);
-        for (held, sample) in held.iter_mut().zip(samples) {
-            *held = f64::from(u8::from(off(&local, sample).abs() <= most));
-        }
+        let held = held(&local, samples);
         local = descend(local, samples, &held, STEPS)?;
     }
+    Some(local)
+}
+
+/// The samples that are not too far off, as weights.
+fn held(local: &Local, samples: &[Sample]) -> Vec<f64> {
+    robust::held(samples.iter().map(|sample| off(local, sample)))
+}
+
+/// A fit that has ended, with all there is to say of it.
+fn told(local: Local, samples: &[Sample], area: f64) -> Option<Fit> {
     let extent_mm = extent_mm(samples);
     let shape = local.shape().filter(|shape| is_sound(shape, extent_mm))?;
+    let held = held(&local, samples);
     let (mut squares, mut squares_mm2, mut count) = (0.0, 0.0, 0_usize);
     for (sample, _) in samples.iter().zip(&held).filter(|(_, held)| **held > 0.0) {
         let off = off(&local, sample);
         squares += off * off;
-        squares_mm2 += (off * sample.sigma_mm).powi(2);
+        squares_mm2 += local.distance::<f64>(&sample.point_mm).powi(2);
         count += 1;
     }
     let free = local.free();
     let left = count.checked_sub(free.len()).filter(|left| *left > 0)? as f64;
     let (normal, _) = normal_equations(&local, samples, &held);
     let covariance = normal.cholesky()?.inverse() * (squares / left * area.max(1.0));
-    let robust = scale(&local, samples);
-    let numbers = numbers(&local, &covariance)?;
-    Some((
-        Fit {
-            shape,
-            rms_mm: (squares_mm2 / count as f64).sqrt(),
-            held: count,
-            numbers,
-            local,
-        },
-        robust,
-    ))
+    Some(Fit {
+        shape,
+        rms_mm: (squares_mm2 / count as f64).sqrt(),
+        held: count,
+        numbers: numbers(&local, &covariance)?,
+        local,
+    })
 }
 
 /// Radii that say nothing are none.
@@ -169,7 +194,7 @@ fn extent_mm(samples: &[Sample]) -> f64 {
 }
 
 fn off(local: &Local, sample: &Sample) -> f64 {
-    local.distance(&sample.point_mm).value / sample.sigma_mm
+    local.off(sample)
 }
 
 /// The standard deviation of the distances, in those of the samples, by their median.
@@ -197,12 +222,11 @@ fn normal_equations(local: &Local, samples: &[Sample], weights: &[f64]) -> (Matr
         .zip(weights)
         .filter(|(_, weight)| **weight > 0.0)
     {
-        let weight = weight * sample.sigma_mm.powi(-2);
-        let distance = local.distance(&sample.point_mm);
+        let off: Jet = local.off(sample);
         for &i in free {
-            right[i] -= weight * distance.by[i] * distance.value;
+            right[i] -= weight * off.by[i] * off.value;
             for &j in free.iter().take_while(|j| **j <= i) {
-                matrix[(i, j)] += weight * distance.by[i] * distance.by[j];
+                matrix[(i, j)] += weight * off.by[i] * off.by[j];
             }
         }
     }

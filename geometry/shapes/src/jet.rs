@@ -12,22 +12,53 @@ pub(crate) struct Jet {
     pub(crate) by: [f64; MOST_FREE],
 }
 
-impl Jet {
-    /// A value that depends on nothing.
-    pub(crate) fn constant(value: f64) -> Self {
-        Self {
-            value,
-            by: [0.0; MOST_FREE],
-        }
-    }
+/// What shapes are computed with: plain numbers, or numbers that carry derivatives.
+pub(crate) trait Scalar:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Neg<Output = Self>
+    + Mul<Output = Self>
+    + Mul<f64, Output = Self>
+    + Add<f64, Output = Self>
+{
+    /// A value with its derivatives by some free numbers.
+    fn varying<const N: usize>(value: f64, by: [(usize, f64); N]) -> Self;
+    /// The plain number.
+    fn value(self) -> f64;
+    fn sqrt(self) -> Self;
+    fn recip(self) -> Self;
+    fn sin_cos(self) -> (Self, Self);
 
     /// The free number of this index itself.
-    pub(crate) fn free(value: f64, index: usize) -> Self {
-        let mut jet = Self::constant(value);
-        jet.by[index] = 1.0;
-        jet
+    fn free(value: f64, index: usize) -> Self {
+        Self::varying(value, [(index, 1.0)])
+    }
+}
+
+impl Scalar for f64 {
+    fn varying<const N: usize>(value: f64, _by: [(usize, f64); N]) -> Self {
+        value
     }
 
+    fn value(self) -> f64 {
+        self
+    }
+
+    fn sqrt(self) -> Self {
+        self.max(Self::MIN_POSITIVE).sqrt()
+    }
+
+    fn recip(self) -> Self {
+        1.0 / self
+    }
+
+    fn sin_cos(self) -> (Self, Self) {
+        libm::sincos(self)
+    }
+}
+
+impl Jet {
     /// A function of this, from its value and its derivative here.
     fn chained(self, value: f64, slope: f64) -> Self {
         Self {
@@ -35,18 +66,35 @@ impl Jet {
             by: self.by.map(|d| slope * d),
         }
     }
+}
 
-    pub(crate) fn sqrt(self) -> Self {
-        let root = self.value.max(f64::MIN_POSITIVE).sqrt();
+impl Scalar for Jet {
+    fn varying<const N: usize>(value: f64, by: [(usize, f64); N]) -> Self {
+        let mut jet = Self {
+            value,
+            by: [0.0; MOST_FREE],
+        };
+        for (index, part) in by {
+            jet.by[index] += part;
+        }
+        jet
+    }
+
+    fn value(self) -> f64 {
+        self.value
+    }
+
+    fn sqrt(self) -> Self {
+        let root = Scalar::sqrt(self.value);
         self.chained(root, 0.5 / root)
     }
 
-    pub(crate) fn recip(self) -> Self {
+    fn recip(self) -> Self {
         let recip = 1.0 / self.value;
         self.chained(recip, -recip * recip)
     }
 
-    pub(crate) fn sin_cos(self) -> (Self, Self) {
+    fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = libm::sincos(self.value);
         (self.chained(sin, cos), self.chained(cos, -sin))
     }

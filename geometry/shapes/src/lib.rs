@@ -17,10 +17,12 @@ mod local;
 mod robust;
 mod rotation;
 mod shape;
+mod spread;
 mod start;
 mod uncertainty;
 
 pub use evidence::{Candidate, Evidence, Verdict, decide};
 pub use fit::{Fit, Sample, fit};
 pub use shape::{Cone, Cylinder, Family, Plane, Shape, Sphere, Torus};
-pub use uncertainty::{Measured, Numbers};
+pub use spread::spread;
+pub use uncertainty::{Measured, Numbers, Spread};

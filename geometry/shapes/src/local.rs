@@ -8,7 +8,8 @@ use core::f64::consts::PI;
 
 use nalgebra::Vector3;
 
-use crate::jet::{Jet, MOST_FREE};
+use crate::fit::{ACROSS, Sample};
+use crate::jet::{MOST_FREE, Scalar};
 use crate::shape::{Cone, Cylinder, Family, Plane, Shape, Sphere, Torus};
 
 /// Curvatures below this, per millimetre, have no centre to speak of.
@@ -60,7 +61,7 @@ impl Local {
 
     /// Signed distance of a point, millimetres, positive above; with its derivatives by the
     /// numbers of a step.
-    pub(crate) fn distance(&self, point: &Vector3<f64>) -> Jet {
+    pub(crate) fn distance<S: Scalar>(&self, point: &Vector3<f64>) -> S {
         let from = point - self.place;
         let across = self.normal.cross(&self.along);
         let (u, v, s) = (
@@ -68,18 +69,10 @@ impl Local {
             from.dot(&across),
             from.dot(&self.normal),
         );
-        let jet = |value: f64, parts: [(usize, f64); 3]| {
-            let mut jet = Jet::constant(value);
-            for (index, part) in parts {
-                jet.by[index] += part;
-            }
-            jet
-        };
-        let [number, second, third] = [0, 1, 2].map(|k| Jet::free(self.numbers[k], NUMBERS + k));
-        let s = jet(s, [(SHIFT, -1.0), (TILT_ALONG, u), (TILT_ACROSS, v)]);
-        let low = s.value;
-        let along = jet(u, [(TILT_ALONG, -low), (TURN, v), (TURN, 0.0)]);
-        let across = jet(v, [(TILT_ACROSS, -low), (TURN, -u), (TURN, 0.0)]);
+        let [number, second, third] = [0, 1, 2].map(|k| S::free(self.numbers[k], NUMBERS + k));
+        let along = S::varying(u, [(TILT_ALONG, -s), (TURN, v)]);
+        let across = S::varying(v, [(TILT_ACROSS, -s), (TURN, -u)]);
+        let s = S::varying(s, [(SHIFT, -1.0), (TILT_ALONG, u), (TILT_ACROSS, v)]);
         match self.family {
             Family::Plane => s,
             Family::Sphere => off_round(number, along * along + across * across + s * s, s),
@@ -98,13 +91,25 @@ impl Local {
                 let up = sin * raised + cos * along;
                 let off = off_round(number, across * across + out * out, out);
                 let from_centre = (off * off + up * up).sqrt();
-                if third.value < 0.0 {
+                if third.value() < 0.0 {
                     -from_centre - radius
                 } else {
                     from_centre - radius
                 }
             }
         }
+    }
+
+    /// How far a sample lies off along its ray, in its standard deviations, positive above; with
+    /// the derivatives. To first order: the distance over the share of it that the ray covers.
+    pub(crate) fn off<S: Scalar>(&self, sample: &Sample) -> S {
+        /// How far along the ray the distance is looked at once more, millimetres.
+        const STEP_MM: f64 = 1e-3;
+        let here: S = self.distance(&sample.point_mm);
+        let further: S = self.distance(&(sample.point_mm + sample.ray * STEP_MM));
+        let covered = (further - here) * (1.0 / STEP_MM);
+        let deviation = (covered * covered + ACROSS * ACROSS).sqrt() * sample.sigma_mm;
+        here * deviation.recip()
     }
 
     /// The shape after a step.
@@ -205,7 +210,7 @@ impl Local {
 /// How much farther a point is from the centre of a circle than the circle, which passes
 /// through the origin with this curvature: from the point's squared distance to the origin
 /// and how far it is above it. As the curvature goes to zero this becomes the height.
-fn off_round(curvature: Jet, distance2: Jet, above: Jet) -> Jet {
+fn off_round<S: Scalar>(curvature: S, distance2: S, above: S) -> S {
     let twice = curvature * distance2 + above * 2.0;
     twice * ((curvature * twice + 1.0).sqrt() + 1.0).recip()
 }
@@ -213,6 +218,7 @@ fn off_round(curvature: Jet, distance2: Jet, above: Jet) -> Jet {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::jet::Jet;
 
     fn local(family: Family, numbers: [f64; 3]) -> Local {
         let normal = Vector3::new(0.2, -0.3, 0.9).normalize();
@@ -258,7 +264,7 @@ mod tests {
                 continue;
             };
             for point in points() {
-                let (near, far) = (local.distance(&point).value, shape.distance_mm(&point));
+                let (near, far) = (local.distance::<f64>(&point), shape.distance_mm(&point));
                 assert!((near - far).abs() < 1e-9, "{shape:?}: {near} {far}");
             }
         }
@@ -269,12 +275,13 @@ mod tests {
         const STEP: f64 = 1e-6;
         for local in all() {
             for point in points() {
-                let jet = local.distance(&point);
+                let jet: Jet = local.distance(&point);
+                assert_eq!(jet.value, local.distance::<f64>(&point));
                 for &k in local.free() {
                     let moved = |by: f64| {
                         let mut step = [0.0; MOST_FREE];
                         step[k] = by;
-                        local.moved(&step).distance(&point).value
+                        local.moved(&step).distance::<f64>(&point)
                     };
                     let slope = (moved(STEP) - moved(-STEP)) / (2.0 * STEP);
                     let off = (slope - jet.by[k]).abs();

@@ -2,34 +2,78 @@
 
 use nalgebra::{SMatrix, SVector};
 
-/// Rounds of weighing.
+use crate::spread::spread;
+
+/// Scatter below this share of what samples are said to have is not believed: where a scanner
+/// counts in steps as wide as its noise, more than half of the samples of a small face may lie
+/// on one step.
+pub(crate) const LEAST_SCATTER: f64 = 0.3;
+/// Rounds of weighing, and those of them that see all equations.
 const ROUNDS: usize = 8;
+const ROUNDS_OF_ALL: usize = 2;
+/// Most equations of the other rounds.
+const SOME: usize = 2000;
 /// The median distance times this is where an equation weighs half.
 const WIDE: f64 = 1.0;
+
+type Equation<const N: usize> = (SVector<f64, N>, f64);
 
 /// Solves `terms . x = value` for many equations, each weighed by how far it is off
 /// (Cauchy's weights). Returns the solution and the weights; `None` where it is not unique.
 pub(crate) fn solve<const N: usize>(
-    equations: &[(SVector<f64, N>, f64)],
+    equations: &[Equation<N>],
 ) -> Option<(SVector<f64, N>, Vec<f64>)> {
-    let mut weights = vec![1.0; equations.len()];
-    let mut solution = SVector::<f64, N>::zeros();
-    for _ in 0..ROUNDS {
+    if equations.len() <= SOME {
+        return weighed(equations, vec![1.0; equations.len()], ROUNDS);
+    }
+    let some: Vec<_> = spread(equations.len(), SOME)
+        .map(|k| equations[k])
+        .collect();
+    let (solution, _) = weighed(&some, vec![1.0; some.len()], ROUNDS - ROUNDS_OF_ALL)?;
+    let weights = weights(equations, &solution)?;
+    weighed(equations, weights, ROUNDS_OF_ALL)
+}
+
+/// Solves for the equations that a solution nearby leaves within the bounds of noise, as
+/// shapes are fitted.
+pub(crate) fn least_squares<const N: usize>(
+    equations: &[Equation<N>],
+    near: &SVector<f64, N>,
+) -> Option<SVector<f64, N>> {
+    let off = |(terms, value): &Equation<N>| value - terms.dot(near);
+    let held = held(equations.iter().map(off));
+    weighed(equations, held, 1).map(|(solution, _)| solution)
+}
+
+/// Rounds of solving with weights, and weighing by the solution.
+fn weighed<const N: usize>(
+    equations: &[Equation<N>],
+    mut by: Vec<f64>,
+    rounds: usize,
+) -> Option<(SVector<f64, N>, Vec<f64>)> {
+    let mut solution = SVector::zeros();
+    for _ in 0..rounds {
         let mut matrix = SMatrix::<f64, N, N>::zeros();
         let mut right = SVector::<f64, N>::zeros();
-        for ((terms, value), weight) in equations.iter().zip(&weights) {
+        for ((terms, value), weight) in equations.iter().zip(&by) {
             matrix += terms * terms.transpose() * *weight;
             right += terms * (value * weight);
         }
         solution = matrix.cholesky()?.solve(&right);
-        let off = |(terms, value): &(SVector<f64, N>, f64)| value - terms.dot(&solution);
-        let median = median_size(equations.iter().map(off))?;
-        let wide = WIDE * median.max(f64::MIN_POSITIVE);
-        for (weight, equation) in weights.iter_mut().zip(equations) {
-            *weight = (1.0 + (off(equation) / wide).powi(2)).recip();
-        }
+        by = weights(equations, &solution)?;
     }
-    Some((solution, weights))
+    Some((solution, by))
+}
+
+/// What each equation weighs by how far it is off. `None` where there are none.
+fn weights<const N: usize>(
+    equations: &[Equation<N>],
+    solution: &SVector<f64, N>,
+) -> Option<Vec<f64>> {
+    let off = |(terms, value): &Equation<N>| value - terms.dot(solution);
+    let wide = WIDE * median_size(equations.iter().map(off))?.max(f64::MIN_POSITIVE);
+    let weight = |equation| (1.0 + (off(equation) / wide).powi(2)).recip();
+    Some(equations.iter().map(weight).collect())
 }
 
 /// The median of the numbers' sizes; `None` where there are none.
@@ -45,6 +89,17 @@ pub(crate) fn deviation(values: impl Iterator<Item = f64>) -> f64 {
     /// Median of the sizes of normal numbers to their standard deviation.
     const OF_MEDIAN: f64 = 1.4826;
     median_size(values).map_or(f64::INFINITY, |median| OF_MEDIAN * median)
+}
+
+/// What is held of distances in deviations of their samples, as weights 0 and 1: all but what
+/// is too far off to be noise.
+pub(crate) fn held(off: impl Iterator<Item = f64>) -> Vec<f64> {
+    /// Distances are held up to so many times their standard deviation.
+    const HELD: f64 = 4.0;
+    let off: Vec<f64> = off.collect();
+    let most = HELD * deviation(off.iter().copied()).max(LEAST_SCATTER);
+    let held = off.iter().map(|off| f64::from(u8::from(off.abs() <= most)));
+    held.collect()
 }
 
 #[cfg(test)]

@@ -70,12 +70,12 @@ impl Frame {
 
     /// A point along, across and above.
     pub(crate) fn coordinates(&self, point: &Vector3<f64>) -> [f64; 3] {
-        let from = point - self.middle;
-        [
-            from.dot(&self.along),
-            from.dot(&self.across),
-            from.dot(&self.normal),
-        ]
+        self.turned(&(point - self.middle))
+    }
+
+    /// A direction along, across and upwards.
+    pub(crate) fn turned(&self, direction: &Vector3<f64>) -> [f64; 3] {
+        [&self.along, &self.across, &self.normal].map(|axis| direction.dot(axis))
     }
 }
 

@@ -1,6 +1,6 @@
 //! How well the numbers of a fitted shape are known.
 
-use nalgebra::{SMatrix, Vector3};
+use nalgebra::{Matrix3, SMatrix, SymmetricEigen, Vector3};
 
 use crate::jet::MOST_FREE;
 use crate::local::Local;
@@ -25,13 +25,41 @@ pub struct Numbers {
     pub tube_mm: Option<Measured>,
     /// Angle between a cone's axis and surface, radians.
     pub half_angle_rad: Option<Measured>,
-    /// Standard deviation of the direction, of a plane's normal or an axis, in each of the two
-    /// ways it can tilt, root mean square, radians.
-    pub direction_rad: Option<f64>,
-    /// Standard deviation of the place along each of its axes, root mean square over those
-    /// that count, millimetres: along a plane's normal, across a cylinder's axis, all three of
-    /// a centre or apex.
-    pub place_mm: f64,
+    /// How a plane's normal or an axis may be off, radians.
+    pub direction_rad: Option<Spread>,
+    /// How the place may be off in the ways that count, millimetres: along a plane's normal,
+    /// across a cylinder's axis, all ways of a centre or apex.
+    pub place_mm: Spread,
+}
+
+/// How a vector may be off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spread {
+    /// Its covariance.
+    pub covariance: Matrix3<f64>,
+}
+
+impl Spread {
+    /// Standard deviation along a unit vector.
+    #[must_use]
+    pub fn along(&self, way: &Vector3<f64>) -> f64 {
+        way.dot(&(self.covariance * way)).max(0.0).sqrt()
+    }
+
+    /// Standard deviation in the way in which it is known least.
+    #[must_use]
+    pub fn most(&self) -> f64 {
+        let eigen = SymmetricEigen::new(self.covariance);
+        eigen.eigenvalues.max().max(0.0).sqrt()
+    }
+
+    /// The same, looked at in these perpendicular unit ways only.
+    fn only(&self, ways: &[Vector3<f64>]) -> Self {
+        let kept: Matrix3<f64> = ways.iter().map(|way| way * way.transpose()).sum();
+        Self {
+            covariance: kept * self.covariance * kept,
+        }
+    }
 }
 
 /// Step by which derivatives are taken, in standard deviations.
@@ -93,59 +121,51 @@ pub(crate) fn numbers(
             place: (up.place - down.place) * per,
         });
     }
-    let variance = |slope: &dyn Fn(&Told) -> f64| -> f64 {
+    let common = |a: &dyn Fn(&Told) -> f64, b: &dyn Fn(&Told) -> f64| -> f64 {
         let mut sum = 0.0;
         for (i, &row) in free.iter().enumerate() {
             for (j, &column) in free.iter().enumerate() {
-                sum += slope(&slopes[i]) * covariance[(row, column)] * slope(&slopes[j]);
+                sum += a(&slopes[i]) * covariance[(row, column)] * b(&slopes[j]);
             }
         }
-        sum.max(0.0)
+        sum
     };
     let measured = |value: f64, slope: &dyn Fn(&Told) -> f64| Measured {
         value,
-        deviation: variance(slope).sqrt(),
+        deviation: common(slope, slope).max(0.0).sqrt(),
+    };
+    let spread = |vector: &dyn Fn(&Told) -> Vector3<f64>| Spread {
+        covariance: Matrix3::from_fn(|i, j| common(&|t| vector(t)[i], &|t| vector(t)[j])),
     };
     let radius = || measured(here.radius, &|t| t.radius);
-    // The ways in which a place may be off that count: `along` is the direction if only that
-    // counts, or if only that does not.
-    let place = |counts: [Vector3<f64>; 3], ways: usize| {
-        let ways = &counts[..ways];
-        let sum: f64 = ways.iter().map(|w| variance(&|t| t.place.dot(w))).sum();
-        (sum / ways.len() as f64).sqrt()
-    };
-    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
-    let (first, second) = across(&here.direction);
-    let tilt = || {
-        let sum = variance(&|t| t.direction.dot(&first)) + variance(&|t| t.direction.dot(&second));
-        (0.5 * sum).sqrt()
-    };
+    let direction = || Some(spread(&|t| t.direction));
     let mut numbers = Numbers {
         radius_mm: None,
         tube_mm: None,
         half_angle_rad: None,
         direction_rad: None,
-        place_mm: place(axes, 3),
+        place_mm: spread(&|t| t.place),
     };
     match shape {
         Shape::Plane(_) => {
-            numbers.direction_rad = Some(tilt());
-            numbers.place_mm = place([here.direction; 3], 1);
+            numbers.direction_rad = direction();
+            numbers.place_mm = numbers.place_mm.only(&[here.direction]);
         }
         Shape::Sphere(_) => numbers.radius_mm = Some(radius()),
         Shape::Cylinder(_) => {
             numbers.radius_mm = Some(radius());
-            numbers.direction_rad = Some(tilt());
-            numbers.place_mm = place([first, second, here.direction], 2);
+            numbers.direction_rad = direction();
+            let (first, second) = across(&here.direction);
+            numbers.place_mm = numbers.place_mm.only(&[first, second]);
         }
         Shape::Cone(_) => {
             numbers.half_angle_rad = Some(measured(here.half_angle, &|t| t.half_angle));
-            numbers.direction_rad = Some(tilt());
+            numbers.direction_rad = direction();
         }
         Shape::Torus(_) => {
             numbers.radius_mm = Some(radius());
             numbers.tube_mm = Some(measured(here.tube, &|t| t.tube));
-            numbers.direction_rad = Some(tilt());
+            numbers.direction_rad = direction();
         }
     }
     Some(numbers)

@@ -25,6 +25,7 @@ fn sheet(count: usize, seed: u64, z_mm: impl Fn(f64, f64) -> f64) -> Vec<Sample>
             );
             Sample {
                 point_mm: Vector3::new(x, y, z_mm(x, y) + NOISE_MM * random.normal()),
+                ray: Vector3::z(),
                 sigma_mm: NOISE_MM,
             }
         })
@@ -53,8 +54,9 @@ fn what_is_of_no_family_is_free_form() {
         |x, y| 2.0 * libm::sin(x / 9.0) * libm::cos(y / 11.0),
         // A paraboloid bends less off its middle than a sphere does.
         |x, y| -(x * x + y * y) / 60.0,
-        // So shallow that nowhere it is off a plane by more than half the noise.
-        |x, y| 0.025 * libm::sin(x / 8.0) * libm::sin(y / 8.0),
+        // So shallow that nowhere it is off a plane by more than the noise. (A single saddle of
+        // half this height would be off a torus by less than a tenth of the noise.)
+        |x, y| 0.05 * libm::sin(x / 6.0) * libm::sin(y / 6.0),
         // A saddle.
         |x, y| (x * x - y * y) / 200.0 + x * x * x / 20_000.0,
     ];

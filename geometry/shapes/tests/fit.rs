@@ -68,15 +68,13 @@ fn numbers_are_as_sure_as_they_say() {
             match (&case.0, &found.shape) {
                 (Shape::Plane(true_plane), Shape::Plane(plane)) => {
                     let tilt = (plane.normal - true_plane.normal).dot(&Vector3::x());
-                    let sin = (1.0 - true_plane.normal.x.powi(2)).sqrt();
-                    note(
-                        "tilt",
-                        tilt / sin / n.direction_rad.expect("a plane has one"),
-                    );
+                    let direction = n.direction_rad.expect("a plane has one");
+                    note("tilt", tilt / direction.along(&Vector3::x()));
+                    assert!(direction.most() >= direction.along(&Vector3::y()));
                     let off = true_plane
                         .normal
                         .dot(&(plane.point_mm - true_plane.point_mm));
-                    note("offset", off / n.place_mm);
+                    note("offset", off / n.place_mm.along(&true_plane.normal));
                 }
                 (Shape::Sphere(sphere), _) => note("radius", pull(n.radius_mm, sphere.radius_mm)),
                 (Shape::Cylinder(cylinder), _) => {
@@ -109,6 +107,37 @@ fn numbers_are_as_sure_as_they_say() {
 }
 
 #[test]
+fn noise_along_rays_does_not_tilt_a_slope() {
+    // A strip 4 mm wide, 66 degrees steep: noise along z moves its samples down the slope too.
+    const RISE: f64 = 2.25;
+    let normal = Vector3::new(-RISE, 0.0, 1.0).normalize();
+    let mut pulls = Vec::new();
+    for seed in 0..60 {
+        let mut random = Random(seed * 77 + 5);
+        let strip: Vec<Sample> = (0..400)
+            .map(|_| {
+                let (x, y) = (1.6 * random.uniform(), 60.0 * random.uniform());
+                Sample {
+                    point_mm: Vector3::new(x, y, RISE * x + 0.15 * random.normal()),
+                    ray: Vector3::z(),
+                    sigma_mm: 0.15,
+                }
+            })
+            .collect();
+        let found = fit(Family::Plane, &strip, 1.0).expect("enough samples");
+        let Shape::Plane(plane) = found.shape else {
+            panic!("another family");
+        };
+        let way = normal.cross(&Vector3::y());
+        let direction = found.numbers.direction_rad.expect("a plane has one");
+        pulls.push(plane.normal.dot(&way) / direction.along(&way));
+    }
+    let mean = pulls.iter().sum::<f64>() / pulls.len() as f64;
+    let square = pulls.iter().map(|pull| pull * pull).sum::<f64>() / pulls.len() as f64;
+    assert!(mean.abs() < 0.5 && square < 1.6, "{mean} {square}");
+}
+
+#[test]
 fn what_is_too_flat_or_too_little_is_of_no_such_family() {
     let plane = &cases()[0];
     let few = samples(plane, 3, 1);
@@ -117,6 +146,7 @@ fn what_is_too_flat_or_too_little_is_of_no_such_family() {
     let line: Vec<Sample> = (0..50)
         .map(|k| Sample {
             point_mm: Vector3::new(f64::from(k), 2.0, 3.0),
+            ray: Vector3::z(),
             sigma_mm: NOISE_MM,
         })
         .collect();

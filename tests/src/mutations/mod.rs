@@ -153,7 +153,7 @@ fn read_all(bytes: &[u8], through: bool) -> Read {
     let columns = cloud.map(columns).or(journal);
     if let Some((columns, pitch_mm)) = columns {
         read.went_on = true;
-        read.model = is_model(columns, pitch_mm);
+        read.model = is_model(&columns, pitch_mm);
     }
     read
 }
@@ -185,14 +185,14 @@ fn journal(source: impl std::io::Read) -> Result<(Vec<Column>, f64)> {
 }
 
 /// The rest of the road, on a grid that is coarse enough for it to be short.
-fn is_model(columns: Vec<Column>, pitch_mm: f64) -> bool {
-    let area_mm2 = pipeline::Extent::of(&columns).map_or(0.0, |extent| {
+fn is_model(columns: &[Column], pitch_mm: f64) -> bool {
+    let area_mm2 = pipeline::Extent::of(columns).map_or(0.0, |extent| {
         let [width, height] = extent.sides_mm();
         width * height
     });
     let pitch_mm = pitch_mm.max((area_mm2 / MOST_NODES).sqrt());
     // Asked as `relief convert` does, which must not panic either.
-    if pipeline::no_surface(&columns, pitch_mm).is_some() {
+    if pipeline::no_surface(columns, pitch_mm).is_some() {
         return false;
     }
     let settings = pipeline::Settings::new(pitch_mm);

@@ -147,6 +147,7 @@ pub(crate) fn samples((shape, at): &Case, count: usize, seed: u64) -> Vec<Sample
             });
             Sample {
                 point_mm: point + slope.normalize() * (NOISE_MM * random.normal()),
+                ray: slope.normalize(),
                 sigma_mm: NOISE_MM,
             }
         })

@@ -120,7 +120,7 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
     let name = args.name(input.name.as_deref());
 
     let watch = Stopwatch::new(shown);
-    let processed = pipeline::process_columns(input.columns, &settings, &watch);
+    let processed = pipeline::process_columns(&input.columns, &settings, &watch);
     let (image, outcome) = processed.map_err(|error| {
         shown.end("failed");
         refused(&args.input, &error, input.units_suspected.as_deref())
