@@ -58,6 +58,13 @@ pub(crate) enum Study {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
+    /// Hold the shapes found on faces against what the faces are.
+    #[command(disable_help_flag = true)]
+    Shapes {
+        /// Options of the study; `--help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
 }
 
 pub(crate) fn run(study: &Study) -> Result<()> {
@@ -72,6 +79,7 @@ pub(crate) fn run(study: &Study) -> Result<()> {
         Study::RealScans { options } => program("study-real-scans", options),
         Study::Regrid { options } => program("study-regrid", options),
         Study::Segmentation { options } => program("study-segmentation", options),
+        Study::Shapes { options } => program("study-shapes", options),
     }
 }
 

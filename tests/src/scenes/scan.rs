@@ -83,6 +83,16 @@ pub(super) fn lattice(scanner: &Scanner, sweep: &Sweep) -> Lattice {
     }
 }
 
+/// The columns of the plain view, and the scanner that they come from.
+///
+/// # Errors
+/// When the scene does not fit the scanner.
+pub fn plain_columns(drawn: &Drawn) -> Result<(Scanner, Vec<Column>)> {
+    let (scanner, sweep) = set_up(drawn, View::Plain)?;
+    let columns = columns(&scanner, &sweep);
+    Ok((scanner, columns))
+}
+
 /// The range image of a view, by the service's default regridding.
 ///
 /// # Errors

@@ -109,7 +109,7 @@ fn case(path: &Path, options: &Options) -> Result<Case> {
     let recording = files::recording(path)?;
     let settings = Settings::new(recording.pitch_mm).with_method(options.method);
     let columns = recording.columns;
-    let (image, outcome) = process_columns(columns.iter().cloned(), &settings, &Unmonitored)?;
+    let (image, outcome) = process_columns(&columns, &settings, &Unmonitored)?;
     let faces = &outcome.reconstruction.model.faces;
     let (all, each) = residuals(&columns, &image, &outcome.regions, faces);
     let name = files::name(path);

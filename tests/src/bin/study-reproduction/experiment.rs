@@ -94,8 +94,7 @@ pub(crate) fn run(scan: &Scan, method: Method, threads: usize) -> Result<Run> {
         .with_seed(scan.seed);
     settings.regrid.threads = threads;
     let watch = Stopwatch::new(&Unmonitored);
-    let (image, outcome) =
-        pipeline::process_columns(scan.columns.iter().cloned(), &settings, &watch)?;
+    let (image, outcome) = pipeline::process_columns(&scan.columns, &settings, &watch)?;
     let mut seconds = watch.read();
 
     let begun = Instant::now();
