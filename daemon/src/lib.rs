@@ -8,8 +8,9 @@
 //! ```
 //!
 //! [`Daemon::start`] runs the whole in this process; the program `reliefd` adds signals,
-//! the log and systemd. One scan at a time is taken, on threads of its own; jobs run on
-//! others, so that a second scan can be taken while the first is processed.
+//! the log and systemd. Each scanner takes one scan at a time, on threads of its own, whatever
+//! the other scanners do; jobs run on others, so that a second scan can be taken while the
+//! first is processed.
 
 pub mod config;
 pub mod logging;
@@ -30,13 +31,14 @@ mod scans;
 mod service;
 mod space;
 mod spool;
+mod station;
 mod store;
 mod tokens;
 
 pub use acquisition::PlanError;
 pub use arguments::Arguments;
 pub use config::{Config, ConfigError};
-pub use daemon::{Daemon, StartError};
+pub use daemon::{Daemon, OpenScanner, StartError};
 pub use error::ServiceError;
 pub use http::ListenError;
 pub use laser::LaserLogError;
