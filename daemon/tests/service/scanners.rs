@@ -227,6 +227,10 @@ async fn trouble_on_one_scanner_leaves_the_scan_of_the_other_alone() {
         assert_eq!(job.state, JobState::Done, "{trouble}: {:?}", job.error);
         assert_eq!(columns(&rig, &right), COLUMNS);
 
+        let status: Status = rig.client.get(path::STATUS).await;
+        let still = status.scanners[0].scan.as_ref().map(|scan| &scan.id);
+        let expected = (trouble == "hung").then_some(&left.id);
+        assert_eq!(still, expected, "{trouble}");
         // The scanner that is well takes another, whatever the other one is at.
         let again: Scan = rig.client.post(path::SCANS, &on("right")).await;
         let again = ended(&mut events, &again.id).await;
