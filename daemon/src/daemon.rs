@@ -8,22 +8,22 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use axum::Router;
-use scanner_driver::{Scanner, ScannerError, SerialScanner, UsbScanner};
+use scanner_driver::{Scanner, ScannerError};
 use storage::{Disk, LocalDisk, create_dir_all};
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
 use crate::acquisition::watch;
-use crate::config::{Config, HttpConfig, NamedScanner, Reloaded, Transport};
+use crate::config::{Config, HttpConfig, Reloaded};
 use crate::error::ServiceError;
 use crate::events::Hub;
 use crate::http::{Context, ListenError, on_loopback, on_socket, serve};
 use crate::jobs::work;
-use crate::laser::{Laser, LaserLogError, end_other_logs};
+use crate::laser::LaserLogError;
 use crate::service::{Kept, Service, remove_if_there};
 use crate::space::tidy;
 use crate::spool::{Spool, SpoolError};
-use crate::station::{Station, stop_all};
+use crate::station::{OpenScanner, make_all, open_all, open_attached, stop_all};
 use crate::store::{Store, StoreError};
 use crate::systemd::{Health, Inherited};
 use crate::tokens::{TokenError, Tokens};
@@ -119,7 +119,7 @@ impl Daemon {
     /// # Errors
     /// Any [`StartError`].
     pub async fn start_activated(config: Config, inherited: Inherited) -> Result<Self, StartError> {
-        Self::start_all(config, &open_scanner, Arc::new(LocalDisk), inherited).await
+        Self::start_all(config, &open_attached, Arc::new(LocalDisk), inherited).await
     }
 
     /// Starts the service with any scanner in place of the one that the configuration names.
@@ -162,7 +162,7 @@ impl Daemon {
         inherited: Inherited,
     ) -> Result<Self, StartError> {
         // Before anything is touched, as a configuration that is not sound.
-        let scanners = open_scanners(&config, open)?;
+        let scanners = open_all(&config, open)?;
         let scans_dir = prepare_state(&*disk, &config.service.state_dir)?;
         let records = config.service.state_dir.join("reliefd.redb");
         let store = Store::open_soon(&disk, &records, HANDOVER).await?;
@@ -170,7 +170,7 @@ impl Daemon {
         let spool = Spool::open(Arc::clone(&disk), &config.service.spool_dir)?;
         let tokens = Tokens::open(&config.service.state_dir.join("tokens.json"))?;
         let hub = Arc::new(Hub::default());
-        let stations = stations(&config, scanners, &hub)?;
+        let stations = make_all(&config, scanners, &hub)?;
         let offered = inherited.or_bind(&config.service).await?;
         let workers = config.queue.workers;
         let limits = config.http;
@@ -343,47 +343,4 @@ fn remove_grids(scans_dir: &Path) {
             remove_if_there(&entry.path());
         }
     }
-}
-
-/// Gives a scanner that the configuration names.
-pub type OpenScanner<'a> =
-    dyn Fn(NamedScanner<'_>) -> Result<Arc<dyn Scanner>, ScannerError> + Send + Sync + 'a;
-
-fn open_scanner(named: NamedScanner<'_>) -> Result<Arc<dyn Scanner>, ScannerError> {
-    let config = named.config;
-    Ok(match config.transport {
-        Transport::Serial => Arc::new(SerialScanner::open(config.serial())?),
-        Transport::Usb => Arc::new(UsbScanner::open(config.usb())?),
-    })
-}
-
-fn open_scanners(
-    config: &Config,
-    open: &OpenScanner<'_>,
-) -> Result<Vec<Arc<dyn Scanner>>, StartError> {
-    let named = config.each_scanner().into_iter();
-    let opened = named.map(|named| {
-        open(named).map_err(|source| StartError::Scanner {
-            section: named.section(),
-            source,
-        })
-    });
-    opened.collect()
-}
-
-fn stations(
-    config: &Config,
-    scanners: Vec<Arc<dyn Scanner>>,
-    hub: &Arc<Hub>,
-) -> Result<Vec<Arc<Station>>, StartError> {
-    let state_dir = &config.service.state_dir;
-    let named = config.each_scanner();
-    let names: Vec<&str> = named.iter().map(|named| named.name).collect();
-    end_other_logs(state_dir, &names);
-    let stations = named.into_iter().zip(scanners).map(|(named, scanner)| {
-        let laser = Laser::open(state_dir, named.name)?;
-        let station = Station::new(named, scanner, laser, Arc::clone(hub));
-        Ok(Arc::new(station))
-    });
-    stations.collect()
 }

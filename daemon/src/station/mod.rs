@@ -3,6 +3,8 @@
 //! Stations share the disk, the records, the queue and the API, and nothing that one of them
 //! could hold while its scanner does not answer.
 
+mod open;
+
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -17,6 +19,9 @@ use crate::error::ServiceError;
 use crate::events::Hub;
 use crate::laser::{Laser, Watched};
 use crate::service::lock;
+
+pub use open::OpenScanner;
+pub(crate) use open::{make_all, open_all, open_attached};
 
 /// The place for the one scan that can be under way on a scanner.
 #[derive(Debug)]
