@@ -80,9 +80,10 @@ impl FakeScanner {
         self.change(|state| state.fault_after = Some(columns));
     }
 
-    /// From now on nothing comes back, not even an error; or all that waits does.
-    pub(crate) fn hang(&self, hung: bool) {
-        self.change(|state| state.hung = hung);
+    /// Nothing comes back, not even an error, until what this gives is dropped.
+    pub(crate) fn hang(self: &Arc<Self>) -> Hung {
+        self.change(|state| state.hung = true);
+        Hung(Arc::clone(self))
     }
 
     /// By hand, as for adjustment.
@@ -140,6 +141,15 @@ impl FakeScanner {
                 }
             }
         }
+    }
+}
+
+/// A scanner that does not answer; also a test that fails lets go of it.
+pub(crate) struct Hung(Arc<FakeScanner>);
+
+impl Drop for Hung {
+    fn drop(&mut self) {
+        self.0.change(|state| state.hung = false);
     }
 }
 

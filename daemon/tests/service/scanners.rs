@@ -71,6 +71,13 @@ async fn amid(columns: u32) -> (Rig, Events, Scan, Scan) {
     (rig, events, left, right)
 }
 
+/// Waits for a scan's end, which may hang on another scanner if the service is broken.
+async fn ended_in_time(events: &mut Events, scan: &Scan) -> Scan {
+    tokio::time::timeout(GUARD, ended(events, &scan.id))
+        .await
+        .expect("it waits for no other scanner")
+}
+
 async fn refused(rig: &Rig, method: &str, path: &str, body: Option<&str>) -> Problem {
     rig.client.request(method, path, body).await.problem()
 }
@@ -196,6 +203,7 @@ async fn trouble_on_one_scanner_leaves_the_scan_of_the_other_alone() {
     for trouble in ["fault", "lost", "hung"] {
         let (rig, mut events, left, right) = amid(10).await;
         let scanner = rig.of("left");
+        let mut hung = None;
         match trouble {
             "fault" => {
                 scanner.fault_after(10);
@@ -206,7 +214,7 @@ async fn trouble_on_one_scanner_leaves_the_scan_of_the_other_alone() {
                 scanner.fault_after(10);
                 scanner.allow_all();
             }
-            _ => scanner.hang(true),
+            _ => hung = Some(scanner.hang()),
         }
         if trouble != "hung" {
             let left = ended(&mut events, &left.id).await;
@@ -217,7 +225,7 @@ async fn trouble_on_one_scanner_leaves_the_scan_of_the_other_alone() {
             );
         }
         rig.of("right").allow_all();
-        let right = ended(&mut events, &right.id).await;
+        let right = ended_in_time(&mut events, &right).await;
         assert_eq!(
             (right.state, right.columns, right.reason.as_deref()),
             (ScanState::Complete, COLUMNS, None),
@@ -240,7 +248,7 @@ async fn trouble_on_one_scanner_leaves_the_scan_of_the_other_alone() {
             "{trouble}: {:?}",
             again.reason
         );
-        scanner.hang(false);
+        drop(hung);
         rig.daemon.shutdown().await;
     }
 }
@@ -248,21 +256,21 @@ async fn trouble_on_one_scanner_leaves_the_scan_of_the_other_alone() {
 #[tokio::test(flavor = "multi_thread")]
 async fn an_abort_of_all_turns_the_laser_off_beside_a_scanner_that_hangs() {
     let (rig, mut events, left, right) = amid(10).await;
-    rig.of("left").hang(true);
     let rig = Arc::new(rig);
+    let hung = rig.of("left").hang();
     let asked = tokio::spawn({
         let rig = Arc::clone(&rig);
         async move { rig.client.ask::<Aborted>(path::ABORT).await }
     });
     // Only then does the other one answer.
-    let over = ended(&mut events, &right.id).await;
+    let over = ended_in_time(&mut events, &right).await;
     assert_eq!(
         (over.state, over.reason.as_deref()),
         (ScanState::Aborted, Some("aborted on request"))
     );
     assert!(!rig.of("right").laser_is_on());
     assert!(!asked.is_finished(), "it waits for the scanner that hangs");
-    rig.of("left").hang(false);
+    drop(hung);
     let aborted = asked.await.unwrap();
     assert_eq!(aborted.scan.id, left.id);
     assert_eq!(aborted.others.len(), 1);
@@ -379,13 +387,13 @@ async fn each_scanner_is_busy_for_itself() {
 #[tokio::test(flavor = "multi_thread")]
 async fn an_end_of_the_service_waits_for_no_scanner_to_turn_off_another() {
     let (rig, mut events, _, right) = amid(10).await;
-    rig.of("left").hang(true);
+    let hung = rig.of("left").hang();
     let (left, other) = (Arc::clone(rig.of("left")), Arc::clone(rig.of("right")));
     let ending = tokio::spawn(rig.daemon.shutdown());
-    ended(&mut events, &right.id).await;
+    ended_in_time(&mut events, &right).await;
     assert!(!other.laser_is_on());
     assert!(!ending.is_finished());
-    left.hang(false);
+    drop(hung);
     ending.await.unwrap();
     assert!(!left.laser_is_on());
 }
