@@ -8,20 +8,22 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use axum::Router;
-use scanner_driver::{Scanner, ScannerError, SerialScanner, UsbScanner};
+use scanner_driver::{Scanner, ScannerError};
 use storage::{Disk, LocalDisk, create_dir_all};
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
 use crate::acquisition::watch;
-use crate::config::{Config, HttpConfig, Reloaded, ScannerConfig, Transport};
+use crate::config::{Config, HttpConfig, Reloaded};
 use crate::error::ServiceError;
+use crate::events::Hub;
 use crate::http::{Context, ListenError, on_loopback, on_socket, serve};
 use crate::jobs::work;
-use crate::laser::{Laser, LaserLogError};
+use crate::laser::LaserLogError;
 use crate::service::{Kept, Service, remove_if_there};
 use crate::space::tidy;
 use crate::spool::{Spool, SpoolError};
+use crate::station::{OpenScanner, make_all, open_all, open_attached, stop_all};
 use crate::store::{Store, StoreError};
 use crate::systemd::{Health, Inherited};
 use crate::tokens::{TokenError, Tokens};
@@ -62,9 +64,14 @@ pub enum StartError {
     /// The API cannot be offered.
     #[error(transparent)]
     Listen(#[from] ListenError),
-    /// The link to the scanner cannot be set up.
-    #[error("cannot set up the scanner: {0}")]
-    Scanner(#[from] ScannerError),
+    /// The link to a scanner cannot be set up.
+    #[error("cannot set up the scanner of [{section}]: {source}")]
+    Scanner {
+        /// Its section of the configuration.
+        section: String,
+        /// Why not.
+        source: ScannerError,
+    },
     /// What an earlier run left cannot be taken up.
     #[error("cannot take up where the service last ended: {0}")]
     Recover(ServiceError),
@@ -98,8 +105,8 @@ impl std::fmt::Debug for Daemon {
 }
 
 impl Daemon {
-    /// Starts the service with the scanner that the configuration names. The scanner need
-    /// not be there yet.
+    /// Starts the service with the scanners that the configuration names. They need not be
+    /// there yet.
     ///
     /// # Errors
     /// Any [`StartError`].
@@ -112,11 +119,10 @@ impl Daemon {
     /// # Errors
     /// Any [`StartError`].
     pub async fn start_activated(config: Config, inherited: Inherited) -> Result<Self, StartError> {
-        let scanner = open_scanner(&config.scanner)?;
-        Self::start_all(config, scanner, Arc::new(LocalDisk), inherited).await
+        Self::start_all(config, &open_attached, Arc::new(LocalDisk), inherited).await
     }
 
-    /// Starts the service with any scanner.
+    /// Starts the service with any scanner in place of the one that the configuration names.
     ///
     /// # Errors
     /// Any [`StartError`] but [`StartError::Scanner`].
@@ -133,22 +139,38 @@ impl Daemon {
         scanner: Arc<dyn Scanner>,
         disk: Arc<dyn Disk>,
     ) -> Result<Self, StartError> {
-        Self::start_all(config, scanner, disk, Inherited::default()).await
+        Self::start_among(config, &|_| Ok(Arc::clone(&scanner)), disk).await
+    }
+
+    /// Starts the service with any scanners on any disk: `open` gives each one that the
+    /// configuration names.
+    ///
+    /// # Errors
+    /// Any [`StartError`].
+    pub async fn start_among(
+        config: Config,
+        open: &OpenScanner<'_>,
+        disk: Arc<dyn Disk>,
+    ) -> Result<Self, StartError> {
+        Self::start_all(config, open, disk, Inherited::default()).await
     }
 
     async fn start_all(
         config: Config,
-        scanner: Arc<dyn Scanner>,
+        open: &OpenScanner<'_>,
         disk: Arc<dyn Disk>,
         inherited: Inherited,
     ) -> Result<Self, StartError> {
+        // Before anything is touched, as a configuration that is not sound.
+        let scanners = open_all(&config, open)?;
         let scans_dir = prepare_state(&*disk, &config.service.state_dir)?;
         let records = config.service.state_dir.join("reliefd.redb");
         let store = Store::open_soon(&disk, &records, HANDOVER).await?;
         remove_grids(&scans_dir);
         let spool = Spool::open(Arc::clone(&disk), &config.service.spool_dir)?;
         let tokens = Tokens::open(&config.service.state_dir.join("tokens.json"))?;
-        let laser = Laser::open(&config.service.state_dir.join("laser.jsonl"))?;
+        let hub = Arc::new(Hub::default());
+        let stations = make_all(&config, scanners, &hub)?;
         let offered = inherited.or_bind(&config.service).await?;
         let workers = config.queue.workers;
         let limits = config.http;
@@ -157,9 +179,8 @@ impl Daemon {
             store,
             spool,
             tokens,
-            laser,
         };
-        let service = Arc::new(Service::new(config, scanner, kept, scans_dir));
+        let service = Arc::new(Service::new(config, stations, hub, kept, scans_dir));
         service.recover_scans().map_err(StartError::Recover)?;
         service.adopt_journals().map_err(StartError::Recover)?;
         service.recover_jobs().map_err(StartError::Recover)?;
@@ -204,12 +225,14 @@ impl Daemon {
                 .name("tidy".into())
                 .spawn(move || tidy(&service))?,
         );
-        let service = Arc::clone(&self.service);
-        self.threads.push(
-            std::thread::Builder::new()
-                .name("scanner-watch".into())
-                .spawn(move || watch(&service))?,
-        );
+        for station in &self.service.stations {
+            let (service, station) = (Arc::clone(&self.service), Arc::clone(station));
+            self.threads.push(
+                std::thread::Builder::new()
+                    .name(station.loop_name("scanner-watch"))
+                    .spawn(move || watch(&service, &station))?,
+            );
+        }
         Ok(())
     }
 
@@ -252,8 +275,8 @@ impl Daemon {
         self.service.reload(config)
     }
 
-    /// Brings the service to an orderly end: a scan under way is aborted and kept, with
-    /// the laser off; running jobs stop at their next opportunity and are taken up by the
+    /// Brings the service to an orderly end: scans under way are aborted and kept, with the
+    /// lasers off; running jobs stop at their next opportunity and are taken up by the
     /// next start; connections are drained. When this returns, another service may take
     /// over the folders and the socket.
     pub async fn shutdown(self) {
@@ -262,13 +285,8 @@ impl Daemon {
         service.queue.stop();
         let threads = self.threads;
         let ended = tokio::task::spawn_blocking(move || {
-            if service.active_scan().is_some()
-                && let Err(error) = service.abort_scan(None, "the service was stopped")
-            {
-                // It ended by itself in this very moment.
-                tracing::debug!(%error, "no scan to abort");
-            }
-            service.join_scan();
+            stop_all(&service.stations, "the service was stopped");
+            service.join_scans();
             for thread in threads {
                 let name = thread.thread().name().unwrap_or("?").to_owned();
                 if thread.join().is_err() {
@@ -325,11 +343,4 @@ fn remove_grids(scans_dir: &Path) {
             remove_if_there(&entry.path());
         }
     }
-}
-
-fn open_scanner(config: &ScannerConfig) -> Result<Arc<dyn Scanner>, StartError> {
-    Ok(match config.transport {
-        Transport::Serial => Arc::new(SerialScanner::open(config.serial())?),
-        Transport::Usb => Arc::new(UsbScanner::open(config.usb())?),
-    })
 }

@@ -2,12 +2,13 @@
 
 use std::io;
 
-use relief_api::{JobId, JobState, ScanState};
+use relief_api::{JobId, JobState, ScanState, THE_SCANNER};
 use scanner_driver::ScannerError;
 
 use crate::acquisition::PlanError;
 use crate::config::OverrideError;
 use crate::spool::SpoolError;
+use crate::station::Station;
 use crate::store::StoreError;
 use crate::tokens::TokenError;
 
@@ -17,18 +18,39 @@ pub enum ServiceError {
     /// It is about to end.
     #[error("the service is stopping")]
     Stopping,
-    /// One scan at a time.
+    /// One scan at a time on each scanner.
     #[error("{}", match .scan {
-        Some(scan) => format!("the scanner is taking the scan {scan}"),
+        Some(scan) => format!("{} is taking the scan {scan}", the_scanner(.scanner)),
         None => "another scan is just being started".to_owned(),
     })]
     ScannerBusy {
+        /// The scanner.
+        scanner: String,
         /// The other scan.
         scan: Option<String>,
     },
+    /// There is no such scanner.
+    #[error("there is no scanner {name}; there {} {}", are(.known), .known.join(", "))]
+    NoSuchScanner {
+        /// As it was given.
+        name: String,
+        /// Those there are.
+        known: Vec<String>,
+    },
+    /// It could be any of them.
+    #[error("there are several scanners, and none is named: {}", .known.join(", "))]
+    WhichScanner {
+        /// Those there are.
+        known: Vec<String>,
+    },
     /// The scanner does not do it.
-    #[error("{0}")]
-    Scanner(ScannerError),
+    #[error("{error}")]
+    Scanner {
+        /// Its section of the configuration.
+        section: String,
+        /// Why not.
+        error: ScannerError,
+    },
     /// The scanner cannot do it.
     #[error("{0}")]
     Plan(#[from] PlanError),
@@ -73,8 +95,14 @@ pub enum ServiceError {
         why: String,
     },
     /// No scan is under way.
-    #[error("no scan is under way")]
-    NothingToAbort,
+    #[error("{}", match .scanner {
+        Some(scanner) => format!("{} is taking no scan", the_scanner(scanner)),
+        None => "no scan is under way".to_owned(),
+    })]
+    NothingToAbort {
+        /// The scanner that was meant.
+        scanner: Option<String>,
+    },
     /// No scan is paused.
     #[error("{}", match .scan {
         Some(scan) => format!("the scan {scan} is not paused"),
@@ -83,6 +111,15 @@ pub enum ServiceError {
     NothingToResume {
         /// The scan that was meant.
         scan: Option<String>,
+    },
+    /// It could be any of them.
+    #[error(
+        "several scans are paused: {}",
+        .scans.iter().map(|(id, scanner)| format!("{id} on {scanner}")).collect::<Vec<_>>().join(", ")
+    )]
+    WhichPaused {
+        /// Each scan, and its scanner.
+        scans: Vec<(String, String)>,
     },
     /// There is no such job.
     #[error("there is no job {id}")]
@@ -109,8 +146,12 @@ pub enum ServiceError {
     /// The disk would get full.
     #[error(
         "there is no room in {folder}: the scan takes up to {}, and {} are to stay free \
-         (storage.reserve_mb), but only {} are free",
-        megabytes(*.scan_bytes), megabytes(*.reserve_bytes), megabytes(*.free_bytes)
+         (storage.reserve_mb), but only {} are free{}",
+        megabytes(*.scan_bytes), megabytes(*.reserve_bytes), megabytes(*.free_bytes),
+        match *.promised_bytes {
+            0 => String::new(),
+            bytes => format!(", of which scans under way take up to {}", megabytes(bytes)),
+        }
     )]
     NoRoom {
         /// The folder that would get full.
@@ -121,6 +162,8 @@ pub enum ServiceError {
         reserve_bytes: u64,
         /// Bytes that are free.
         free_bytes: u64,
+        /// Bytes of these that scans under way may still take.
+        promised_bytes: u64,
     },
     /// The records do not work.
     #[error(transparent)]
@@ -142,6 +185,28 @@ pub enum ServiceError {
     /// The system has no more threads.
     #[error("cannot start a thread: {0}")]
     Thread(io::Error),
+}
+
+impl ServiceError {
+    /// A station's scanner does not do it.
+    pub(crate) fn scanner(station: &Station, error: ScannerError) -> Self {
+        Self::Scanner {
+            section: station.section().to_owned(),
+            error,
+        }
+    }
+}
+
+/// A scanner in a sentence; one that nobody has named is "the scanner".
+fn the_scanner(name: &str) -> String {
+    match name {
+        THE_SCANNER => "the scanner".to_owned(),
+        name => format!("the scanner {name}"),
+    }
+}
+
+fn are(list: &[String]) -> &'static str {
+    if list.len() == 1 { "is" } else { "are" }
 }
 
 /// A size for people.

@@ -1,6 +1,6 @@
 //! The laser: whether it is on, and a log of every change with its cause.
 //!
-//! The log is `laser.jsonl` in the state folder: one JSON object a line, only ever appended
+//! Each scanner has a log in the state folder: one JSON object a line, only ever appended
 //! to. A line that says `on` is on disk before the scanner is asked.
 
 use std::collections::VecDeque;
@@ -10,7 +10,7 @@ use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use relief_api::{LaserEntry, LaserState, ScanState};
+use relief_api::{LaserEntry, LaserState, ScanState, THE_SCANNER};
 use scanner_driver::{DeviceStatus, ScanStream, Scanner, ScannerError};
 use scanner_protocol::{Identity, ScanPlan};
 
@@ -18,7 +18,7 @@ use crate::ids::now;
 use crate::service::lock;
 
 /// Entries that are kept for showing; the file has all.
-const MOST_SHOWN: usize = 1_000;
+pub(crate) const MOST_SHOWN: usize = 1_000;
 /// How much of the file's end is read at the start: more than that many entries take.
 const TAIL_BYTES: u64 = 512 * 1024;
 /// For the service's user to write, and for its group to read.
@@ -46,6 +46,7 @@ pub(crate) struct Laser {
 
 #[derive(Debug)]
 struct Known {
+    scanner: String,
     file: File,
     entries: VecDeque<LaserEntry>,
     /// The scan that is about to begin.
@@ -59,10 +60,12 @@ struct Known {
 }
 
 impl Laser {
-    /// Opens the log, and notes if the service last ended with the laser on.
-    pub(crate) fn open(path: &Path) -> Result<Self, LaserLogError> {
+    /// Opens a scanner's log in the state folder, and notes if the service last ended with the
+    /// laser on.
+    pub(crate) fn open(state_dir: &Path, scanner: &str) -> Result<Self, LaserLogError> {
+        let path = state_dir.join(file_name(scanner));
         let failed = |source| LaserLogError {
-            path: path.to_owned(),
+            path: path.clone(),
             source,
         };
         let mut file = OpenOptions::new()
@@ -70,11 +73,18 @@ impl Laser {
             .append(true)
             .create(true)
             .mode(FILE_MODE)
-            .open(path)
+            .open(&path)
             .map_err(failed)?;
-        let entries = read_tail(&mut file).map_err(failed)?;
+        let mut entries = read_tail(&mut file).map_err(failed)?;
+        for entry in &mut entries {
+            // Of a version in which scanners had no names.
+            if entry.scanner.is_empty() {
+                scanner.clone_into(&mut entry.scanner);
+            }
+        }
         let laser = Self {
             known: Mutex::new(Known {
+                scanner: scanner.to_owned(),
                 file,
                 entries,
                 next_scan: None,
@@ -188,12 +198,14 @@ impl Known {
             at: now(),
             laser,
             cause: cause.to_owned(),
+            scanner: self.scanner.clone(),
             scan: self.scan.clone(),
         };
+        let (scanner, scan) = (&self.scanner, &entry.scan);
         match laser {
-            LaserState::On => tracing::info!(cause, scan = entry.scan, "laser on"),
-            LaserState::Off => tracing::info!(cause, scan = entry.scan, "laser off"),
-            LaserState::Unknown => tracing::warn!(cause, scan = entry.scan, "laser unknown"),
+            LaserState::On => tracing::info!(scanner, cause, scan, "laser on"),
+            LaserState::Off => tracing::info!(scanner, cause, scan, "laser off"),
+            LaserState::Unknown => tracing::warn!(scanner, cause, scan, "laser unknown"),
         }
         if let Err(error) = append(&mut self.file, &entry) {
             tracing::error!(%error, "the log of the laser cannot be written");
@@ -201,6 +213,36 @@ impl Known {
         self.entries.push_back(entry);
         if self.entries.len() > MOST_SHOWN {
             self.entries.pop_front();
+        }
+    }
+}
+
+/// The only scanner's log has had this name before scanners had any.
+fn file_name(scanner: &str) -> String {
+    match scanner {
+        THE_SCANNER => "laser.jsonl".to_owned(),
+        name => format!("laser-{name}.jsonl"),
+    }
+}
+
+/// The scanner whose log a file is, if it is one.
+fn scanner_of(file_name: &str) -> Option<&str> {
+    match file_name {
+        "laser.jsonl" => Some(THE_SCANNER),
+        other => other.strip_prefix("laser-")?.strip_suffix(".jsonl"),
+    }
+}
+
+/// Ends the logs of scanners that are configured no more, so that none says for ever that a
+/// laser is on.
+pub(crate) fn end_other_logs(state_dir: &Path, configured: &[&str]) {
+    for entry in std::fs::read_dir(state_dir).into_iter().flatten().flatten() {
+        let file = entry.file_name();
+        let scanner = file.to_str().and_then(scanner_of);
+        if let Some(scanner) = scanner.filter(|name| !configured.contains(name))
+            && let Err(error) = Laser::open(state_dir, scanner)
+        {
+            tracing::warn!(scanner, %error, "the log of a laser is left as it is");
         }
     }
 }
@@ -314,7 +356,7 @@ mod tests {
     fn the_log_is_appended_to_and_survives_torn_lines() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("laser.jsonl");
-        let laser = Laser::open(&path).unwrap();
+        let laser = Laser::open(folder.path(), THE_SCANNER).unwrap();
         assert_eq!(laser.latest(), None);
         laser.scan_begins("s");
         laser.begin();
@@ -324,14 +366,14 @@ mod tests {
         let mut file = OpenOptions::new().append(true).open(&path).unwrap();
         file.write_all(b"{\"at\":\"2026").unwrap();
 
-        let laser = Laser::open(&path).unwrap();
+        let laser = Laser::open(folder.path(), THE_SCANNER).unwrap();
         laser.note(LaserState::Off, "the scanner says that it is off");
         let states: Vec<LaserState> = laser.entries().iter().map(|e| e.laser).collect();
         let expected = [LaserState::On, LaserState::Unknown, LaserState::Off];
         assert_eq!(states, expected);
         assert_eq!(laser.entries()[0].scan.as_deref(), Some("s"));
         assert!(laser.entries()[1].cause.contains("dead-man"));
-        let again = Laser::open(&path).unwrap();
+        let again = Laser::open(folder.path(), THE_SCANNER).unwrap();
         assert_eq!(again.entries(), laser.entries());
         let text = std::fs::read_to_string(&path).unwrap();
         assert_eq!(text.lines().count(), 4, "{text}");
@@ -340,7 +382,7 @@ mod tests {
     #[test]
     fn nobody_knows_of_a_pause_whether_the_laser_is_on() {
         let folder = tempfile::tempdir().unwrap();
-        let laser = Laser::open(&folder.path().join("laser.jsonl")).unwrap();
+        let laser = Laser::open(folder.path(), "left").unwrap();
         laser.scan_begins("s");
         laser.begin();
         laser.scan_paused("the cable was pulled");
@@ -352,6 +394,40 @@ mod tests {
         assert_eq!(states, [On, Unknown, On, Off]);
         assert!(entries.iter().all(|e| e.scan.as_deref() == Some("s")));
         assert_eq!(entries[1].cause, "the cable was pulled");
+        assert!(entries.iter().all(|e| e.scanner == "left"));
+    }
+
+    #[test]
+    fn logs_of_scanners_that_are_no_more_are_ended_and_others_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        for scanner in [THE_SCANNER, "left", "right"] {
+            Laser::open(at, scanner).unwrap().begin();
+        }
+        std::fs::write(at.join("laser-notes.txt"), "mine").unwrap();
+        let states = |scanner: &str| -> Vec<String> {
+            let text = std::fs::read_to_string(at.join(file_name(scanner))).unwrap();
+            let entries = text.lines().map(|line| serde_json::from_str(line).unwrap());
+            entries
+                .map(|e: LaserEntry| format!("{} {}", e.scanner, e.laser.as_str()))
+                .collect()
+        };
+        end_other_logs(at, &["left"]);
+        end_other_logs(at, &["left"]);
+        assert_eq!(states("left"), ["left on"]);
+        assert_eq!(states("right"), ["right on", "right unknown"]);
+        assert_eq!(states(THE_SCANNER), ["scanner on", "scanner unknown"]);
+        assert_eq!(std::fs::read_dir(at).unwrap().count(), 4);
+    }
+
+    #[test]
+    fn entries_from_before_scanners_had_names_are_of_the_one_there_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let old = r#"{"at":"2026-11-22T11:11:36.320Z","laser":"off","cause":"c","scan":"s"}"#;
+        std::fs::write(folder.path().join("laser.jsonl"), format!("{old}\n")).unwrap();
+        let laser = Laser::open(folder.path(), THE_SCANNER).unwrap();
+        assert_eq!(laser.entries()[0].scanner, "scanner");
+        assert_eq!(laser.entries()[0].scan.as_deref(), Some("s"));
     }
 
     #[test]
@@ -362,13 +438,14 @@ mod tests {
             at: number.to_string(),
             laser: LaserState::Off,
             cause: "c".repeat(100),
+            scanner: THE_SCANNER.into(),
             scan: None,
         };
         let text: String = (0..9_000)
             .map(|n| serde_json::to_string(&entry(n)).unwrap() + "\n")
             .collect();
         std::fs::write(&path, text).unwrap();
-        let laser = Laser::open(&path).unwrap();
+        let laser = Laser::open(folder.path(), THE_SCANNER).unwrap();
         assert_eq!(laser.entries().len(), MOST_SHOWN);
         assert_eq!(laser.latest(), Some(entry(8_999)));
     }

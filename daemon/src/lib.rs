@@ -8,8 +8,9 @@
 //! ```
 //!
 //! [`Daemon::start`] runs the whole in this process; the program `reliefd` adds signals,
-//! the log and systemd. One scan at a time is taken, on threads of its own; jobs run on
-//! others, so that a second scan can be taken while the first is processed.
+//! the log and systemd. Each scanner takes one scan at a time, on threads of its own, whatever
+//! the other scanners do; jobs run on others, so that a second scan can be taken while the
+//! first is processed.
 
 pub mod config;
 pub mod logging;
@@ -30,6 +31,7 @@ mod scans;
 mod service;
 mod space;
 mod spool;
+mod station;
 mod store;
 mod tokens;
 
@@ -41,5 +43,6 @@ pub use error::ServiceError;
 pub use http::ListenError;
 pub use laser::LaserLogError;
 pub use spool::SpoolError;
+pub use station::OpenScanner;
 pub use store::StoreError;
 pub use tokens::TokenError;

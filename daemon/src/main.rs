@@ -22,6 +22,11 @@ fn main() -> ExitCode {
     };
     if arguments.check_config {
         println!("{}: sound", arguments.config.display());
+        for scanner in config.each_scanner() {
+            if !scanner.is_the_only {
+                println!("scanner {}: {}", scanner.name, scanner.config.place());
+            }
+        }
         return ExitCode::SUCCESS;
     }
     match run(&arguments, config) {

@@ -1,45 +1,15 @@
 //! Scans: starting, ending, and what is kept of them.
 
 use std::sync::Arc;
-use std::thread::JoinHandle;
 
-use relief_api::{Event, Scan, ScanState, ScannerLink, StartScan};
+use relief_api::{Aborted, Event, Scan, ScanState, ScannerLink, StartScan};
 use scanner_driver::ScannerError;
 
 use crate::acquisition::{AbortRequest, Ticket, resolve, run};
 use crate::error::ServiceError;
 use crate::ids::{now, shown_name};
 use crate::service::{Service, lock};
-
-/// The place for the one scan that can be under way.
-#[derive(Debug)]
-pub(crate) enum Slot {
-    /// Nothing is under way.
-    Free,
-    /// The scanner is being asked whether it is there.
-    Reserved,
-    /// A scan is under way.
-    Taken {
-        /// As it stands; newer than the kept record.
-        scan: Box<Scan>,
-        /// Ends it early.
-        abort: Arc<AbortRequest>,
-    },
-}
-
-/// Frees a reserved slot unless the scan took it.
-struct Reservation<'a> {
-    service: &'a Service,
-    used: bool,
-}
-
-impl Drop for Reservation<'_> {
-    fn drop(&mut self) {
-        if !self.used {
-            *lock(&self.service.slot) = Slot::Free;
-        }
-    }
-}
+use crate::station::{Station, stop_all};
 
 impl Service {
     /// Starts a scan. Blocks until the scanner has said who it is, so that a scanner that
@@ -47,25 +17,28 @@ impl Service {
     pub(crate) fn start_scan(self: &Arc<Self>, request: &StartScan) -> Result<Scan, ServiceError> {
         self.check_running()?;
         let name = shown_name(&request.name)?;
+        let station = Arc::clone(self.station(&request.scanner)?);
         let config = self.config();
         let processing = config.processing().with_overrides(&request.settings)?;
-        let mut reservation = self.reserve()?;
-        let identity = self.scanner.identify().map_err(|error| {
-            self.note_scanner(ScannerLink::Trouble, Some(error.to_string()));
-            ServiceError::Scanner(error)
+        let reservation = station.reserve()?;
+        let identity = station.scanner.identify().map_err(|error| {
+            station.note(ScannerLink::Trouble, Some(error.to_string()));
+            ServiceError::scanner(&station, error)
         })?;
-        self.note_identity(&identity);
-        let plan = resolve(&request.plan.or(&config.scan), &identity)?;
-        self.check_room(plan.plan.columns, plan.plan.samples)?;
+        station.note_identity(&identity);
+        let plan = request.plan.or(&config.scan_on(station.name()));
+        let plan = resolve(&plan, &identity)?;
         let id = self.ids.next(&request.name, |id| {
             self.spool.has(id) || self.journal_path(id).exists()
         });
+        let room = self.promise_room(&id, plan.plan.columns, plan.plan.samples)?;
         let scan = Scan {
             id,
             name,
             part: request.part.clone(),
             operator: request.operator.clone(),
             note: request.note.clone(),
+            scanner: station.name().to_owned(),
             state: ScanState::Starting,
             reason: None,
             started_at: now(),
@@ -78,152 +51,140 @@ impl Service {
         };
         let abort = Arc::new(AbortRequest::default());
         let ticket = Ticket {
+            station: Arc::clone(&station),
             scan: scan.clone(),
             plan,
             identity,
             processing,
+            room,
             abort: Arc::clone(&abort),
         };
-        {
-            // Under the lock, so that the thread finds its slot taken, and so that a
-            // service that stops finds either the scan or none to come.
-            let mut slot = lock(&self.slot);
+        reservation.take(&scan, abort, || {
+            // Where nobody sees the slot, so that a service that stops finds either the scan
+            // or none to come.
             self.check_running()?;
             self.store.put_scan(&scan)?;
-            self.laser.scan_begins(&scan.id);
+            station.laser.scan_begins(&scan.id);
             let service = Arc::clone(self);
-            let thread = std::thread::Builder::new()
-                .name("scan".into())
+            std::thread::Builder::new()
+                .name(station.loop_name("scan"))
                 .spawn(move || run(&service, ticket))
-                .map_err(ServiceError::Thread)?;
-            self.hold_scan_thread(thread);
-            *slot = Slot::Taken {
-                scan: Box::new(scan.clone()),
-                abort,
-            };
-            reservation.used = true;
-            // Before the lock goes, so that nobody hears of what follows first.
-            self.hub.tell(Event::Scan(scan.clone()));
-        }
+                .map_err(ServiceError::Thread)
+        })?;
         Ok(scan)
     }
 
-    fn reserve(&self) -> Result<Reservation<'_>, ServiceError> {
-        let mut slot = lock(&self.slot);
-        match &*slot {
-            Slot::Free => {
-                *slot = Slot::Reserved;
-                Ok(Reservation {
-                    service: self,
-                    used: false,
-                })
-            }
-            Slot::Reserved => Err(ServiceError::ScannerBusy { scan: None }),
-            Slot::Taken { scan, .. } => Err(ServiceError::ScannerBusy {
-                scan: Some(scan.id.clone()),
+    /// Ends a scan that is under way. The laser is off when this returns, if the scanner can
+    /// be reached.
+    pub(crate) fn abort_scan(&self, id: &str, reason: &str) -> Result<Scan, ServiceError> {
+        let stopped = self.stations.iter().any(|station| {
+            let is_here = station.active_scan().is_some_and(|scan| scan.id == id);
+            is_here && station.stop(Some(id), reason).is_some()
+        });
+        let scan = self.scan(id)?;
+        if stopped {
+            Ok(scan)
+        } else {
+            Err(ServiceError::ScanIsOver {
+                id: scan.id,
+                state: scan.state,
+            })
+        }
+    }
+
+    /// Ends the scan that is under way on this scanner, as [`Service::abort_scan`] does.
+    pub(crate) fn abort_on(&self, scanner: &str, reason: &str) -> Result<Scan, ServiceError> {
+        let station = self.station(scanner)?;
+        match station.stop(None, reason) {
+            Some(id) => self.scan(&id),
+            None => Err(ServiceError::NothingToAbort {
+                scanner: Some(scanner.to_owned()),
             }),
         }
     }
 
-    /// Ends the scan that is under way, or that of this id. The laser is off when this
-    /// returns, if the scanner can be reached.
-    pub(crate) fn abort_scan(&self, id: Option<&str>, reason: &str) -> Result<Scan, ServiceError> {
-        let (scan, abort) = {
-            let slot = lock(&self.slot);
-            match &*slot {
-                Slot::Taken { scan, abort, .. } if id.is_none_or(|id| id == scan.id) => {
-                    (scan.clone(), Arc::clone(abort))
-                }
-                _ => {
-                    drop(slot);
-                    return Err(match id {
-                        Some(id) => {
-                            let scan = self.scan(id)?;
-                            ServiceError::ScanIsOver {
-                                id: scan.id,
-                                state: scan.state,
-                            }
-                        }
-                        None => ServiceError::NothingToAbort,
-                    });
-                }
-            }
-        };
-        // First the reason: whoever takes the scan stops the scanner as soon as it is asked to.
-        self.laser.stop_asked(reason);
-        abort.ask(reason);
-        if let Err(error) = self.scanner.abort() {
-            tracing::warn!(%error, "cannot tell the scanner to stop");
+    /// Ends whatever scans are under way: who does not say which one is meant wants no laser
+    /// on, whatever becomes of the scans.
+    pub(crate) fn abort_all(&self, reason: &str) -> Result<Aborted, ServiceError> {
+        let mut scans = Vec::new();
+        for id in stop_all(&self.stations, reason) {
+            scans.push(self.scan(&id)?);
         }
-        self.scan(&scan.id)
+        if scans.is_empty() {
+            return Err(ServiceError::NothingToAbort { scanner: None });
+        }
+        Ok(Aborted {
+            scan: scans.remove(0),
+            others: scans,
+        })
     }
 
-    /// Lets the paused scan, or that of this id, go on: somebody has looked. Whether it does go
-    /// on is told by events.
-    pub(crate) fn resume_scan(&self, id: Option<&str>) -> Result<Scan, ServiceError> {
-        let paused = self
-            .active_scan()
-            .filter(|scan| scan.state == ScanState::Paused && id.is_none_or(|id| id == scan.id));
-        let Some(scan) = paused else {
-            if let Some(id) = id {
-                // One that is not there is another mistake.
-                self.scan(id)?;
+    /// Lets the paused scan of this id go on: somebody has looked. Whether it does go on is
+    /// told by events.
+    pub(crate) fn resume_scan(&self, id: &str) -> Result<Scan, ServiceError> {
+        for station in &self.stations {
+            if let Some(scan) = station.paused_scan().filter(|scan| scan.id == id) {
+                return self.resume(station, &scan);
             }
-            return Err(ServiceError::NothingToResume {
-                scan: id.map(str::to_owned),
-            });
-        };
-        tracing::info!(scan = %scan.id, "asked to go on");
-        self.scanner.resume_scan().map_err(|error| match error {
+        }
+        // One that is not there is another mistake.
+        self.scan(id)?;
+        Err(ServiceError::NothingToResume {
+            scan: Some(id.to_owned()),
+        })
+    }
+
+    /// The same of the scan that is paused on this scanner.
+    pub(crate) fn resume_on(&self, scanner: &str) -> Result<Scan, ServiceError> {
+        let station = self.station(scanner)?;
+        match station.paused_scan() {
+            Some(scan) => self.resume(station, &scan),
+            None => Err(ServiceError::NothingToResume { scan: None }),
+        }
+    }
+
+    /// The same of the only scan that is paused. Of several none goes on: who looked at one
+    /// scanner need not have looked at the other.
+    pub(crate) fn resume_any(&self) -> Result<Scan, ServiceError> {
+        let paused: Vec<(&Arc<Station>, Scan)> = self
+            .stations
+            .iter()
+            .filter_map(|station| Some((station, station.paused_scan()?)))
+            .collect();
+        match paused.as_slice() {
+            [] => Err(ServiceError::NothingToResume { scan: None }),
+            [(station, scan)] => self.resume(station, scan),
+            several => {
+                let named = |(_, scan): &(_, Scan)| (scan.id.clone(), scan.scanner.clone());
+                Err(ServiceError::WhichPaused {
+                    scans: several.iter().map(named).collect(),
+                })
+            }
+        }
+    }
+
+    fn resume(&self, station: &Station, scan: &Scan) -> Result<Scan, ServiceError> {
+        tracing::info!(scan = %scan.id, scanner = station.name(), "asked to go on");
+        station.scanner.resume_scan().map_err(|error| match error {
             // It has gone on by itself in this very moment.
             ScannerError::NothingPaused => ServiceError::NothingToResume {
                 scan: Some(scan.id.clone()),
             },
-            error => ServiceError::Scanner(error),
+            error => ServiceError::scanner(station, error),
         })?;
         self.scan(&scan.id)
     }
 
-    /// Keeps a scan's thread until it is joined. The place of a scan is free a moment
-    /// before its thread has ended, so that the thread is not kept there.
-    fn hold_scan_thread(&self, thread: JoinHandle<()>) {
-        let mut threads = lock(&self.scan_threads);
-        threads.retain(|thread| !thread.is_finished());
-        threads.push(thread);
-    }
-
     /// Waits until the threads of all scans have ended.
-    pub(crate) fn join_scan(&self) {
-        let threads = std::mem::take(&mut *lock(&self.scan_threads));
-        for thread in threads {
-            if thread.join().is_err() {
-                tracing::error!("the scan's thread ended by a panic");
-            }
+    pub(crate) fn join_scans(&self) {
+        for station in &self.stations {
+            station.join();
         }
     }
 
-    /// True while a scan is under way or about to be.
-    pub(crate) fn is_scanning(&self) -> bool {
-        !matches!(*lock(&self.slot), Slot::Free)
-    }
-
-    /// The scan under way.
-    pub(crate) fn active_scan(&self) -> Option<Scan> {
-        match &*lock(&self.slot) {
-            Slot::Taken { scan, .. } => Some((**scan).clone()),
-            _ => None,
-        }
-    }
-
-    /// Changes what is known of the scan under way; gives it as it is then.
-    pub(crate) fn update_active(&self, change: impl FnOnce(&mut Scan)) -> Option<Scan> {
-        match &mut *lock(&self.slot) {
-            Slot::Taken { scan, .. } => {
-                change(scan);
-                Some((**scan).clone())
-            }
-            _ => None,
-        }
+    /// The scans under way.
+    fn active_scans(&self) -> impl Iterator<Item = Scan> + '_ {
+        self.stations.iter().filter_map(|s| s.active_scan())
     }
 
     /// Keeps a scan's record and tells of it.
@@ -233,11 +194,17 @@ impl Service {
         Ok(())
     }
 
-    /// Notes how the scan under way ended, queues its job if it is complete, and makes
-    /// room for the next.
-    pub(crate) fn end_scan(&self, id: &str, state: ScanState, reason: Option<String>) {
-        self.laser.scan_ended(state, reason.as_deref());
-        let scan = self.update_active(|scan| {
+    /// Notes how a scanner's scan ended, queues its job if it is complete, and makes room for
+    /// the next.
+    pub(crate) fn end_scan(
+        &self,
+        station: &Station,
+        id: &str,
+        state: ScanState,
+        reason: Option<String>,
+    ) {
+        station.laser.scan_ended(state, reason.as_deref());
+        let scan = station.update_active(|scan| {
             scan.state = state;
             scan.reason = reason;
             scan.ended_at = Some(now());
@@ -249,19 +216,19 @@ impl Service {
             tracing::error!(scan = id, %error, "cannot keep the record of a scan now; its columns are safe");
             lock(&self.unkept).push(scan.clone());
         }
-        *lock(&self.slot) = Slot::Free;
+        station.free();
         match (state, &scan.reason) {
             (ScanState::Failed, Some(reason)) => {
-                self.note_scanner(ScannerLink::Trouble, Some(reason.clone()));
+                station.note(ScannerLink::Trouble, Some(reason.clone()));
             }
-            _ => self.note_scanner(ScannerLink::Ready, None),
+            _ => station.note(ScannerLink::Ready, None),
         }
         self.hub.tell(Event::Scan(scan));
     }
 
     /// One scan, as it stands.
     pub(crate) fn scan(&self, id: &str) -> Result<Scan, ServiceError> {
-        if let Some(scan) = self.active_scan().filter(|scan| scan.id == id) {
+        if let Some(scan) = self.active_scans().find(|scan| scan.id == id) {
             return Ok(scan);
         }
         let unkept = lock(&self.unkept)
@@ -281,7 +248,7 @@ impl Service {
         let newer: Vec<Scan> = lock(&self.unkept)
             .iter()
             .cloned()
-            .chain(self.active_scan())
+            .chain(self.active_scans())
             .collect();
         let mut scans = self.store.scans()?;
         scans.reverse();
@@ -298,12 +265,14 @@ impl Service {
 mod tests {
     use super::*;
     use crate::config::Config;
+    use crate::events::Hub;
     use crate::laser::Laser;
     use crate::service::Kept;
     use crate::spool::Spool;
     use crate::store::Store;
     use crate::tokens::Tokens;
     use range_image::{Calibration, calibration::Head};
+    use relief_api::THE_SCANNER;
     use scan_record::{Header, JournalWriter, RawColumn};
     use scanner_driver::{DeviceStatus, ScanStream, Scanner};
     use scanner_protocol::{Identity, ScanPlan};
@@ -333,15 +302,20 @@ mod tests {
     #[test]
     fn a_scan_cut_short_by_a_crash_is_found_with_its_columns() {
         let folder = tempfile::tempdir().unwrap();
+        let config = Config::default();
+        let hub = Arc::new(Hub::default());
+        let laser = Laser::open(folder.path(), THE_SCANNER).unwrap();
+        let configured = config.each_scanner()[0];
+        let station = Station::new(configured, Arc::new(Absent), laser, Arc::clone(&hub));
         let service = Service::new(
-            Config::default(),
-            Arc::new(Absent),
+            config,
+            vec![Arc::new(station)],
+            hub,
             Kept {
                 disk: Arc::new(LocalDisk),
                 store: Store::open(Arc::new(LocalDisk), &folder.path().join("store")).unwrap(),
                 spool: Spool::open(Arc::new(LocalDisk), &folder.path().join("spool")).unwrap(),
                 tokens: Tokens::open(&folder.path().join("tokens.json")).unwrap(),
-                laser: Laser::open(&folder.path().join("laser.jsonl")).unwrap(),
             },
             folder.path().to_owned(),
         );
@@ -351,6 +325,7 @@ mod tests {
             part: String::new(),
             operator: String::new(),
             note: String::new(),
+            scanner: String::new(),
             state: ScanState::Scanning,
             reason: None,
             started_at: now(),
@@ -395,7 +370,11 @@ mod tests {
         );
         let service = Arc::new(service);
         let error = service.start_scan(&StartScan::default()).unwrap_err();
-        assert!(matches!(error, ServiceError::Scanner(ScannerError::Closed)));
-        assert!(!service.is_scanning(), "the slot is free again");
+        let ServiceError::Scanner { section, error } = error else {
+            panic!("{error}");
+        };
+        assert!(matches!(error, ScannerError::Closed));
+        assert_eq!(section, "scanner");
+        assert!(!service.stations[0].is_scanning(), "the slot is free again");
     }
 }

@@ -3,25 +3,22 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, RwLock};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 use regrid::RegridSettings;
-use relief_api::{Event, Scan, ScannerLink, ScannerStatus, Status};
-use scanner_driver::Scanner;
-use scanner_protocol::Identity;
+use relief_api::{LaserEntry, Scan, ScannerList, Status};
 use storage::Disk;
 
-use crate::acquisition::describe_trouble;
 use crate::config::{Config, Reloaded};
 use crate::error::ServiceError;
 use crate::events::Hub;
 use crate::ids::{Ids, now};
 use crate::jobs::Queue;
-use crate::laser::{Laser, Watched};
+use crate::laser::MOST_SHOWN;
 use crate::liveness::Liveness;
-use crate::scans::Slot;
+use crate::space::Promises;
 use crate::spool::Spool;
+use crate::station::Station;
 use crate::store::Store;
 use crate::tokens::Tokens;
 
@@ -31,29 +28,25 @@ pub(crate) struct Kept {
     pub(crate) store: Store,
     pub(crate) spool: Spool,
     pub(crate) tokens: Tokens,
-    pub(crate) laser: Laser,
 }
 
 /// What all parts of the service share.
 pub(crate) struct Service {
-    pub(crate) scanner: Arc<dyn Scanner>,
+    /// In the order of their names; at least one.
+    pub(crate) stations: Vec<Arc<Station>>,
     /// Where everything is kept that must survive.
     pub(crate) disk: Arc<dyn Disk>,
     pub(crate) store: Store,
     pub(crate) spool: Spool,
     pub(crate) tokens: Tokens,
-    pub(crate) laser: Arc<Laser>,
-    pub(crate) hub: Hub,
+    pub(crate) hub: Arc<Hub>,
     pub(crate) ids: Ids,
     pub(crate) queue: Queue,
     pub(crate) liveness: Liveness,
-    /// The scan under way, if any.
-    pub(crate) slot: Mutex<Slot>,
-    /// Threads of scans; all but the last are about to end, if they have not yet.
-    pub(crate) scan_threads: Mutex<Vec<JoinHandle<()>>>,
+    /// Room on the disk that scans under way may still take.
+    pub(crate) promises: Arc<Promises>,
     config: RwLock<Arc<Config>>,
     scans_dir: PathBuf,
-    scanner_status: Mutex<ScannerStatus>,
     grids: Mutex<BTreeMap<String, KeptGrid>>,
     /// Scans that are over and whose records the disk refused.
     pub(crate) unkept: Mutex<Vec<Scan>>,
@@ -74,7 +67,8 @@ pub(crate) struct KeptGrid {
 impl Service {
     pub(crate) fn new(
         config: Config,
-        scanner: Arc<dyn Scanner>,
+        stations: Vec<Arc<Station>>,
+        hub: Arc<Hub>,
         kept: Kept,
         scans_dir: PathBuf,
     ) -> Self {
@@ -83,33 +77,20 @@ impl Service {
             store,
             spool,
             tokens,
-            laser,
         } = kept;
-        let endpoint = config.scanner.place();
-        let laser = Arc::new(laser);
         Self {
-            scanner: Arc::new(Watched::new(scanner, Arc::clone(&laser))),
+            stations,
             disk,
             store,
             spool,
             tokens,
-            laser,
-            hub: Hub::default(),
+            hub,
             ids: Ids::default(),
             queue: Queue::default(),
             liveness: Liveness::default(),
-            slot: Mutex::new(Slot::Free),
-            scan_threads: Mutex::default(),
+            promises: Arc::default(),
             config: RwLock::new(Arc::new(config)),
             scans_dir,
-            scanner_status: Mutex::new(ScannerStatus {
-                link: ScannerLink::Unknown,
-                endpoint,
-                model: None,
-                serial: None,
-                firmware: None,
-                problem: None,
-            }),
             grids: Mutex::default(),
             unkept: Mutex::default(),
             kept_bytes: Mutex::default(),
@@ -135,17 +116,58 @@ impl Service {
     /// The service at a glance.
     pub(crate) fn status(&self) -> Status {
         let (jobs_queued, jobs_running) = self.queue.counts();
+        let scanners = self.scanners().scanners;
+        // There is at least one.
+        let first = scanners[0].clone();
         Status {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             started_at: self.started_at.clone(),
-            scanner: self.scanner_status(),
-            laser: self.laser.latest().map(Box::new),
-            scan: self.active_scan(),
+            scanner: first.status,
+            scanners,
+            laser: first.laser,
+            scan: first.scan,
             jobs_queued,
             jobs_running,
             spool: self.spool.root().display().to_string(),
             storage: Some(Box::new(self.storage_status())),
         }
+    }
+
+    /// The scanners at a glance.
+    pub(crate) fn scanners(&self) -> ScannerList {
+        ScannerList {
+            scanners: self.stations.iter().map(|s| s.summary()).collect(),
+        }
+    }
+
+    /// The station of this name; of an empty name, the only one.
+    pub(crate) fn station(&self, name: &str) -> Result<&Arc<Station>, ServiceError> {
+        let found = match (&*self.stations, name) {
+            ([only], "") => Some(only),
+            (all, _) => all.iter().find(|station| station.name() == name),
+        };
+        found.ok_or_else(|| {
+            let known = self.stations.iter().map(|s| s.name().to_owned()).collect();
+            match name {
+                "" => ServiceError::WhichScanner { known },
+                _ => ServiceError::NoSuchScanner {
+                    name: name.to_owned(),
+                    known,
+                },
+            }
+        })
+    }
+
+    /// The latest changes of all lasers, oldest first.
+    pub(crate) fn laser_entries(&self) -> Vec<LaserEntry> {
+        let mut all: Vec<LaserEntry> = Vec::new();
+        for station in &self.stations {
+            all.extend(station.laser.entries());
+        }
+        // Times are of one length and in UTC; those of one laser are in order already.
+        all.sort_by(|a, b| a.at.cmp(&b.at));
+        all.drain(..all.len().saturating_sub(MOST_SHOWN));
+        all
     }
 
     /// Folder of the kept scans.
@@ -185,44 +207,6 @@ impl Service {
         for scan in grids.keys() {
             remove_if_there(&self.grid_path(scan));
         }
-    }
-
-    /// What is known of the scanner.
-    pub(crate) fn scanner_status(&self) -> ScannerStatus {
-        lock(&self.scanner_status).clone()
-    }
-
-    /// Notes who the scanner is.
-    pub(crate) fn note_identity(&self, identity: &Identity) {
-        self.change_scanner(|status| {
-            status.model = Some(identity.model.as_str().to_owned());
-            status.serial = Some(identity.serial.as_str().to_owned());
-            status.firmware = Some(identity.firmware.as_str().to_owned());
-        });
-    }
-
-    /// Notes how the scanner does.
-    pub(crate) fn note_scanner(&self, link: ScannerLink, problem: Option<String>) {
-        self.change_scanner(|status| {
-            status.link = link;
-            status.problem = problem;
-        });
-    }
-
-    fn change_scanner(&self, change: impl FnOnce(&mut ScannerStatus)) {
-        let status = {
-            let mut status = lock(&self.scanner_status);
-            let before = status.clone();
-            change(&mut status);
-            if *status == before {
-                return;
-            }
-            status.clone()
-        };
-        if let Some(problem) = describe_trouble(&status) {
-            tracing::warn!(endpoint = %status.endpoint, %problem, "scanner in trouble");
-        }
-        self.hub.tell(Event::Scanner(status));
     }
 
     /// Refuses new work once the service stops.

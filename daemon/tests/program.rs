@@ -180,3 +180,23 @@ fn a_wrong_configuration_is_told_by_an_exit_code_of_its_own() {
         assert!(said.contains("did you mean `baud`"), "{said}");
     }
 }
+
+#[test]
+fn a_look_at_the_configuration_tells_of_each_of_several_scanners() {
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
+    let told = |name: &str| {
+        let output = Command::new(env!("CARGO_BIN_EXE_reliefd"))
+            .current_dir(&config)
+            .args(["--check-config", "--config", name])
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(0));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    assert_eq!(told("serial.toml"), "serial.toml: sound\n");
+    assert_eq!(
+        told("two-scanners.toml"),
+        "two-scanners.toml: sound\nscanner left: /dev/relief/scanner-000123\n\
+         scanner right: USB 1209:0001, serial 000124\n"
+    );
+}

@@ -12,7 +12,7 @@ use crate::status::{ScannerStatus, Status};
 pub enum Event {
     /// First on every stream, so that nothing is missed between asking and listening.
     Status(Box<Status>),
-    /// The scanner was reached, lost, or got into trouble.
+    /// A scanner was reached, lost, or got into trouble.
     Scanner(ScannerStatus),
     /// A scan began or changed its state.
     Scan(Scan),
@@ -20,6 +20,9 @@ pub enum Event {
     Column {
         /// The scan.
         scan: String,
+        /// Name of the scanner; empty from services that had but one.
+        #[serde(default, skip_serializing_if = "String::is_empty")]
+        scanner: String,
         /// Columns on disk so far.
         columns: u32,
         /// Columns planned.

@@ -36,6 +36,9 @@ pub struct LaserEntry {
     pub laser: LaserState,
     /// Why, in words.
     pub cause: String,
+    /// Name of the scanner whose laser it is; empty from services that had but one.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub scanner: String,
     /// The scan for whose sake.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scan: Option<String>,

@@ -8,14 +8,21 @@
 //! | method and path | request | reply |
 //! | --- | --- | --- |
 //! | `GET /v1/status` | | [`Status`] |
-//! | `GET /v1/laser` | | [`LaserLog`], the latest 1000 |
+//! | `GET /v1/scanners` | | [`ScannerList`] |
+//! | `GET /v1/scanners/{scanner}` | | [`ScannerSummary`] |
+//! | `POST /v1/scanners/{scanner}/abort` | | the scan that was running there: [`Scan`] |
+//! | `POST /v1/scanners/{scanner}/resume` | | the scan that was paused there: [`Scan`] |
+//! | `GET /v1/scanners/{scanner}/laser` | | [`LaserLog`], the latest 1000 |
+//! | `GET /v1/laser` | | [`LaserLog`], the latest 1000 of all scanners |
 //! | `GET /v1/scans` | | [`ScanList`], newest first |
 //! | `POST /v1/scans` | [`StartScan`] | 202 [`Scan`] |
 //! | `GET /v1/scans/{scan}` | | [`Scan`] |
 //! | `POST /v1/scans/{scan}/abort` | | [`Scan`] |
 //! | `POST /v1/scans/{scan}/rerun` | [`Rerun`] | 202 [`Job`] |
 //! | `GET /v1/scans/{scan}/journal` | | the kept raw columns, a `.scan` file |
-//! | `POST /v1/abort` | | the scan that was running: [`Scan`] |
+//! | `POST /v1/scans/{scan}/resume` | | [`Scan`] |
+//! | `POST /v1/abort` | | the scans that were running, on every scanner: [`Aborted`] |
+//! | `POST /v1/resume` | | the scan that was paused: [`Scan`] |
 //! | `GET /v1/jobs` | | [`JobList`], newest first |
 //! | `GET /v1/jobs/{job}` | | [`Job`] |
 //! | `POST /v1/jobs/{job}/retry` | | 202 [`Job`] |
@@ -44,7 +51,9 @@ pub use job::{Job, JobId, JobList, JobState, Rerun, SpoolEntry, SpoolFile, Stage
 pub use laser::{LaserEntry, LaserLog, LaserState};
 pub use problem::Problem;
 pub use scan::{
-    MAX_NAME_CHARS, PlanRequest, Scan, ScanList, ScanState, SettingOverrides, StartScan,
+    Aborted, MAX_NAME_CHARS, PlanRequest, Scan, ScanList, ScanState, SettingOverrides, StartScan,
 };
-pub use status::{ScannerLink, ScannerStatus, Status, StorageStatus};
+pub use status::{
+    ScannerLink, ScannerList, ScannerStatus, ScannerSummary, Status, StorageStatus, THE_SCANNER,
+};
 pub use token::{CreateToken, MAX_TOKEN_NAME_CHARS, NewToken, Token, TokenList};

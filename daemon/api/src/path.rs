@@ -14,9 +14,19 @@ pub const SCAN_RESUME: &str = "/v1/scans/{scan}/resume";
 pub const SCAN_RERUN: &str = "/v1/scans/{scan}/rerun";
 /// Pattern of a scan's journal.
 pub const SCAN_JOURNAL: &str = "/v1/scans/{scan}/journal";
-/// Aborts whatever scan is running.
+/// The scanners.
+pub const SCANNERS: &str = "/v1/scanners";
+/// Pattern of one scanner.
+pub const SCANNER: &str = "/v1/scanners/{scanner}";
+/// Pattern of the abort of a scanner's scan.
+pub const SCANNER_ABORT: &str = "/v1/scanners/{scanner}/abort";
+/// Pattern of letting a scanner's paused scan go on.
+pub const SCANNER_RESUME: &str = "/v1/scanners/{scanner}/resume";
+/// Pattern of the log of a scanner's laser.
+pub const SCANNER_LASER: &str = "/v1/scanners/{scanner}/laser";
+/// Aborts whatever scan is running, on every scanner.
 pub const ABORT: &str = "/v1/abort";
-/// Lets whatever scan is paused go on.
+/// Lets the paused scan go on; refused where several are paused.
 pub const RESUME: &str = "/v1/resume";
 /// The jobs.
 pub const JOBS: &str = "/v1/jobs";
@@ -30,7 +40,7 @@ pub const JOB_CANCEL: &str = "/v1/jobs/{job}/cancel";
 pub const SPOOL: &str = "/v1/spool/{result}";
 /// Pattern of one file of the spool.
 pub const SPOOL_FILE: &str = "/v1/spool/{result}/{file}";
-/// The log of the laser.
+/// The log of the lasers.
 pub const LASER: &str = "/v1/laser";
 /// The tokens; on the socket only.
 pub const TOKENS: &str = "/v1/tokens";
@@ -67,6 +77,30 @@ pub fn scan_rerun(id: &str) -> String {
 #[must_use]
 pub fn scan_journal(id: &str) -> String {
     scan(id) + "/journal"
+}
+
+/// One scanner.
+#[must_use]
+pub fn scanner(name: &str) -> String {
+    format!("{SCANNERS}/{}", segment(name))
+}
+
+/// Abort of a scanner's scan.
+#[must_use]
+pub fn scanner_abort(name: &str) -> String {
+    scanner(name) + "/abort"
+}
+
+/// Letting a scanner's paused scan go on.
+#[must_use]
+pub fn scanner_resume(name: &str) -> String {
+    scanner(name) + "/resume"
+}
+
+/// Log of a scanner's laser.
+#[must_use]
+pub fn scanner_laser(name: &str) -> String {
+    scanner(name) + "/laser"
 }
 
 /// One job.

@@ -29,6 +29,9 @@ pub struct StartScan {
     /// Anything else; carried into the report.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub note: String,
+    /// Name of the scanner; needed where there are several.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub scanner: String,
     /// What to measure, where it differs from the configured plan.
     #[serde(skip_serializing_if = "PlanRequest::is_empty")]
     pub plan: PlanRequest,
@@ -163,6 +166,10 @@ pub struct Scan {
     /// Anything else.
     #[serde(default)]
     pub note: String,
+    /// Name of the scanner; empty in records from before scanners had names, when there was
+    /// but one.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub scanner: String,
     /// Where it stands.
     pub state: ScanState,
     /// What went wrong, or who ended it; of a paused scan, why.
@@ -188,6 +195,17 @@ pub struct Scan {
     /// When its columns were removed to make room, RFC 3339; it cannot be run again.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub removed_at: Option<String>,
+}
+
+/// The scans that were asked to end: read as a [`Scan`], it is the first of them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Aborted {
+    /// The first of them, in the order of the scanners.
+    #[serde(flatten)]
+    pub scan: Scan,
+    /// Those of other scanners.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub others: Vec<Scan>,
 }
 
 /// The scans.

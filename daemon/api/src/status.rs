@@ -12,8 +12,11 @@ pub struct Status {
     pub version: String,
     /// Since when it runs, RFC 3339 in UTC.
     pub started_at: String,
-    /// The scanner.
+    /// The scanner; of several the first, as in `laser` and `scan`.
     pub scanner: ScannerStatus,
+    /// Every scanner, in the order of their names; empty from services that had but one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub scanners: Vec<ScannerSummary>,
     /// The laser, since its latest change; absent until the scanner was first asked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub laser: Option<Box<LaserEntry>>,
@@ -73,9 +76,15 @@ impl ScannerLink {
     }
 }
 
-/// What is known of the scanner.
+/// Name of the only scanner, unless the configuration gives it another.
+pub const THE_SCANNER: &str = "scanner";
+
+/// What is known of a scanner.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScannerStatus {
+    /// Its name; empty from services that had but one.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub name: String,
     /// How the service stands with it.
     pub link: ScannerLink,
     /// Where it is attached, such as a serial port.
@@ -92,4 +101,25 @@ pub struct ScannerStatus {
     /// What is wrong, when something is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub problem: Option<String>,
+}
+
+/// A scanner at a glance.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ScannerSummary {
+    /// What is known of it.
+    #[serde(flatten)]
+    pub status: ScannerStatus,
+    /// Its laser, since its latest change; absent until the scanner was first asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub laser: Option<Box<LaserEntry>>,
+    /// Its scan under way.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scan: Option<Scan>,
+}
+
+/// The scanners.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct ScannerList {
+    /// In the order of their names; at least one.
+    pub scanners: Vec<ScannerSummary>,
 }

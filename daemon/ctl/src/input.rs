@@ -205,6 +205,7 @@ fn journal(reader: impl BufRead, name: &str) -> Result<Input, Failure> {
             .unwrap_or_else(|| spacing_y(&columns)),
         scan: ScanReport {
             id: kept.as_ref().map(|scan| scan.id.clone()),
+            scanner: kept.as_ref().and_then(|scan| text(&scan.scanner)),
             source,
             operator: kept.as_ref().and_then(|scan| text(&scan.operator)),
             part: kept.as_ref().and_then(|scan| text(&scan.part)),

@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+use relief_api::THE_SCANNER;
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -61,6 +62,37 @@ pub(crate) fn table(
     lines.join("\n")
 }
 
+/// The same of things that scanners did; their names come in at column `at`, unless nobody has
+/// given the only scanner one.
+pub(crate) fn of_scanners<'a>(
+    heading: &[&str],
+    at: usize,
+    numbers: &[usize],
+    lines: impl Iterator<Item = (&'a str, Vec<String>)>,
+) -> String {
+    let lines: Vec<(&str, Vec<String>)> = lines.collect();
+    let named = |(name, _): &(&str, Vec<String>)| !matches!(*name, "" | THE_SCANNER);
+    if !lines.iter().any(named) {
+        return table(heading, numbers, lines.into_iter().map(|(_, line)| line));
+    }
+    let mut heading = heading.to_vec();
+    heading.insert(at, "SCANNER");
+    let numbers: Vec<usize> = numbers.iter().map(|&n| n + usize::from(n >= at)).collect();
+    let lines = lines.into_iter().map(|(name, mut line)| {
+        line.insert(at, name.to_owned());
+        line
+    });
+    table(&heading, &numbers, lines)
+}
+
+/// A scanner in a sentence; one that nobody has named is "scanner".
+pub(crate) fn scanner(name: &str) -> String {
+    match name {
+        "" | THE_SCANNER => "scanner".to_owned(),
+        name => format!("scanner {name}"),
+    }
+}
+
 /// "1 job", "3 jobs".
 pub(crate) fn counted(number: usize, noun: &str) -> String {
     let ending = if number == 1 { "" } else { "s" };
@@ -76,5 +108,20 @@ mod tests {
         let lines = [["a", "5", "x"], ["long", "123", ""]].map(|l| l.map(String::from).to_vec());
         let table = table(&["name", "n", "note"], &[1], lines);
         assert_eq!(table, "name     n   note\na        5   x\nlong   123");
+    }
+
+    #[test]
+    fn scanners_are_told_apart_where_they_have_names() {
+        let told = |scanners: [&'static str; 2]| {
+            let line = |n: &str| vec![n.to_owned(), "7".to_owned()];
+            let lines = scanners.into_iter().zip([line("a"), line("b")]);
+            of_scanners(&["SCAN", "COLUMNS"], 1, &[1], lines)
+        };
+        let without = "SCAN   COLUMNS\na            7\nb            7";
+        assert_eq!(told(["", "scanner"]), without);
+        assert_eq!(
+            told(["left", "scanner"]),
+            "SCAN   SCANNER   COLUMNS\na      left            7\nb      scanner         7"
+        );
     }
 }

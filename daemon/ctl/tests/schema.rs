@@ -280,6 +280,78 @@ async fn what_the_clients_of_the_service_tell() {
     daemon.shutdown().await;
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_told_of_several_scanners() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let sims = [1, 2].map(|seed| {
+        let sim = SimConfig {
+            overrides: Overrides {
+                columns: Some(60),
+                samples: Some(64),
+                ..Overrides::default()
+            },
+            seed,
+            ..SimConfig::default()
+        };
+        sim.serve_pty(None).unwrap()
+    });
+    let mut config = Config::default();
+    config.service.socket = at.join("s");
+    config.service.state_dir = at.join("state");
+    config.service.spool_dir = at.join("spool");
+    for (name, sim) in ["left", "right"].into_iter().zip(&sims) {
+        // So that each scan is under way when the other begins.
+        sim.control().step_columns(Some(5));
+        let mut scanner = config.scanner.clone();
+        scanner.port = sim.port().to_owned();
+        config.scanners.insert(name.into(), scanner);
+    }
+    let daemon = Daemon::start(config).await.unwrap();
+    let told = async |arguments: &[&str]| {
+        let told = ask(at, daemon.socket(), arguments).await;
+        let reference = format!("commands.schema.json#/$defs/{}", arguments[0]);
+        check(&reference, &told);
+        told
+    };
+    let socket = daemon.socket().to_str().unwrap();
+    let refused = run(at, &[], &["scan", "--socket", socket]).await;
+    assert_eq!(refused.status.code(), Some(1));
+    let words = String::from_utf8_lossy(&refused.stderr);
+    assert!(words.contains("none is named: left, right"), "{words}");
+    for name in ["left", "right"] {
+        let scanned = told(&["scan", "--scanner", name]).await;
+        assert_eq!(scanned["scan"]["scanner"], name);
+    }
+    let status = told(&["status"]).await;
+    for (index, name) in ["left", "right"].into_iter().enumerate() {
+        assert_eq!(status["scanners"][index]["name"], name);
+        assert_eq!(status["scanners"][index]["scan"]["scanner"], name);
+    }
+    assert_eq!(status["scan"], status["scanners"][0]["scan"]);
+    let shown = run(at, &[], &["status", "--socket", socket]).await;
+    let shown = String::from_utf8_lossy(&shown.stdout);
+    assert!(shown.contains("scanner   left, ") && shown.contains("scanner   right, "));
+    let aborted = told(&["abort", "--all"]).await;
+    assert_eq!(aborted["scanner"], "left");
+    assert_eq!(aborted["others"][0]["scanner"], "right");
+    for name in ["left", "right"] {
+        let laser = told(&["laser", "--scanner", name]).await;
+        let entries = laser["entries"].as_array().unwrap();
+        assert!(entries.iter().all(|entry| entry["scanner"] == name));
+        assert_eq!(entries.last().unwrap()["laser"], "off");
+    }
+    told(&["scans"]).await;
+    let both = run(
+        at,
+        &[],
+        &["abort", "--all", "--scanner", "left", "--socket", socket],
+    )
+    .await;
+    assert_eq!(both.status.code(), Some(2));
+    daemon.shutdown().await;
+}
+
 /// A command with an environment of its own, run while the service answers.
 async fn run(at: &Path, environment: &[(&str, &str)], arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_relief"));

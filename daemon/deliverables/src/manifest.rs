@@ -16,6 +16,9 @@ pub struct Manifest {
     pub name: String,
     /// When the scan was taken, RFC 3339.
     pub timestamp: String,
+    /// Name of the scanner in the service, where it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scanner: Option<String>,
     /// Every file but the manifest itself, in the order in which they were written.
     pub files: Vec<ManifestFile>,
     /// Versions of the programs that took part, by name.

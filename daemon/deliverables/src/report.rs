@@ -52,6 +52,10 @@ pub struct Report {
 pub struct ScanReport {
     /// Identity of the scan in the service; absent for converted files.
     pub id: Option<String>,
+    /// Name of the scanner in the service; absent for converted files, and for scans from
+    /// before scanners had names.
+    #[serde(default)]
+    pub scanner: Option<String>,
     /// The scanner (model and serial number) or the file.
     pub source: String,
     /// Who took the scan.

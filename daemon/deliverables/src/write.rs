@@ -154,6 +154,7 @@ pub fn write(
     let manifest = Manifest {
         name: report.name.clone(),
         timestamp: report.timestamp.clone(),
+        scanner: report.scan.scanner.clone(),
         files: files.clone(),
         versions: report.versions.clone(),
         seed: report.settings.seed,

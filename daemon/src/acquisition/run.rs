@@ -27,6 +27,8 @@ use crate::config::{JournalConfig, Processing};
 use crate::error::panic_text;
 use crate::liveness::Pulse;
 use crate::service::{KeptGrid, Service};
+use crate::space::Promise;
+use crate::station::Station;
 
 /// How often a scan is begun: a line that loses words may need more than one attempt.
 const START_ATTEMPTS: u32 = 3;
@@ -36,10 +38,13 @@ const CHANNEL_COLUMNS: usize = 64;
 
 /// Everything a scan needs to know at its start.
 pub(crate) struct Ticket {
+    pub(crate) station: Arc<Station>,
     pub(crate) scan: Scan,
     pub(crate) plan: ResolvedPlan,
     pub(crate) identity: Identity,
     pub(crate) processing: Processing,
+    /// Room on the disk for its columns.
+    pub(crate) room: Promise,
     pub(crate) abort: Arc<AbortRequest>,
 }
 
@@ -47,7 +52,8 @@ pub(crate) struct Ticket {
 /// scan's state.
 pub(crate) fn run(service: &Arc<Service>, ticket: Ticket) {
     let id = ticket.scan.id.clone();
-    let pulse = service.liveness.begin("scan");
+    let station = Arc::clone(&ticket.station);
+    let pulse = service.liveness.begin(station.loop_name("scan"));
     // A defect in the taking of one scan must not keep the scanner busy for ever. What the
     // panic passes on its way drops the stream, which turns the laser off.
     let outcome =
@@ -69,19 +75,21 @@ pub(crate) fn run(service: &Arc<Service>, ticket: Ticket) {
             tracing::warn!(scan = %id, state = state.as_str(), %reason, "scan ended early")
         }
     }
-    service.end_scan(&id, state, reason);
+    // What it did not take is free for the next scan, which may begin once this one has ended.
+    drop(ticket.room);
+    service.end_scan(&station, &id, state, reason);
 }
 
 /// The text of an error is the scan's reason.
 fn take(service: &Arc<Service>, ticket: &Ticket, pulse: &Pulse) -> Result<(), String> {
-    let longest = service.config().scanner.longest_wait();
-    pulse.work(longest);
+    let station = &*ticket.station;
+    pulse.work(station.longest_wait);
     let text = |error: ScannerError| error.to_string();
     let check_abort = || match ticket.abort.reason() {
         Some(reason) => Err(reason),
         None => Ok(()),
     };
-    let scanner = &*service.scanner;
+    let scanner = &*station.scanner;
     check_abort()?;
     let mut attempts = 1;
     let stream = loop {
@@ -100,9 +108,14 @@ fn take(service: &Arc<Service>, ticket: &Ticket, pulse: &Pulse) -> Result<(), St
     // the stream turns the laser off.
     check_abort()?;
     let info = stream.info();
-    tracing::info!(scan = %ticket.scan.id, columns = info.columns, "scan begins");
-    service.note_scanner(ScannerLink::Scanning, None);
-    let scan = service.update_active(|scan| {
+    tracing::info!(
+        scan = %ticket.scan.id,
+        scanner = station.name(),
+        columns = info.columns,
+        "scan begins"
+    );
+    station.note(ScannerLink::Scanning, None);
+    let scan = station.update_active(|scan| {
         scan.columns_planned = info.columns;
         scan.state = ScanState::Scanning;
     });
@@ -158,6 +171,7 @@ fn header(ticket: &Ticket, sample_spacing_mm: f64) -> Header {
 /// What a column meets on its way.
 struct Keeper<'a> {
     service: &'a Service,
+    station: &'a Station,
     id: &'a str,
     abort: &'a AbortRequest,
     policy: JournalConfig,
@@ -208,6 +222,7 @@ impl<'a> Keeper<'a> {
             .ok();
         Ok(Self {
             service,
+            station: &ticket.station,
             id,
             abort: &ticket.abort,
             policy: service.config().journal,
@@ -218,13 +233,13 @@ impl<'a> Keeper<'a> {
     }
 
     fn keep_all(mut self, stream: ScanStream, pulse: &Pulse) -> Result<(), String> {
-        let service = self.service;
+        let (service, station) = (self.service, self.station);
         let acknowledger = stream.acknowledger();
         let (sender, receiver) = sync_channel(CHANNEL_COLUMNS);
         let result = std::thread::scope(|scope| {
             let feeder = std::thread::Builder::new()
-                .name("scan-feed".into())
-                .spawn_scoped(scope, move || feed(service, stream, &sender))
+                .name(station.loop_name("scan-feed"))
+                .spawn_scoped(scope, move || feed(service, station, stream, &sender))
                 .map_err(|error| format!("cannot start a thread: {error}"))?;
             let result = self.drain(&receiver, pulse, &|index| acknowledger.acknowledge(index));
             // With the receiver gone the feeder ends at its next column; an abort wakes a
@@ -232,7 +247,7 @@ impl<'a> Keeper<'a> {
             drop(receiver);
             if result.is_err()
                 && !feeder.is_finished()
-                && let Err(error) = self.service.scanner.abort()
+                && let Err(error) = station.scanner.abort()
             {
                 tracing::warn!(%error, "cannot tell the scanner to stop");
             }
@@ -259,7 +274,6 @@ impl<'a> Keeper<'a> {
         pulse: &Pulse,
         acknowledge: &dyn Fn(u32),
     ) -> Result<(), String> {
-        let longest = self.service.config().scanner.longest_wait();
         let mut batch: Vec<RawColumn> = Vec::new();
         let mut due = Instant::now();
         loop {
@@ -269,7 +283,7 @@ impl<'a> Keeper<'a> {
             } else {
                 receiver.recv_timeout(due.saturating_duration_since(Instant::now()))
             };
-            pulse.work(longest);
+            pulse.work(self.station.longest_wait);
             match fed {
                 Ok(Fed::Column(column)) => {
                     if batch.is_empty() {
@@ -284,13 +298,13 @@ impl<'a> Keeper<'a> {
                 Ok(Fed::Paused(reason)) => {
                     self.commit(&mut batch, acknowledge)?;
                     tracing::warn!(scan = self.id, %reason, "scan paused");
-                    self.service.laser.scan_paused(&reason);
+                    self.station.laser.scan_paused(&reason);
                     self.note_pause(Some(reason));
                 }
                 Ok(Fed::Resumed) => {
                     self.commit(&mut batch, acknowledge)?;
                     tracing::info!(scan = self.id, "scan goes on");
-                    self.service.laser.scan_goes_on();
+                    self.station.laser.scan_goes_on();
                     self.note_pause(None);
                 }
                 Ok(Fed::End(end)) => {
@@ -312,8 +326,8 @@ impl<'a> Keeper<'a> {
             Some(_) => (ScanState::Paused, ScannerLink::Trouble),
             None => (ScanState::Scanning, ScannerLink::Scanning),
         };
-        self.service.note_scanner(link, reason.clone());
-        let scan = self.service.update_active(|scan| {
+        self.station.note(link, reason.clone());
+        let scan = self.station.update_active(|scan| {
             scan.state = state;
             scan.reason = reason;
         });
@@ -338,12 +352,13 @@ impl<'a> Keeper<'a> {
         }
         let before = self.journal.columns() - batch.len() as u32;
         for (column, kept) in batch.drain(..).zip(before + 1..) {
-            let scan = self.service.update_active(|scan| scan.columns = kept);
+            let scan = self.station.update_active(|scan| scan.columns = kept);
             let columns_planned = scan.map_or(0, |scan| scan.columns_planned);
             let live = self.regrid(&column);
             if self.service.hub.has_listeners() {
                 self.service.hub.tell(Event::Column {
                     scan: self.id.to_owned(),
+                    scanner: self.station.name().to_owned(),
                     columns: kept,
                     columns_planned,
                     samples: column.samples.len() as u32,
@@ -406,16 +421,15 @@ fn finish_live(service: &Service, id: &str, mut live: Live, wanted: bool) {
 }
 
 /// Moves columns from the driver to the channel until either ends.
-fn feed(service: &Service, mut stream: ScanStream, sender: &SyncSender<Fed>) {
-    let pulse = service.liveness.begin("scan-feed");
-    let longest = service.config().scanner.longest_wait();
+fn feed(service: &Service, station: &Station, mut stream: ScanStream, sender: &SyncSender<Fed>) {
+    let pulse = service.liveness.begin(station.loop_name("scan-feed"));
     let mut paused = false;
     loop {
         // The driver answers in time, if only with an error; a pause lasts as long as it does.
         if paused {
             pulse.rest();
         } else {
-            pulse.work(longest);
+            pulse.work(station.longest_wait);
         }
         let fed = match stream.next_progress() {
             Ok(Some(ScanProgress::Column(column))) => Fed::Column(raw(column)),

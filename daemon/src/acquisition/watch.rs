@@ -7,17 +7,18 @@ use relief_api::{ScannerLink, ScannerStatus};
 use scanner_driver::ScannerError;
 
 use crate::service::Service;
+use crate::station::Station;
 
 /// How often an idle scanner is looked at.
 const INTERVAL: Duration = Duration::from_secs(2);
 
-/// Looks at the scanner until the service stops. Runs on a thread of its own.
-pub(crate) fn watch(service: &Arc<Service>) {
-    let pulse = service.liveness.begin("scanner-watch");
+/// Looks at a scanner until the service stops. Runs on a thread of its own.
+pub(crate) fn watch(service: &Arc<Service>, station: &Station) {
+    let pulse = service.liveness.begin(station.loop_name("scanner-watch"));
     loop {
-        if !service.is_scanning() {
-            pulse.work(service.config().scanner.longest_wait());
-            look(service);
+        if !station.is_scanning() {
+            pulse.work(station.longest_wait);
+            look(station);
             pulse.rest();
         }
         if service.wait_for_stop(INTERVAL) {
@@ -26,10 +27,10 @@ pub(crate) fn watch(service: &Arc<Service>) {
     }
 }
 
-fn look(service: &Service) {
-    let known = service.scanner_status().model.is_some();
+fn look(station: &Station) {
+    let known = station.status().model.is_some();
     let result = if known {
-        service.scanner.status().map(|status| {
+        station.scanner.status().map(|status| {
             if status.faults.is_empty() {
                 Ok(())
             } else {
@@ -37,19 +38,19 @@ fn look(service: &Service) {
             }
         })
     } else {
-        service.scanner.identify().map(|identity| {
-            service.note_identity(&identity);
+        station.scanner.identify().map(|identity| {
+            station.note_identity(&identity);
             Ok(())
         })
     };
     // A scan may have begun while this waited for its answer; then the scan knows better.
-    if service.is_scanning() {
+    if station.is_scanning() {
         return;
     }
     match result {
-        Ok(Ok(())) => service.note_scanner(ScannerLink::Ready, None),
-        Ok(Err(fault)) => service.note_scanner(ScannerLink::Trouble, Some(fault)),
-        Err(error) => service.note_scanner(ScannerLink::Trouble, Some(error.to_string())),
+        Ok(Ok(())) => station.note(ScannerLink::Ready, None),
+        Ok(Err(fault)) => station.note(ScannerLink::Trouble, Some(fault)),
+        Err(error) => station.note(ScannerLink::Trouble, Some(error.to_string())),
     }
 }
 

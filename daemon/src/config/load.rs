@@ -1,10 +1,10 @@
 //! From a file's text to a configuration, or to an error that a person can act on.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::{Config, Transport};
+use super::{Config, scanners};
 use crate::error::bounded;
 
 /// A hundred times what every key with its comment takes.
@@ -75,7 +75,9 @@ impl Config {
         }
         let text = String::from_utf8(bytes)
             .map_err(|error| failed(std::io::Error::new(std::io::ErrorKind::InvalidData, error)))?;
-        Self::parse(&text, path)
+        // Two names may lead to one port; one that is not there is what it is called.
+        let port = |port: &Path| fs::canonicalize(port).unwrap_or_else(|_| port.to_owned());
+        Self::parse_with(&text, path, &port)
     }
 
     /// Reads a configuration from text; `path` is for the messages.
@@ -83,10 +85,26 @@ impl Config {
     /// # Errors
     /// [`ConfigError::Wrong`] and [`ConfigError::Inconsistent`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, ConfigError> {
+        Self::parse_with(text, path, &Path::to_owned)
+    }
+
+    fn parse_with(
+        text: &str,
+        path: &Path,
+        port: &dyn Fn(&Path) -> PathBuf,
+    ) -> Result<Self, ConfigError> {
+        let wrong = |start: usize, message: String| {
+            let (line, column) = line_and_column(text, start);
+            ConfigError::Wrong {
+                path: path.to_owned(),
+                line,
+                column,
+                message: bounded(message),
+            }
+        };
         let config: Self = toml::from_str(text).map_err(|error| {
             let start = error.span().map_or(0, |span| span.start).min(text.len());
             let before = text.get(..start).unwrap_or_default();
-            let line_start = before.rfind('\n').map_or(0, |at| at + 1);
             let mut message = with_nearest_name(error.message());
             if error.message().starts_with("unknown field")
                 && let Some(section) = section_of(before)
@@ -94,47 +112,29 @@ impl Config {
                 message =
                     message.replacen("unknown key", &format!("in [{section}] unknown key"), 1);
             }
-            ConfigError::Wrong {
-                path: path.to_owned(),
-                line: before.matches('\n').count() + 1,
-                column: before[line_start..].chars().count() + 1,
-                message: bounded(message),
-            }
+            wrong(start, message)
         })?;
-        let inconsistent = |(section, message)| ConfigError::Inconsistent {
-            path: path.to_owned(),
-            section,
-            message: bounded(message),
-        };
-        other_transport(text, config.scanner.transport).map_err(inconsistent)?;
-        config.processing().check().map_err(inconsistent)?;
+        scanners::check(text, &config, port).map_err(|(start, message)| wrong(start, message))?;
+        config
+            .processing()
+            .check()
+            .map_err(|(section, message)| ConfigError::Inconsistent {
+                path: path.to_owned(),
+                section,
+                message: bounded(message),
+            })?;
         Ok(config)
     }
 }
 
-/// Refuses keys that belong to the other way of attaching a scanner: they would do nothing.
-fn other_transport(text: &str, transport: Transport) -> Result<(), (&'static str, String)> {
-    const SERIAL: [&str; 2] = ["port", "baud"];
-    const USB: [&str; 3] = ["vendor_id", "product_id", "serial_number"];
-    let (of_the_other, other, own): (&[&str], _, _) = match transport {
-        Transport::Serial => (&USB, "usb", "serial"),
-        Transport::Usb => (&SERIAL, "serial", "usb"),
-    };
-    let given: Option<toml::Table> = toml::from_str(text).ok();
-    let section = given
-        .as_ref()
-        .and_then(|all| all.get("scanner")?.as_table());
-    let Some(key) = section.and_then(|s| of_the_other.iter().find(|key| s.contains_key(**key)))
-    else {
-        return Ok(());
-    };
-    Err((
-        "scanner",
-        format!(
-            "`{key}` is for transport = \"{other}\", but the transport is \"{own}\": \
-             remove it, or change the transport"
-        ),
-    ))
+/// Line and column in characters of a place in a text, each from 1.
+pub(super) fn line_and_column(text: &str, start: usize) -> (usize, usize) {
+    let before = text.get(..start).unwrap_or_default();
+    let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+    (
+        before.matches('\n').count() + 1,
+        before[line_start..].chars().count() + 1,
+    )
 }
 
 /// The section that a place in the file belongs to; `None` on a section's own line.

@@ -1,14 +1,14 @@
 //! Taking over a changed configuration while the service runs.
 
-use super::Config;
+use super::{Config, ScannerConfig};
 
 /// What became of a reload.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Reloaded {
     /// Sections that changed and hold from now on: for scans and reruns begun later.
-    pub applied: Vec<&'static str>,
+    pub applied: Vec<String>,
     /// Sections that changed but only hold after a restart.
-    pub needs_restart: Vec<&'static str>,
+    pub needs_restart: Vec<String>,
 }
 
 impl Config {
@@ -21,14 +21,14 @@ impl Config {
             ($($section:ident),*) => {$(
                 if self.$section != new.$section {
                     merged.$section = new.$section.clone();
-                    outcome.applied.push(stringify!($section));
+                    outcome.applied.push(stringify!($section).to_owned());
                 }
             )*};
         }
         macro_rules! leave {
             ($($section:ident),*) => {$(
                 if self.$section != new.$section {
-                    outcome.needs_restart.push(stringify!($section));
+                    outcome.needs_restart.push(stringify!($section).to_owned());
                 }
             )*};
         }
@@ -41,14 +41,50 @@ impl Config {
             reconstruct,
             deliverables
         );
-        leave!(service, http, scanner, queue);
+        leave!(service, http, queue);
+        merged.scanner = reloaded_scanner("scanner", &self.scanner, &new.scanner, &mut outcome);
+        for (name, scanner) in &self.scanners {
+            let section = format!("scanners.{name}");
+            match new.scanners.get(name) {
+                Some(new) => {
+                    let scanner = reloaded_scanner(&section, scanner, new, &mut outcome);
+                    merged.scanners.insert(name.clone(), scanner);
+                }
+                None => outcome.needs_restart.push(section),
+            }
+        }
+        for name in new.scanners.keys() {
+            if !self.scanners.contains_key(name) {
+                outcome.needs_restart.push(format!("scanners.{name}"));
+            }
+        }
         if self.log.level != new.log.level {
             merged.log.level.clone_from(&new.log.level);
-            outcome.applied.push("log");
+            outcome.applied.push("log".to_owned());
         }
         if self.log.format != new.log.format {
-            outcome.needs_restart.push("log.format");
+            outcome.needs_restart.push("log.format".to_owned());
         }
         (merged, outcome)
     }
+}
+
+/// A scanner stays attached as it is; what it measures may change.
+fn reloaded_scanner(
+    section: &str,
+    old: &ScannerConfig,
+    new: &ScannerConfig,
+    outcome: &mut Reloaded,
+) -> ScannerConfig {
+    let merged = ScannerConfig {
+        scan: new.scan,
+        ..old.clone()
+    };
+    if merged != *old {
+        outcome.applied.push(format!("{section}.scan"));
+    }
+    if merged != *new {
+        outcome.needs_restart.push(section.to_owned());
+    }
+    merged
 }

@@ -26,6 +26,30 @@ pub(super) fn baud<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D:
     bounded(deserializer, 1_200, 12_000_000, " bits per second")
 }
 
+/// Most characters of a scanner's name: it stands in names of files and threads.
+const MOST_NAME_CHARS: usize = 32;
+
+/// Names of scanners stand in names of files, in paths of the API and on command lines.
+pub(super) fn check_scanner_name(name: &str) -> Result<(), String> {
+    let of_file = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
+    let begins = name.starts_with(|c: char| c.is_ascii_alphanumeric());
+    if begins && name.len() <= MOST_NAME_CHARS && name.chars().all(of_file) {
+        return Ok(());
+    }
+    Err(format!(
+        "{name:?} is no name for a scanner: 1 to {MOST_NAME_CHARS} letters (a to z, A to Z), \
+         digits, `-` and `_` are possible, a letter or digit first"
+    ))
+}
+
+pub(super) fn scanner_name<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<String>, D::Error> {
+    let name = String::deserialize(deserializer)?;
+    check_scanner_name(&name).map_err(D::Error::custom)?;
+    Ok(Some(name))
+}
+
 /// A serial number as USB devices have them; an empty one would mean any device, by mistake.
 pub(super) fn serial_number<'de, D: Deserializer<'de>>(
     deserializer: D,

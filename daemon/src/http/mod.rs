@@ -10,6 +10,7 @@ mod guard;
 mod jobs;
 mod listen;
 mod problem;
+mod scanners;
 mod scans;
 mod serve;
 mod stall;
@@ -22,7 +23,7 @@ use axum::extract::State;
 use axum::middleware::from_fn_with_state;
 use axum::response::Json;
 use axum::routing::{any, get, post};
-use relief_api::{LaserLog, Status, path};
+use relief_api::{Status, path};
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
@@ -62,14 +63,19 @@ pub(crate) fn on_loopback(context: &Context) -> Router {
 fn complete(tokens: Router<Context>, context: &Context) -> Router {
     tokens
         .route(path::STATUS, get(status))
-        .route(path::LASER, get(laser))
+        .route(path::LASER, get(scanners::lasers))
+        .route(path::SCANNERS, get(scanners::list))
+        .route(path::SCANNER, get(scanners::get))
+        .route(path::SCANNER_ABORT, post(scans::abort_on))
+        .route(path::SCANNER_RESUME, post(scans::resume_on))
+        .route(path::SCANNER_LASER, get(scanners::laser))
         .route(path::SCANS, get(scans::list).post(scans::start))
         .route(path::SCAN, get(scans::get))
         .route(path::SCAN_ABORT, post(scans::abort))
         .route(path::SCAN_RESUME, post(scans::resume))
         .route(path::SCAN_RERUN, post(scans::rerun))
         .route(path::SCAN_JOURNAL, get(files::journal))
-        .route(path::ABORT, post(scans::abort_any))
+        .route(path::ABORT, post(scans::abort_all))
         .route(path::RESUME, post(scans::resume_any))
         .route(path::JOBS, get(jobs::list))
         .route(path::JOB, get(jobs::get))
@@ -86,12 +92,6 @@ fn complete(tokens: Router<Context>, context: &Context) -> Router {
 
 async fn status(State(context): State<Context>) -> Json<Status> {
     Json(context.service.status())
-}
-
-async fn laser(State(context): State<Context>) -> Json<LaserLog> {
-    Json(LaserLog {
-        entries: context.service.laser.entries(),
-    })
 }
 
 /// Runs something that may block where blocking is allowed.

@@ -84,9 +84,16 @@ impl From<ServiceError> for Refusal {
                 "scanner-busy",
                 Some("wait for its end, or abort it".into()),
             ),
-            ServiceError::Scanner(scanner) => {
-                let (status, kind, hint) = scanner_problem(scanner);
-                (status, kind, hint.map(str::to_owned))
+            ServiceError::NoSuchScanner { .. } => (S::NOT_FOUND, "no-such-scanner", None),
+            ServiceError::WhichScanner { .. } => (
+                S::BAD_REQUEST,
+                "which-scanner",
+                Some("say which one is meant: --scanner, or `scanner` in the request".into()),
+            ),
+            ServiceError::Scanner { section, error } => {
+                let (status, kind, hint) = scanner_problem(error);
+                let hint = hint.map(|hint| hint.replace(" scanner.", &format!(" {section}.")));
+                (status, kind, hint)
             }
             ServiceError::Plan(_) => (S::BAD_REQUEST, "impossible-scan", None),
             ServiceError::Setting(_) => (S::BAD_REQUEST, "wrong-setting", None),
@@ -103,8 +110,16 @@ impl From<ServiceError> for Refusal {
                 Some("wait for its end, or abort it".into()),
             ),
             ServiceError::NothingKept { .. } => (S::CONFLICT, "nothing-kept", None),
-            ServiceError::NothingToAbort => (S::CONFLICT, "nothing-to-abort", None),
+            ServiceError::NothingToAbort { .. } => (S::CONFLICT, "nothing-to-abort", None),
             ServiceError::NothingToResume { .. } => (S::CONFLICT, "nothing-to-resume", None),
+            ServiceError::WhichPaused { .. } => (
+                S::CONFLICT,
+                "which-scan",
+                Some(
+                    "look at the scanner that is to go on, then name it (--scanner) or its scan"
+                        .into(),
+                ),
+            ),
             ServiceError::NoSuchJob { .. } => (
                 S::NOT_FOUND,
                 "no-such-job",
@@ -164,7 +179,8 @@ fn token_problem(error: &TokenError) -> (StatusCode, &'static str, Option<String
     }
 }
 
-/// 503 while the scanner cannot be reached, 502 where it answers with trouble.
+/// 503 while the scanner cannot be reached, 502 where it answers with trouble. Hints name
+/// keys of the section `scanner`, whatever the scanner's own is.
 fn scanner_problem(error: &ScannerError) -> (StatusCode, &'static str, Option<&'static str>) {
     use StatusCode as S;
     match error {

@@ -3,7 +3,7 @@
 use axum::extract::{Path, State};
 use axum::http::StatusCode;
 use axum::response::Json;
-use relief_api::{Job, Rerun, Scan, ScanList, StartScan};
+use relief_api::{Aborted, Job, Rerun, Scan, ScanList, StartScan};
 
 use super::problem::{Body, Refusal};
 use super::{Context, blocking};
@@ -37,13 +37,22 @@ pub(super) async fn abort(
     State(context): State<Context>,
     Path(id): Path<String>,
 ) -> Result<Json<Scan>, Refusal> {
-    blocking(context, move |service| service.abort_scan(Some(&id), ASKED))
+    blocking(context, move |service| service.abort_scan(&id, ASKED))
         .await
         .map(Json)
 }
 
-pub(super) async fn abort_any(State(context): State<Context>) -> Result<Json<Scan>, Refusal> {
-    blocking(context, |service| service.abort_scan(None, ASKED))
+pub(super) async fn abort_all(State(context): State<Context>) -> Result<Json<Aborted>, Refusal> {
+    blocking(context, |service| service.abort_all(ASKED))
+        .await
+        .map(Json)
+}
+
+pub(super) async fn abort_on(
+    State(context): State<Context>,
+    Path(scanner): Path<String>,
+) -> Result<Json<Scan>, Refusal> {
+    blocking(context, move |service| service.abort_on(&scanner, ASKED))
         .await
         .map(Json)
 }
@@ -52,13 +61,22 @@ pub(super) async fn resume(
     State(context): State<Context>,
     Path(id): Path<String>,
 ) -> Result<Json<Scan>, Refusal> {
-    blocking(context, move |service| service.resume_scan(Some(&id)))
+    blocking(context, move |service| service.resume_scan(&id))
         .await
         .map(Json)
 }
 
 pub(super) async fn resume_any(State(context): State<Context>) -> Result<Json<Scan>, Refusal> {
-    blocking(context, |service| service.resume_scan(None))
+    blocking(context, |service| service.resume_any())
+        .await
+        .map(Json)
+}
+
+pub(super) async fn resume_on(
+    State(context): State<Context>,
+    Path(scanner): Path<String>,
+) -> Result<Json<Scan>, Refusal> {
+    blocking(context, move |service| service.resume_on(&scanner))
         .await
         .map(Json)
 }

@@ -398,6 +398,7 @@ fn scan_report(scan: &Scan, header: &Header, kept: &Kept) -> ScanReport {
     let field = |name: &str| identity.get(name).map_or("?", String::as_str);
     ScanReport {
         id: Some(scan.id.clone()),
+        scanner: text(&scan.scanner),
         source: format!("{}, serial number {}", field("model"), field("serial")),
         operator: text(&scan.operator),
         part: text(&scan.part),

@@ -4,6 +4,7 @@
 //! jobs waits, runs or has failed. Range images that were put aside go as soon as the
 //! reserve is touched, since a job can make them again.
 
+mod promise;
 mod sweep;
 
 use std::fs;
@@ -18,6 +19,7 @@ use storage::remove_file_if_there;
 use crate::error::ServiceError;
 use crate::ids::now;
 use crate::service::{Service, lock};
+pub(crate) use promise::{Promise, Promises};
 use sweep::{Kept, surplus};
 
 /// How often the service tries again what the disk refused ...
@@ -38,36 +40,52 @@ pub(crate) fn tidy(service: &Arc<Service>) {
 }
 
 impl Service {
-    /// Refuses a scan for which there is no room, after having made what room can be made.
-    pub(crate) fn check_room(&self, columns: u32, samples: u16) -> Result<(), ServiceError> {
+    /// Promises a scan the room that it may take, after having made what room can be made.
+    /// Refuses one for which there is none beside the scans that are under way.
+    pub(crate) fn promise_room(
+        &self,
+        scan: &str,
+        columns: u32,
+        samples: u16,
+    ) -> Result<Promise, ServiceError> {
         let reserve_bytes = self.config().storage.reserve_bytes();
         let journal_bytes = scan_record::most_bytes(columns, samples.into());
-        let look = || {
-            let folders = [(self.scans_dir(), journal_bytes), (self.spool.root(), 0)];
-            folders.into_iter().try_for_each(|(folder, scan_bytes)| {
-                match self.disk.free_bytes(folder) {
-                    Ok(Some(free_bytes))
-                        if free_bytes < scan_bytes.saturating_add(reserve_bytes) =>
-                    {
-                        Err(ServiceError::NoRoom {
-                            folder: folder.display().to_string(),
-                            scan_bytes,
-                            reserve_bytes,
-                            free_bytes,
-                        })
-                    }
-                    Ok(_) => Ok(()),
-                    Err(source) => Err(ServiceError::Io {
-                        what: format!("the free space of {}", folder.display()),
-                        source,
-                    }),
-                }
+        let journal = self.journal_path(scan);
+        self.promises
+            .make(journal, journal_bytes, |promised_bytes| {
+                let look = || {
+                    let folders = [
+                        (self.scans_dir(), journal_bytes, promised_bytes),
+                        (self.spool.root(), 0, 0),
+                    ];
+                    let mut folders = folders.into_iter();
+                    folders.try_for_each(|(folder, scan_bytes, promised_bytes)| {
+                        let needed = scan_bytes
+                            .saturating_add(promised_bytes)
+                            .saturating_add(reserve_bytes);
+                        match self.disk.free_bytes(folder) {
+                            Ok(Some(free_bytes)) if free_bytes < needed => {
+                                Err(ServiceError::NoRoom {
+                                    folder: folder.display().to_string(),
+                                    scan_bytes,
+                                    reserve_bytes,
+                                    free_bytes,
+                                    promised_bytes,
+                                })
+                            }
+                            Ok(_) => Ok(()),
+                            Err(source) => Err(ServiceError::Io {
+                                what: format!("the free space of {}", folder.display()),
+                                source,
+                            }),
+                        }
+                    })
+                };
+                look().or_else(|_| {
+                    self.sweep();
+                    look()
+                })
             })
-        };
-        look().or_else(|_| {
-            self.sweep();
-            look()
-        })
     }
 
     /// True when so little room is left that what can be done without is done without.

@@ -9,7 +9,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use relief_api::{ScanState, Status};
+use relief_api::{Scan, ScanState, ScannerStatus, Status};
 use sd_notify::NotifyState;
 
 use crate::liveness::Stuck;
@@ -69,8 +69,26 @@ pub(super) async fn run(
 }
 
 fn line(status: &Status) -> String {
-    let scanner = &status.scanner;
-    let mut line = match (&status.scan, &scanner.problem) {
+    let mut line = match status.scanners.as_slice() {
+        several @ [_, _, ..] => several
+            .iter()
+            .map(|one| format!("{}: {}", one.status.name, of_one(&one.status, &one.scan)))
+            .collect::<Vec<_>>()
+            .join("; "),
+        _ => of_one(&status.scanner, &status.scan),
+    };
+    if status.jobs_running + status.jobs_queued > 0 {
+        line += &format!(
+            "; jobs: {} running, {} waiting",
+            status.jobs_running, status.jobs_queued
+        );
+    }
+    // Whatever a device says of itself: another line would be another message to systemd.
+    line.replace(char::is_control, " ")
+}
+
+fn of_one(scanner: &ScannerStatus, scan: &Option<Scan>) -> String {
+    match (scan, &scanner.problem) {
         (Some(scan), _) => {
             let (columns, planned) = (scan.columns, scan.columns_planned);
             let paused = match (scan.state, &scan.reason) {
@@ -82,15 +100,7 @@ fn line(status: &Status) -> String {
         }
         (None, Some(problem)) => format!("no scan; scanner in trouble: {problem}"),
         (None, None) => format!("no scan; scanner {}", scanner.link.as_str()),
-    };
-    if status.jobs_running + status.jobs_queued > 0 {
-        line += &format!(
-            "; jobs: {} running, {} waiting",
-            status.jobs_running, status.jobs_queued
-        );
     }
-    // Whatever a device says of itself: another line would be another message to systemd.
-    line.replace(char::is_control, " ")
 }
 
 #[cfg(test)]

@@ -31,12 +31,12 @@ fn faults_are_told_with_their_line_and_a_way_out() {
         ),
         (
             "[scanner]\ntransport = \"usb\"\nport = \"/dev/ttyUSB0\"\n",
-            "relief.toml, section [scanner]: `port` is for transport = \"serial\", but the \
+            "relief.toml, line 3, column 1: `port` is for transport = \"serial\", but the \
              transport is \"usb\": remove it, or change the transport",
         ),
         (
             "[scanner]\nvendor_id = 0x1209\n",
-            "relief.toml, section [scanner]: `vendor_id` is for transport = \"usb\", but the \
+            "relief.toml, line 2, column 1: `vendor_id` is for transport = \"usb\", but the \
              transport is \"serial\": remove it, or change the transport",
         ),
         (
@@ -47,9 +47,9 @@ fn faults_are_told_with_their_line_and_a_way_out() {
         (
             "[scanner]\ntransport = \"usb\"\nserial = \"1\"\n",
             "relief.toml, line 3, column 1: in [scanner] unknown key `serial`; known are: \
-             transport, port, baud, vendor_id, product_id, serial_number, request_timeout_ms, \
+             name, transport, port, baud, vendor_id, product_id, serial_number, request_timeout_ms, \
              request_attempts, motion_timeout_ms, column_timeout_ms, dead_man_ms, credits, \
-             resume, resume_unattended_s",
+             resume, resume_unattended_s, scan",
         ),
         (
             "[service]\nlisten = \"0.0.0.0:80\"\n",
@@ -172,7 +172,27 @@ fn the_examples_are_sound_and_show_the_defaults() {
         Config::default().scanner.usb().link
     );
 
+    let two = folder.join("two-scanners.toml");
+    let places = |config: &Config| -> Vec<(String, String)> {
+        let all = config.each_scanner();
+        all.iter()
+            .map(|one| (one.name.to_owned(), one.config.place()))
+            .collect()
+    };
+    let expected = [
+        ("left", "/dev/relief/scanner-000123"),
+        ("right", "USB 1209:0001, serial 000124"),
+    ]
+    .map(|(name, place)| (name.to_owned(), place.to_owned()));
+    assert_eq!(places(&Config::load(&two).unwrap()), expected);
+    let two = in_force(&two);
+    assert_eq!(places(&two), expected);
+    assert_eq!(two.scan_on("left").x_first_mm, Some(-60.0));
+    assert_eq!(two.scan_on("right").x_first_mm, None);
+    assert_eq!(two.scan_on("right").pitch_mm, Some(0.5));
+
     let all = in_force(&folder.join("serial.toml"));
+    assert_eq!(all.each_scanner()[0].name, "scanner");
     assert_eq!(all.regrid.neighbours, Some(49));
     assert_eq!(all.journal, Config::default().journal);
     assert_eq!(all.queue, Config::default().queue);
@@ -205,4 +225,154 @@ fn a_reload_says_what_holds_and_what_needs_a_restart() {
     assert_eq!(merged.regrid.seed, Some(7));
     assert_eq!(merged.scanner, old.scanner);
     assert_eq!(old.reloaded(&old).1, reliefd::config::Reloaded::default());
+}
+
+#[test]
+fn several_scanners_are_told_apart_and_faults_with_their_lines() {
+    let port = |name: &str| format!("[scanners.{name}]\nport = \"/dev/{name}\"\n");
+    let config = Config::parse(
+        &format!(
+            "{}[scanners.left.scan]\nsamples = 64\n{}[scan]\nsamples = 32\npitch_mm = 2.0\n",
+            port("left"),
+            port("a-2_B")
+        ),
+        Path::new("relief.toml"),
+    )
+    .unwrap();
+    let all = config.each_scanner();
+    let told: Vec<(&str, String, String)> = all
+        .iter()
+        .map(|s| (s.name, s.section(), s.config.place()))
+        .collect();
+    let of = |name: &'static str| (name, format!("scanners.{name}"), format!("/dev/{name}"));
+    assert_eq!(told, [of("a-2_B"), of("left")]);
+    // What a scanner leaves out is as in [scan].
+    let (left, other) = (config.scan_on("left"), config.scan_on("a-2_B"));
+    assert_eq!((left.samples, left.pitch_mm), (Some(64), Some(2.0)));
+    assert_eq!((other.samples, other.pitch_mm), (Some(32), Some(2.0)));
+    let one = Config::parse("[scanner]\nname = \"mill\"\n", Path::new("c")).unwrap();
+    assert_eq!(one.each_scanner()[0].name, "mill");
+    assert_eq!(one.each_scanner()[0].section(), "scanner");
+    assert_eq!(Config::default().each_scanner()[0].name, "scanner");
+
+    let usb = |name: &str, serial: &str| {
+        format!("[scanners.{name}]\ntransport = \"usb\"\nserial_number = \"{serial}\"\n")
+    };
+    let usb_config = usb("a", "1") + &usb("b", "2");
+    assert!(Config::parse(&usb_config, Path::new("c")).is_ok());
+    for (text, message) in [
+        (
+            format!("{}\n[scanner]\nport = \"p\"\n", port("left")),
+            "line 4, column 2: there are both [scanner] and [scanners]: keep [scanner] for one \
+             scanner, or give each of several a section [scanners.NAME]",
+        ),
+        (
+            format!("[scanner]\n{}", port("left")),
+            "line 2, column 2: there are both [scanner] and [scanners]: keep [scanner] for one \
+             scanner, or give each of several a section [scanners.NAME]",
+        ),
+        (
+            "[scanners]\n".into(),
+            "line 1, column 2: no scanner has a name: give each a section, such as \
+             [scanners.left]",
+        ),
+        (
+            "[scanners]\nport = \"p\"\n".into(),
+            "line 2, column 8: invalid type: string \"p\", expected a section with the keys of \
+             a scanner, such as [scanners.left]",
+        ),
+        (
+            "[scanners.\"../etc\"]\n".into(),
+            "line 1, column 11: \"../etc\" is no name for a scanner: 1 to 32 letters (a to z, A \
+             to Z), digits, `-` and `_` are possible, a letter or digit first",
+        ),
+        (
+            "[scanners.-a]\n".into(),
+            "line 1, column 11: \"-a\" is no name for a scanner: 1 to 32 letters (a to z, A to \
+             Z), digits, `-` and `_` are possible, a letter or digit first",
+        ),
+        (
+            "[scanner]\nname = \"\"\n".into(),
+            "line 2, column 8: \"\" is no name for a scanner: 1 to 32 letters (a to z, A to Z), \
+             digits, `-` and `_` are possible, a letter or digit first",
+        ),
+        (
+            port("left") + "name = \"right\"\n",
+            "line 3, column 1: the name of [scanners.left] is `left`: remove the key `name`",
+        ),
+        (
+            port("left") + "baudd = 9600\n",
+            "line 3, column 1: in [scanners.left] unknown key `baudd`; did you mean `baud`?",
+        ),
+        (
+            port("left") + "vendor_id = 1\n",
+            "line 3, column 1: `vendor_id` is for transport = \"usb\", but the transport is \
+             \"serial\": remove it, or change the transport",
+        ),
+        (
+            port("z") + "[scanners.a]\nbaud = 9600\nport = \"/dev//z\"\n",
+            "line 5, column 1: [scanners.z], line 1, is on the port /dev//z too: each scanner has \
+             its own",
+        ),
+        (
+            "[scanners.a]\n[scanners.b]\n".into(),
+            "line 2, column 11: [scanners.a], line 1, is on the port /dev/ttyUSB0 too: each \
+             scanner has its own",
+        ),
+        (
+            usb("a", "1") + &usb("b", "1"),
+            "line 6, column 1: [scanners.a], line 1, has the serial number 1 too: each scanner \
+             has its own",
+        ),
+        (
+            usb("a", "1") + "[scanners.b]\ntransport = \"usb\"\n",
+            "line 4, column 11: [scanners.a], line 1, has the same vendor and product number: \
+             both need a serial_number, or each might take the other's scanner",
+        ),
+    ] {
+        let refused = refused(&text);
+        assert_eq!(refused, format!("relief.toml, {message}"), "{text}");
+    }
+    let long = "x".repeat(33);
+    assert!(refused(&port(&long)).contains("is no name for a scanner"));
+    assert!(Config::parse(&port(&long[1..]), Path::new("c")).is_ok());
+}
+
+#[test]
+fn two_names_of_one_port_are_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let (port, link) = (folder.path().join("port"), folder.path().join("link"));
+    std::fs::write(&port, "").unwrap();
+    std::os::unix::fs::symlink(&port, &link).unwrap();
+    let text = format!("[scanners.a]\nport = {port:?}\n[scanners.b]\nport = {link:?}\n");
+    let file = folder.path().join("c.toml");
+    std::fs::write(&file, text).unwrap();
+    let refused = Config::load(&file).unwrap_err().to_string();
+    assert!(
+        refused.contains("line 4, column 1: [scanners.a], line 1,"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn a_reload_changes_what_a_scanner_measures_and_leaves_it_attached() {
+    let parse = |text: &str| Config::parse(text, Path::new("relief.toml")).unwrap();
+    let old = parse("[scanners.a]\nport = \"a\"\n[scanners.b]\nport = \"b\"\n");
+    let new = parse(
+        "[scanners.a]\nport = \"a\"\nscan.samples = 9\n[scanners.b]\nport = \"other\"\n\
+         scan.samples = 8\n[scanners.c]\nport = \"c\"\n",
+    );
+    let (merged, outcome) = old.reloaded(&new);
+    assert_eq!(outcome.applied, ["scanners.a.scan", "scanners.b.scan"]);
+    assert_eq!(outcome.needs_restart, ["scanners.b", "scanners.c"]);
+    assert_eq!(merged.scan_on("a").samples, Some(9));
+    assert_eq!(merged.scan_on("b").samples, Some(8));
+    assert_eq!(merged.scanners["b"].port, Path::new("b"));
+    assert_eq!(merged.scanners.len(), 2);
+    let (merged, outcome) = old.reloaded(&parse("[scanner]\nport = \"a\"\n"));
+    assert_eq!(
+        outcome.needs_restart,
+        ["scanner", "scanners.a", "scanners.b"]
+    );
+    assert_eq!(merged.each_scanner().len(), 2);
 }

@@ -1,7 +1,7 @@
 //! A scanner in memory: a gable roof of two planes, delivered when the test says so.
 
 use std::sync::mpsc::sync_channel;
-use std::sync::{Arc, Condvar, Mutex};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::time::Duration;
 
 use scanner_driver::protocol::{
@@ -35,6 +35,8 @@ struct State {
     /// A fault after this many columns of a scan.
     fault_after: Option<u32>,
     laser_on: bool,
+    /// Nothing that is asked for comes back.
+    hung: bool,
 }
 
 /// The scanner, and the test's hand on it.
@@ -78,6 +80,12 @@ impl FakeScanner {
         self.change(|state| state.fault_after = Some(columns));
     }
 
+    /// Nothing comes back, not even an error, until what this gives is dropped.
+    pub(crate) fn hang(self: &Arc<Self>) -> Hung {
+        self.change(|state| state.hung = true);
+        Hung(Arc::clone(self))
+    }
+
     /// By hand, as for adjustment.
     pub(crate) fn switch_laser(&self, on: bool) {
         self.change(|state| state.laser_on = on);
@@ -101,16 +109,23 @@ impl FakeScanner {
     }
 
     fn check(&self) -> Result<(), ScannerError> {
-        match &self.state.lock().unwrap().trouble {
+        match &self.answering().trouble {
             Some(trouble) => Err(trouble.clone()),
             None => Ok(()),
         }
+    }
+
+    /// Waits until the scanner answers.
+    fn answering(&self) -> MutexGuard<'_, State> {
+        let state = self.state.lock().unwrap();
+        self.changed.wait_while(state, |state| state.hung).unwrap()
     }
 
     /// Waits for leave to deliver column `index`.
     fn wait_for_leave(&self, index: u32) -> Result<(), ScannerError> {
         let mut state = self.state.lock().unwrap();
         loop {
+            state = self.changed.wait_while(state, |state| state.hung).unwrap();
             if state.aborted {
                 return Err(ScannerError::Aborted);
             }
@@ -126,6 +141,15 @@ impl FakeScanner {
                 }
             }
         }
+    }
+}
+
+/// A scanner that does not answer; also a test that fails lets go of it.
+pub(crate) struct Hung(Arc<FakeScanner>);
+
+impl Drop for Hung {
+    fn drop(&mut self) {
+        self.0.change(|state| state.hung = false);
     }
 }
 
@@ -246,6 +270,7 @@ impl Scanner for FakeScanner {
     }
 
     fn abort(&self) -> Result<(), ScannerError> {
+        drop(self.answering());
         self.change(|state| state.aborted = true);
         Ok(())
     }

@@ -19,4 +19,5 @@ mod old_state;
 mod power;
 mod refusals;
 mod rig;
+mod scanners;
 mod scans;

@@ -1,10 +1,13 @@
 //! A service in a folder of its own.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use relief_api::{Event, Job, JobId, JobState, Scan, ScanState, StartScan, path};
+use reliefd::config::NamedScanner;
 use reliefd::{Config, Daemon};
+use scanner_driver::Scanner;
 use storage::{Disk, LocalDisk};
 use tempfile::TempDir;
 
@@ -14,7 +17,10 @@ use crate::fake::FakeScanner;
 pub(crate) struct Rig {
     pub(crate) daemon: Daemon,
     pub(crate) client: Client,
+    /// The first of the scanners.
     pub(crate) scanner: Arc<FakeScanner>,
+    /// All of them by name.
+    pub(crate) scanners: BTreeMap<String, Arc<FakeScanner>>,
     pub(crate) folder: TempDir,
 }
 
@@ -43,16 +49,29 @@ impl Rig {
     ) -> Self {
         let mut config = config(folder.path());
         change(&mut config);
-        let scanner = FakeScanner::new();
-        let daemon = Daemon::start_on(config, scanner.clone(), disk)
-            .await
-            .unwrap();
+        let names = config.each_scanner();
+        let scanners: BTreeMap<String, Arc<FakeScanner>> = names
+            .iter()
+            .map(|named| (named.name.to_owned(), FakeScanner::new()))
+            .collect();
+        let scanner = Arc::clone(&scanners[names[0].name]);
+        let open = |named: NamedScanner<'_>| {
+            let scanner: Arc<dyn Scanner> = scanners[named.name].clone();
+            Ok(scanner)
+        };
+        let daemon = Daemon::start_among(config, &open, disk).await.unwrap();
         Self {
             client: Client::new(daemon.socket()),
             daemon,
             scanner,
+            scanners,
             folder,
         }
+    }
+
+    /// The scanner of this name.
+    pub(crate) fn of(&self, name: &str) -> &Arc<FakeScanner> {
+        &self.scanners[name]
     }
 
     /// Ends the service and starts another on what it left.

@@ -1,4 +1,4 @@
-//! A simulated scanner on a pseudo-terminal and a private service before it, in a folder
+//! Simulated scanners on pseudo-terminals and a private service before them, in a folder
 //! that goes when they go.
 
 mod client;
@@ -8,14 +8,16 @@ mod foreign;
 mod object;
 mod wait;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use anyhow::{Context, Result, ensure};
-use relief_api::{Job, JobId, JobState, Rerun, Scan, StartScan, path};
+use relief_api::{Job, JobId, JobState, Rerun, Scan, StartScan, THE_SCANNER, path};
+use reliefd::config::{NamedScanner, ScannerConfig};
 use reliefd::{Config, Daemon};
-use scanner_driver::SerialScanner;
+use scanner_driver::{Scanner, SerialScanner};
 use sim_scanner::config::SimConfig;
 use sim_scanner::control::Control;
 use sim_scanner::endpoint::pty::PtyServer;
@@ -36,7 +38,7 @@ pub use wait::{Ended, GUARD};
 #[derive(Debug)]
 pub struct Rig {
     daemon: Daemon,
-    scanner: Option<PtyServer>,
+    scanners: BTreeMap<String, PtyServer>,
     client: Client,
     config: Config,
     folder: TempDir,
@@ -67,9 +69,27 @@ impl Rig {
     /// # Errors
     /// As [`Rig::start`].
     pub async fn start_with(scanner: &SimConfig, change: impl FnOnce(&mut Config)) -> Result<Self> {
-        let scanner = scanner.serve_pty(None)?;
-        let port = scanner.port().to_owned();
-        Self::around(Some(scanner), &port, Arc::new(LocalDisk), change).await
+        Self::start_on(scanner, Arc::new(LocalDisk), change).await
+    }
+
+    /// Starts a simulated scanner for each name, and one service for all of them.
+    ///
+    /// # Errors
+    /// As [`Rig::start`].
+    pub async fn start_several(scanners: &[(&str, &SimConfig)]) -> Result<Self> {
+        let mut servers = BTreeMap::new();
+        let mut configured = BTreeMap::new();
+        for (name, scanner) in scanners {
+            let server = scanner.serve_pty(None)?;
+            let attached = ScannerConfig {
+                port: server.port().to_owned(),
+                ..ScannerConfig::default()
+            };
+            configured.insert((*name).to_owned(), attached);
+            servers.insert((*name).to_owned(), server);
+        }
+        let change = |config: &mut Config| config.scanners = configured;
+        Self::around(servers, Path::new(""), Arc::new(LocalDisk), change).await
     }
 
     /// As [`Rig::start_with`], with a service that keeps its things on this disk.
@@ -83,7 +103,8 @@ impl Rig {
     ) -> Result<Self> {
         let scanner = scanner.serve_pty(None)?;
         let port = scanner.port().to_owned();
-        Self::around(Some(scanner), &port, disk, change).await
+        let scanners = BTreeMap::from([(THE_SCANNER.to_owned(), scanner)]);
+        Self::around(scanners, &port, disk, change).await
     }
 
     /// Starts a service alone, for whatever is at `port`.
@@ -91,11 +112,11 @@ impl Rig {
     /// # Errors
     /// Whatever keeps the service from starting.
     pub async fn at_port(port: &Path) -> Result<Self> {
-        Self::around(None, port, Arc::new(LocalDisk), |_| {}).await
+        Self::around(BTreeMap::new(), port, Arc::new(LocalDisk), |_| {}).await
     }
 
     async fn around(
-        scanner: Option<PtyServer>,
+        scanners: BTreeMap<String, PtyServer>,
         port: &Path,
         disk: Arc<dyn Disk>,
         change: impl FnOnce(&mut Config),
@@ -107,12 +128,15 @@ impl Rig {
             .tempdir()?;
         let mut config = config(folder.path(), port);
         change(&mut config);
-        let driver = SerialScanner::open(config.scanner.serial())?;
-        let daemon = Daemon::start_on(config.clone(), Arc::new(driver), disk).await?;
+        let open = |named: NamedScanner<'_>| {
+            let driver: Arc<dyn Scanner> = Arc::new(SerialScanner::open(named.config.serial())?);
+            Ok(driver)
+        };
+        let daemon = Daemon::start_among(config.clone(), &open, disk).await?;
         Ok(Self {
             client: Client::new(daemon.socket()),
             daemon,
-            scanner,
+            scanners,
             config,
             folder,
         })
@@ -131,7 +155,7 @@ impl Rig {
         Ok(Self {
             client: Client::new(daemon.socket()),
             daemon,
-            scanner: self.scanner,
+            scanners: self.scanners,
             config,
             folder: self.folder,
         })
@@ -143,7 +167,7 @@ impl Rig {
     /// When the folder cannot be removed.
     pub async fn end(self) -> Result<()> {
         self.daemon.shutdown().await;
-        drop(self.scanner);
+        drop(self.scanners);
         Ok(self.folder.close()?)
     }
 
@@ -156,11 +180,19 @@ impl Rig {
     /// A hand on the simulated scanner.
     ///
     /// # Errors
-    /// When the rig has none.
+    /// When the rig has none, or several.
     pub fn control(&self) -> Result<Control> {
-        let scanner = self.scanner.as_ref();
+        self.control_of(THE_SCANNER)
+    }
+
+    /// A hand on the simulated scanner of this name.
+    ///
+    /// # Errors
+    /// When the rig has none.
+    pub fn control_of(&self, name: &str) -> Result<Control> {
+        let scanner = self.scanners.get(name);
         Ok(scanner
-            .context("this rig has no scanner of its own")?
+            .with_context(|| format!("this rig has no scanner {name} of its own"))?
             .control())
     }
 

@@ -10,6 +10,7 @@ mod real_input;
 mod restart;
 mod same_bytes;
 mod scan;
+mod several;
 mod slow_disk;
 
 use relief_api::StartScan;

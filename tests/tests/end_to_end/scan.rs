@@ -92,6 +92,7 @@ fn columns_come_live_and_in_order(seen: &[Event], id: &str) -> Result<()> {
     for event in seen {
         let Event::Column {
             scan,
+            scanner,
             columns,
             columns_planned,
             samples,
@@ -104,8 +105,8 @@ fn columns_come_live_and_in_order(seen: &[Event], id: &str) -> Result<()> {
         };
         expected += 1;
         assert_eq!(
-            (scan.as_str(), *columns, *columns_planned),
-            (id, expected, 60)
+            (scan.as_str(), scanner.as_str(), *columns, *columns_planned),
+            (id, "scanner", expected, 60)
         );
         assert!(*x_mm > last_x_mm, "{x_mm} after {last_x_mm}");
         assert!(*samples <= 64 && *pitch_mm > 1.0 && *pitch_mm < 3.0);

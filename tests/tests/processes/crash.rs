@@ -4,19 +4,34 @@ use std::io::Read;
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use relief_api::{Event, Job, JobState, Rerun, Scan, ScanState, StartScan, path};
+use relief_api::{
+    Event, Job, JobState, LaserEntry, LaserLog, LaserState, Rerun, Scan, ScanState, StartScan, path,
+};
 use relief_tests::rig::{self, Client, GUARD, journal_columns, leisurely_house, small_house};
-use reliefd::Daemon;
+use reliefd::{Config, Daemon};
 use scan_record::{Ending, JournalReader};
 use sim_scanner::device::Event as Happened;
 
 use crate::role::{Role, SERVICE};
 use crate::runtime;
 
+/// One scanner at each port; of several the second has the name `b`.
+fn configured(folder: &Path, ports: &[&Path]) -> Config {
+    let mut config = rig::config(folder, ports.first().unwrap_or(&Path::new("none")));
+    if ports.len() > 1 {
+        for (name, port) in ["a", "b"].into_iter().zip(ports) {
+            let mut scanner = config.scanner.clone();
+            scanner.port = (*port).to_owned();
+            config.scanners.insert(name.to_owned(), scanner);
+        }
+    }
+    config
+}
+
 /// The service in its own process, until its input ends.
-pub(crate) fn be_the_service(folder: &Path, port: &Path) -> Result<()> {
+pub(crate) fn be_the_service(folder: &Path, ports: &[&Path]) -> Result<()> {
     runtime()?.block_on(async {
-        let daemon = Daemon::start(rig::config(folder, port)).await?;
+        let daemon = Daemon::start(configured(folder, ports)).await?;
         println!("ready");
         tokio::task::spawn_blocking(|| std::io::stdin().read_to_end(&mut Vec::new())).await??;
         daemon.shutdown().await;
@@ -25,13 +40,21 @@ pub(crate) fn be_the_service(folder: &Path, port: &Path) -> Result<()> {
 }
 
 fn start(folder: &Path, port: &Path) -> Result<(Role, Client)> {
-    let arguments = [folder.to_string_lossy(), port.to_string_lossy()];
-    let mut service = Role::start(SERVICE, &[&arguments[0], &arguments[1]])?;
+    start_before(folder, &[port])
+}
+
+fn start_before(folder: &Path, ports: &[&Path]) -> Result<(Role, Client)> {
+    let arguments: Vec<String> = std::iter::once(&folder)
+        .chain(ports)
+        .map(|path| path.display().to_string())
+        .collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let mut service = Role::start(SERVICE, &arguments)?;
     let said = service.line()?;
     ensure!(said == "ready", "the service says {said}");
     Ok((
         service,
-        Client::new(&rig::config(folder, port).service.socket),
+        Client::new(&configured(folder, ports).service.socket),
     ))
 }
 
@@ -102,6 +125,60 @@ pub(crate) fn what_was_acknowledged_survives_the_death_of_the_service() -> Resul
         let next: Scan = client.post(path::SCANS, &next).await?;
         let next = events.scan_complete(&next.id).await?;
         ensure!(next.columns == 60, "{next:?}");
+        Ok(())
+    })?;
+    service.end()
+}
+
+pub(crate) fn two_scans_survive_the_death_of_the_service() -> Result<()> {
+    let folder = tempfile::tempdir()?;
+    let scanners = [
+        leisurely_house().serve_pty(None)?,
+        leisurely_house().serve_pty(None)?,
+    ];
+    let ports = scanners.each_ref().map(|scanner| scanner.port());
+    let (service, client) = start_before(folder.path(), &ports)?;
+    let runtime = runtime()?;
+    let ids = runtime.block_on(async {
+        let mut events = client.events().await?;
+        let mut ids = Vec::new();
+        for name in ["a", "b"] {
+            let mut request = named("cut short");
+            request.scanner = name.into();
+            let scan: Scan = client.post(path::SCANS, &request).await?;
+            ids.push(scan.id);
+        }
+        for id in &ids {
+            events.columns(id, 40).await?;
+        }
+        Ok::<_, anyhow::Error>(ids)
+    })?;
+    service.kill()?;
+    for scanner in &scanners {
+        let mut control = scanner.control();
+        control.wait_for(GUARD, |event| *event == Happened::DeadMan)?;
+        ensure!(!control.snapshot().laser_on, "a laser is on");
+    }
+    let (service, client) = start_before(folder.path(), &ports)?;
+    runtime.block_on(async {
+        for ((id, name), scanner) in ids.iter().zip(["a", "b"]).zip(&scanners) {
+            let safe = acknowledged(&scanner.control().events());
+            let scan: Scan = client.get(&path::scan(id)).await?;
+            ensure!(
+                (scan.state, scan.scanner.as_str()) == (ScanState::Interrupted, name),
+                "{scan:?}"
+            );
+            ensure!(
+                safe >= 32 && scan.columns >= safe,
+                "{} of {safe} columns are kept",
+                scan.columns
+            );
+            let log: LaserLog = client.get(&path::scanner_laser(name)).await?;
+            let told = |entry: &LaserEntry| {
+                entry.laser == LaserState::Unknown && entry.cause.contains("dead-man")
+            };
+            ensure!(log.entries.iter().any(told), "{log:?}");
+        }
         Ok(())
     })?;
     service.end()

@@ -19,10 +19,14 @@ static ALLOCATOR: PeakAlloc = PeakAlloc;
 
 type Test = (&'static str, fn() -> Result<()>);
 
-const TESTS: [Test; 3] = [
+const TESTS: [Test; 4] = [
     (
         "crash::what_was_acknowledged_survives_the_death_of_the_service",
         crash::what_was_acknowledged_survives_the_death_of_the_service,
+    ),
+    (
+        "crash::two_scans_survive_the_death_of_the_service",
+        crash::two_scans_survive_the_death_of_the_service,
     ),
     (
         "crash::a_job_survives_the_death_of_the_service",
@@ -39,7 +43,10 @@ fn main() -> Result<()> {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments.as_slice() {
         [SCANNER, file, columns] => memory::be_the_scanner(Path::new(file), columns.parse()?),
-        [SERVICE, folder, port] => crash::be_the_service(Path::new(folder), Path::new(port)),
+        [SERVICE, folder, ports @ ..] => {
+            let ports: Vec<&Path> = ports.iter().map(Path::new).collect();
+            crash::be_the_service(Path::new(folder), &ports)
+        }
         // Some runners ask first, and then want one test by its name.
         words if words.contains(&"--list") => {
             for (name, _) in TESTS {

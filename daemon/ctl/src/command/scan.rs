@@ -40,6 +40,14 @@ pub(crate) struct Args {
         hide_default_value = true
     )]
     note: String,
+    /// Which scanner; needed where the service has several
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "",
+        hide_default_value = true
+    )]
+    scanner: String,
     /// Stay until the deliverables are published
     #[arg(long)]
     wait: bool,
@@ -120,6 +128,7 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
         part: args.part,
         operator: args.operator,
         note: args.note,
+        scanner: args.scanner,
         plan: PlanRequest {
             x_first_mm: plan.x_first_mm,
             x_last_mm: plan.x_last_mm,

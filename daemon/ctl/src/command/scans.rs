@@ -3,7 +3,7 @@
 use relief_api::{ScanList, path};
 
 use crate::failure::Failure;
-use crate::output;
+use crate::output::of_scanners;
 use crate::service::EndpointArgs;
 
 /// List the kept scans, newest first
@@ -27,17 +27,21 @@ fn told(list: &ScanList) -> String {
             None => scan.state.as_str().to_owned(),
         };
         let jobs: Vec<String> = scan.jobs.iter().map(u64::to_string).collect();
-        vec![
-            scan.id.clone(),
-            scan.name.clone(),
-            scan.part.clone(),
-            format!("{}/{}", scan.columns, scan.columns_planned),
-            jobs.join(" "),
-            state,
-        ]
+        (
+            scan.scanner.as_str(),
+            vec![
+                scan.id.clone(),
+                scan.name.clone(),
+                scan.part.clone(),
+                format!("{}/{}", scan.columns, scan.columns_planned),
+                jobs.join(" "),
+                state,
+            ],
+        )
     });
-    output::table(
+    of_scanners(
         &["SCAN", "NAME", "PART", "COLUMNS", "JOBS", "STATE"],
+        1,
         &[3],
         lines,
     )

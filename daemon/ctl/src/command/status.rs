@@ -1,12 +1,12 @@
 //! `relief status`.
 
-use relief_api::{ScannerLink, Status, path};
+use relief_api::{LaserEntry, Scan, ScannerLink, ScannerStatus, Status, THE_SCANNER, path};
 
 use crate::failure::Failure;
 use crate::output::counted;
 use crate::service::EndpointArgs;
 
-/// Show the service, its scanner and what is under way
+/// Show the service, its scanners and what is under way
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -18,48 +18,16 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
 }
 
 fn told(status: &Status) -> String {
-    let scanner = &status.scanner;
-    let link = match scanner.link {
-        ScannerLink::Unknown => "not spoken to yet",
-        ScannerLink::Ready => "ready",
-        ScannerLink::Scanning => "scanning",
-        ScannerLink::Trouble => "in trouble",
-    };
-    let model = scanner.model.as_deref().unwrap_or("unknown model");
-    let serial = scanner
-        .serial
-        .as_ref()
-        .map_or(String::new(), |serial| format!(" {serial}"));
-    let mut lines = vec![
-        format!(
-            "service   reliefd {}, since {}",
-            status.version, status.started_at
-        ),
-        format!("scanner   {link}: {model}{serial} at {}", scanner.endpoint),
-    ];
-    if let Some(problem) = &scanner.problem {
-        lines.push(format!("          {problem}"));
+    let mut lines = vec![format!(
+        "service   reliefd {}, since {}",
+        status.version, status.started_at
+    )];
+    if status.scanners.is_empty() {
+        scanner(&mut lines, &status.scanner, &status.laser, &status.scan);
     }
-    lines.push(match &status.laser {
-        Some(laser) => format!(
-            "laser     {} since {}: {}",
-            laser.laser.as_str(),
-            laser.at,
-            laser.cause
-        ),
-        None => "laser     not known yet".into(),
-    });
-    lines.push(match &status.scan {
-        Some(scan) => format!(
-            "scan      {} ({}): {}, {} of {} columns",
-            scan.id,
-            scan.name,
-            scan.state.as_str(),
-            scan.columns,
-            scan.columns_planned
-        ),
-        None => "scan      none".into(),
-    });
+    for one in &status.scanners {
+        scanner(&mut lines, &one.status, &one.laser, &one.scan);
+    }
     lines.push(format!(
         "jobs      {} running, {} waiting",
         status.jobs_running,
@@ -79,6 +47,57 @@ fn told(status: &Status) -> String {
         ));
     }
     lines.join("\n")
+}
+
+/// Some lines on a scanner, its laser and its scan.
+fn scanner(
+    lines: &mut Vec<String>,
+    scanner: &ScannerStatus,
+    laser: &Option<Box<LaserEntry>>,
+    scan: &Option<Scan>,
+) {
+    let link = match scanner.link {
+        ScannerLink::Unknown => "not spoken to yet",
+        ScannerLink::Ready => "ready",
+        ScannerLink::Scanning => "scanning",
+        ScannerLink::Trouble => "in trouble",
+    };
+    let name = match scanner.name.as_str() {
+        "" | THE_SCANNER => String::new(),
+        name => format!("{name}, "),
+    };
+    let model = scanner.model.as_deref().unwrap_or("unknown model");
+    let serial = scanner
+        .serial
+        .as_ref()
+        .map_or(String::new(), |serial| format!(" {serial}"));
+    let endpoint = &scanner.endpoint;
+    lines.push(format!(
+        "scanner   {name}{link}: {model}{serial} at {endpoint}"
+    ));
+    if let Some(problem) = &scanner.problem {
+        lines.push(format!("          {problem}"));
+    }
+    lines.push(match laser {
+        Some(laser) => format!(
+            "laser     {} since {}: {}",
+            laser.laser.as_str(),
+            laser.at,
+            laser.cause
+        ),
+        None => "laser     not known yet".into(),
+    });
+    lines.push(match scan {
+        Some(scan) => format!(
+            "scan      {} ({}): {}, {} of {} columns",
+            scan.id,
+            scan.name,
+            scan.state.as_str(),
+            scan.columns,
+            scan.columns_planned
+        ),
+        None => "scan      none".into(),
+    });
 }
 
 /// A size for people.

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use relief_api::Event;
+use relief_api::{Event, ScannerStatus};
 
 use crate::failure::Failure;
 use crate::output;
@@ -55,10 +55,21 @@ fn element(event: &Event, first: bool) -> Result<(), Failure> {
 
 fn line(event: &Event) -> String {
     match event {
-        Event::Status(status) => format!(
-            "reliefd {}, scanner at {}, {} running and {} waiting jobs",
-            status.version, status.scanner.endpoint, status.jobs_running, status.jobs_queued
-        ),
+        Event::Status(status) => {
+            let several = status.scanners.iter().map(|one| &one.status);
+            let scanners: Vec<String> = if status.scanners.is_empty() {
+                vec![at(&status.scanner)]
+            } else {
+                several.map(at).collect()
+            };
+            format!(
+                "reliefd {}, {}, {} running and {} waiting jobs",
+                status.version,
+                scanners.join(", "),
+                status.jobs_running,
+                status.jobs_queued
+            )
+        }
         Event::Scan(scan) => {
             let reason = scan
                 .reason
@@ -119,12 +130,14 @@ fn line(event: &Event) -> String {
                 .problem
                 .as_ref()
                 .map_or(String::new(), |problem| format!(": {problem}"));
-            format!(
-                "scanner at {}: {}{problem}",
-                scanner.endpoint,
-                scanner.link.as_str()
-            )
+            format!("{}: {}{problem}", at(scanner), scanner.link.as_str())
         }
         Event::Unknown => "(an event this program does not know)".to_owned(),
     }
+}
+
+/// Which scanner, and where it is attached.
+fn at(scanner: &ScannerStatus) -> String {
+    let name = output::scanner(&scanner.name);
+    format!("{name} at {}", scanner.endpoint)
 }

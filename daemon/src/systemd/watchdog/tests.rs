@@ -1,7 +1,7 @@
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Mutex, PoisonError};
 
-use relief_api::{ScannerLink, ScannerStatus};
+use relief_api::{ScannerLink, ScannerStatus, ScannerSummary};
 
 use super::*;
 
@@ -102,7 +102,9 @@ fn what_is_told_is_one_line() {
     let mut status = Status {
         version: String::new(),
         started_at: String::new(),
+        scanners: Vec::new(),
         scanner: ScannerStatus {
+            name: "scanner".into(),
             link: ScannerLink::Trouble,
             endpoint: String::new(),
             model: None,
@@ -131,6 +133,25 @@ fn what_is_told_is_one_line() {
     assert_eq!(
         line(&status),
         "scan s: 3 of 9 columns, paused: the cable was pulled"
+    );
+    let summary = |name: &str, problem: Option<&str>, scan: Option<Scan>| ScannerSummary {
+        status: ScannerStatus {
+            name: name.into(),
+            problem: problem.map(str::to_owned),
+            ..status.scanner.clone()
+        },
+        laser: None,
+        scan,
+    };
+    let scanners = vec![
+        summary("left", None, status.scan.clone()),
+        summary("right", Some("it\nburns"), None),
+    ];
+    status.scanners = scanners;
+    assert_eq!(
+        line(&status),
+        "left: scan s: 3 of 9 columns, paused: the cable was pulled; right: no scan; scanner in \
+         trouble: it burns"
     );
 }
 

@@ -15,7 +15,7 @@ use crate::rig::{Rig, ended, job_over};
 use disk::Ailing;
 
 /// A service on a disk that does what it is told to.
-async fn rig(change: impl FnOnce(&mut Config)) -> (Rig, Ailing) {
+pub(crate) async fn rig(change: impl FnOnce(&mut Config)) -> (Rig, Ailing) {
     let disk = Ailing::default();
     let folder = tempfile::tempdir().unwrap();
     let rig = Rig::start_on(folder, Arc::new(disk.clone()), change).await;

@@ -102,6 +102,7 @@ async fn story() -> Story {
         daemon,
         client,
         scanner,
+        scanners: BTreeMap::new(),
         folder,
     };
     let first = job_over(&mut events, &rig, scan.jobs[0]).await;

@@ -21,7 +21,7 @@ use finding::{Finding, Grade};
 
 /// Look for the usual troubles and say how to mend each
 ///
-/// Checks the configuration, the scanner's port or USB device (there, permitted, not held by
+/// Checks the configuration, each scanner's port or USB device (there, permitted, not held by
 /// somebody else), the udev rules, programs that disturb serial ports, the folders and their
 /// disk, the clock, and whether the service answers; lists the serial ports and USB scanners
 /// that are there. Changes nothing.
@@ -75,7 +75,10 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
             Config::default()
         }
     };
-    findings.extend(scanner(&config.scanner));
+    for named in config.each_scanner() {
+        let found = scanner(named.config).into_iter();
+        findings.extend(found.map(|finding| finding.of(&named)));
+    }
     findings.push(port::present());
     findings.push(usb::present());
     findings.extend(machine::disturbers());

@@ -1,28 +1,27 @@
 //! Whether the service answers, and what it says about its scanner.
 
-use relief_api::{ScannerLink, Status, path};
+use relief_api::{ScannerLink, ScannerStatus, Status, path};
 
 use super::finding::Finding;
+use crate::output::scanner;
 use crate::service::{Client, Endpoint, ServiceError};
 
 const CHECK: &str = "service";
 
 /// Asks the service for its status.
 pub(super) async fn check(endpoint: Endpoint) -> Finding {
-    match Client::new(endpoint.clone())
-        .get::<Status>(path::STATUS)
-        .await
-    {
-        Ok(status) if status.scanner.link == ScannerLink::Trouble => Finding::bad(
+    let asked = Client::new(endpoint.clone()).get(path::STATUS).await;
+    let troubles = match &asked {
+        Ok(status) => troubles(status),
+        Err(_) => Vec::new(),
+    };
+    match asked {
+        Ok(status) if !troubles.is_empty() => Finding::bad(
             CHECK,
             format!(
-                "reliefd {} answers at {endpoint}, but its scanner is in trouble: {}",
+                "reliefd {} answers at {endpoint}, but {}",
                 status.version,
-                status
-                    .scanner
-                    .problem
-                    .as_deref()
-                    .unwrap_or("it does not say why")
+                troubles.join("; ")
             ),
             "see to the scanner's power, cable and port; the service tries again by itself",
         ),
@@ -50,4 +49,21 @@ pub(super) async fn check(endpoint: Endpoint) -> Finding {
             "see what listens there, and restart the service",
         ),
     }
+}
+
+/// What the service says of its scanners that are in trouble.
+fn troubles(status: &Status) -> Vec<String> {
+    let several: Vec<&ScannerStatus> = match status.scanners.as_slice() {
+        [] => vec![&status.scanner],
+        scanners => scanners.iter().map(|one| &one.status).collect(),
+    };
+    let in_trouble = several
+        .into_iter()
+        .filter(|one| one.link == ScannerLink::Trouble);
+    in_trouble
+        .map(|one| {
+            let why = one.problem.as_deref().unwrap_or("it does not say why");
+            format!("its {} is in trouble: {why}", scanner(&one.name))
+        })
+        .collect()
 }

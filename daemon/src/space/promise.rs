@@ -1,0 +1,104 @@
+//! Room on the disk that scans under way may still take.
+//!
+//! A scan's journal sets its room aside when the scanner has begun, and on some file systems
+//! never; until then the room looks free to a scan that begins on another scanner.
+
+use std::fs;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+use crate::error::ServiceError;
+use crate::service::lock;
+
+/// Bytes of a block as `stat` counts them.
+const BLOCK_BYTES: u64 = 512;
+
+/// What was promised to the scans under way: journals, and the most bytes of each.
+#[derive(Debug, Default)]
+pub(crate) struct Promises(Mutex<Vec<(PathBuf, u64)>>);
+
+/// Room for a scan; what it has not taken is free again when this is dropped.
+#[derive(Debug)]
+pub(crate) struct Promise {
+    all: Arc<Promises>,
+    journal: PathBuf,
+}
+
+impl Drop for Promise {
+    fn drop(&mut self) {
+        lock(&self.all.0).retain(|(journal, _)| *journal != self.journal);
+    }
+}
+
+impl Promises {
+    /// Makes a promise, unless `check` refuses it; it is given the bytes that earlier ones may
+    /// still take. One at a time, so that no two are given the same room.
+    pub(crate) fn make(
+        self: &Arc<Self>,
+        journal: PathBuf,
+        bytes: u64,
+        check: impl FnOnce(u64) -> Result<(), ServiceError>,
+    ) -> Result<Promise, ServiceError> {
+        let mut promises = lock(&self.0);
+        let outstanding = promises
+            .iter()
+            .map(|(journal, bytes)| bytes.saturating_sub(taken_bytes(journal)));
+        check(outstanding.fold(0, u64::saturating_add))?;
+        promises.push((journal.clone(), bytes));
+        Ok(Promise {
+            all: Arc::clone(self),
+            journal,
+        })
+    }
+}
+
+/// Bytes that a journal has taken of its disk, those set aside included.
+fn taken_bytes(journal: &Path) -> u64 {
+    fs::metadata(journal).map_or(0, |journal| journal.blocks().saturating_mul(BLOCK_BYTES))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn promised(promises: &Arc<Promises>) -> u64 {
+        let mut found = 0;
+        let probe = promises.make("probe".into(), 0, |outstanding| {
+            found = outstanding;
+            Ok(())
+        });
+        drop(probe.unwrap());
+        found
+    }
+
+    #[test]
+    fn what_a_journal_has_taken_is_promised_no_more() {
+        let folder = tempfile::tempdir().unwrap();
+        let journal = folder.path().join("a.scan");
+        let promises = Arc::new(Promises::default());
+        let most = 10 << 20;
+        let first = promises.make(journal.clone(), most, |_| Ok(())).unwrap();
+        assert_eq!(promised(&promises), most);
+        let second = promises.make("b".into(), 7, |before| {
+            assert_eq!(before, most);
+            Ok(())
+        });
+        assert_eq!(promised(&promises), most + 7);
+        drop(second);
+        fs::write(&journal, vec![1; 1 << 20]).unwrap();
+        fs::File::open(&journal).unwrap().sync_all().unwrap();
+        let left = promised(&promises);
+        assert!(left <= most - (1 << 20) && left > 0, "{left}");
+        drop(first);
+        assert_eq!(promised(&promises), 0);
+    }
+
+    #[test]
+    fn a_refused_promise_is_none() {
+        let promises = Arc::new(Promises::default());
+        let refused = promises.make("a".into(), 5, |_| Err(ServiceError::Stopping));
+        assert!(refused.is_err());
+        assert_eq!(promised(&promises), 0);
+    }
+}
