@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 use relief_api::{Event, Scan, ScanState, ScannerLink, StartScan};
 use scanner_driver::ScannerError;
 
-use crate::acquisition::{AbortRequest, Ticket, resolve, run};
+use crate::acquisition::{AbortRequest, Ticket, calibration, check_grid, resolve, run};
 use crate::error::ServiceError;
 use crate::ids::{now, shown_name};
 use crate::service::{Service, lock};
@@ -56,6 +56,7 @@ impl Service {
         })?;
         self.note_identity(&identity);
         let plan = resolve(&request.plan.or(&config.scan), &identity)?;
+        check_grid(&processing.regrid, &plan, &calibration(&identity))?;
         self.check_room(plan.plan.columns, plan.plan.samples)?;
         let id = self.ids.next(&request.name, |id| {
             self.spool.has(id) || self.journal_path(id).exists()

@@ -20,7 +20,7 @@ mod process;
 mod settings;
 
 pub use background::{BackgroundPolicy, Crumb, NodeRole, UnknownPolicy};
-pub use extent::{Extent, no_surface, unusual_size};
+pub use extent::{Extent, finest_pitch_mm, no_surface, unusual_size};
 pub use kinds::{RegionKind, kinds};
 pub use method::{Method, UnknownMethod};
 pub use observer::{Observer, Stage};
