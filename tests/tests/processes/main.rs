@@ -19,7 +19,7 @@ static ALLOCATOR: PeakAlloc = PeakAlloc;
 
 type Test = (&'static str, fn() -> Result<()>);
 
-const TESTS: [Test; 3] = [
+const TESTS: [Test; 4] = [
     (
         "crash::what_was_acknowledged_survives_the_death_of_the_service",
         crash::what_was_acknowledged_survives_the_death_of_the_service,
@@ -27,6 +27,10 @@ const TESTS: [Test; 3] = [
     (
         "crash::a_job_survives_the_death_of_the_service",
         crash::a_job_survives_the_death_of_the_service,
+    ),
+    (
+        "crash::a_job_that_always_ends_the_service_is_given_up",
+        crash::a_job_that_always_ends_the_service_is_given_up,
     ),
     (
         "memory::acquisition_needs_the_same_however_long_the_scan",
