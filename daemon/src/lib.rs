@@ -21,6 +21,7 @@ mod arguments;
 mod daemon;
 mod error;
 mod events;
+mod fit;
 mod http;
 mod ids;
 mod jobs;

@@ -1,8 +1,9 @@
 //! Where the log goes: lines for people, the systemd journal, or JSON.
 
+mod journal;
+
 use std::io::IsTerminal;
 
-use tracing_journald::{Priority, PriorityMappings};
 use tracing_subscriber::filter::EnvFilter;
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
@@ -50,7 +51,7 @@ impl LogHandle {
 pub fn init(config: &LogConfig) -> Result<LogHandle, LogError> {
     let (filter, handle) = reload::Layer::new(filter(&config.level)?);
     let layer: Box<dyn Layer<_> + Send + Sync> = match resolved(config.format) {
-        LogFormat::Journald => Box::new(journal().map_err(LogError::NoJournal)?),
+        LogFormat::Journald => Box::new(journal::layer().map_err(LogError::NoJournal)?),
         LogFormat::Json => Box::new(fmt::layer().json().with_writer(std::io::stderr)),
         LogFormat::Text | LogFormat::Auto => Box::new(
             fmt::layer()
@@ -65,18 +66,6 @@ pub fn init(config: &LogConfig) -> Result<LogHandle, LogError> {
         .try_init()
         .map_err(|_| LogError::Twice)?;
     Ok(LogHandle { filter: handle })
-}
-
-/// A message's fields become fields of the journal's entry: `scan` is `RELIEF_SCAN`.
-fn journal() -> std::io::Result<tracing_journald::Layer> {
-    Ok(tracing_journald::layer()?
-        .with_syslog_identifier("reliefd".into())
-        .with_field_prefix(Some("RELIEF".into()))
-        .with_priority_mappings(PriorityMappings {
-            info: Priority::Informational,
-            debug: Priority::Debug,
-            ..PriorityMappings::new()
-        }))
 }
 
 fn resolved(format: LogFormat) -> LogFormat {

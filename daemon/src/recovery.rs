@@ -166,6 +166,7 @@ impl Service {
             if self.spool.has(&job.result) {
                 self.queue.remove(job.id);
                 job.state = JobState::Done;
+                job.cut_short = 0;
                 job.stage = None;
                 job.ended_at = Some(now());
                 job.directory = Some(self.spool.directory(&job.result).display().to_string());
@@ -173,12 +174,10 @@ impl Service {
                 continue;
             }
             if job.state == JobState::Running {
-                tracing::info!(job = job.id, scan = %job.scan, "taking up a job that was cut short");
-                job.state = JobState::Queued;
-                job.stage = None;
-                self.store.put_job(&job)?;
+                self.take_up_job(&mut job)?;
+            } else {
+                self.queue.add(job.id);
             }
-            self.queue.add(job.id);
         }
         Ok(())
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use relief_api::{Aborted, Event, Scan, ScanState, ScannerLink, StartScan};
 use scanner_driver::ScannerError;
 
-use crate::acquisition::{AbortRequest, Ticket, resolve, run};
+use crate::acquisition::{AbortRequest, Ticket, calibration, check_grid, resolve, run};
 use crate::error::ServiceError;
 use crate::ids::{now, shown_name};
 use crate::service::{Service, lock};
@@ -28,6 +28,7 @@ impl Service {
         station.note_identity(&identity);
         let plan = request.plan.or(&config.scan_on(station.name()));
         let plan = resolve(&plan, &identity)?;
+        check_grid(&processing.regrid, &plan, &calibration(&identity))?;
         let id = self.ids.next(&request.name, |id| {
             self.spool.has(id) || self.journal_path(id).exists()
         });

@@ -36,8 +36,7 @@ pub(crate) struct Running {
     pub(crate) halt_endpoint: bool,
     pub(crate) ended: bool,
     line: LineUse,
-    /// Since when the device waits for the host.
-    waiting_since: Option<Duration>,
+    waiting: Option<Wait>,
 }
 
 /// What has gone over the line.
@@ -50,6 +49,25 @@ pub struct LineUse {
     /// How long the device could not go on since the host did not fetch what was sent, or
     /// had given no credit for more columns.
     pub waited_for_host: Duration,
+    /// The part of it for which there was no credit.
+    pub waited_for_credit: Duration,
+}
+
+/// Since when the device waits for the host.
+#[derive(Debug, Clone, Copy)]
+struct Wait {
+    since: Duration,
+    for_credit: bool,
+}
+
+impl LineUse {
+    fn add(&mut self, wait: Wait, now: Duration) {
+        let waited = now.saturating_sub(wait.since);
+        self.waited_for_host += waited;
+        if wait.for_credit {
+            self.waited_for_credit += waited;
+        }
+    }
 }
 
 impl Running {
@@ -68,11 +86,14 @@ impl Running {
 
     /// Keeps the account of waiting; `unfetched` says that the line holds bytes for the host.
     pub(crate) fn note_line(&mut self, now: Duration, unfetched: bool) {
-        if let Some(since) = self.waiting_since.take() {
-            self.line.waited_for_host += now.saturating_sub(since);
+        if let Some(wait) = self.waiting.take() {
+            self.line.add(wait, now);
         }
-        let starved = self.device.snapshot(now).activity == Activity::Waiting;
-        self.waiting_since = (unfetched || starved).then_some(now);
+        let for_credit = self.device.snapshot(now).activity == Activity::Waiting;
+        self.waiting = (unfetched || for_credit).then_some(Wait {
+            since: now,
+            for_credit,
+        });
     }
 }
 
@@ -87,7 +108,7 @@ impl Shared {
                 halt_endpoint: false,
                 ended: false,
                 line: LineUse::default(),
-                waiting_since: None,
+                waiting: None,
             }),
             changed: Condvar::new(),
             waker,
@@ -231,8 +252,8 @@ impl Control {
     pub fn line_use(&self) -> LineUse {
         let running = self.shared.lock();
         let mut line = running.line;
-        if let Some(since) = running.waiting_since {
-            line.waited_for_host += self.shared.now().saturating_sub(since);
+        if let Some(wait) = running.waiting {
+            line.add(wait, self.shared.now());
         }
         line
     }

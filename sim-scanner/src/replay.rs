@@ -52,6 +52,8 @@ pub struct Replay {
     pitch_counts: i32,
     spacing_counts: i32,
     lateral_counts: (i32, i32),
+    /// Sent in fragments that tell only the first lateral and the step.
+    uniform: bool,
 }
 
 impl Replay {
@@ -107,7 +109,34 @@ impl Replay {
             pitch_counts: length(scan.column_pitch_mm),
             spacing_counts: length(scan.sample_spacing_mm),
             lateral_counts,
+            uniform: false,
         })
+    }
+
+    /// The same in the shorter encoding, for samples that are evenly spaced in every column;
+    /// `None` if they are not.
+    #[must_use]
+    pub fn into_uniform(self) -> Option<Self> {
+        let step = |pair: &[Sample]| match pair {
+            [a, b] => i64::from(b.lateral_counts) - i64::from(a.lateral_counts),
+            _ => 0,
+        };
+        let mut steps = self
+            .columns
+            .iter()
+            .map(|column| column.samples.windows(2).map(step));
+        let even = steps.all(|mut steps| {
+            let first = steps.next();
+            steps.all(|step| Some(step) == first)
+        });
+        even.then_some(Self {
+            uniform: true,
+            ..self
+        })
+    }
+
+    pub(crate) fn is_uniform(&self) -> bool {
+        self.uniform
     }
 
     /// What counts mean.

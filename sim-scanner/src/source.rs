@@ -195,7 +195,7 @@ impl Source {
                 Accepted {
                     columns,
                     spacing_um: replay.spacing_um(),
-                    uniform: false,
+                    uniform: replay.is_uniform(),
                     first,
                 }
             }

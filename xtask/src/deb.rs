@@ -11,8 +11,9 @@ use crate::{apt, shell};
 const TOOL: &str = "cargo-deb";
 const TOOL_VERSION: &str = "3.8.0";
 
-/// As in the package's own description.
-const MAINTAINER: &str = "The Relief developers <relief@localhost>";
+/// Who answers for a package that nobody is known to have made; as in the package's own
+/// description.
+const NOBODY: &str = "The Relief developers <relief@localhost>";
 
 #[derive(Debug, Default, clap::Args)]
 pub(crate) struct Options {
@@ -52,13 +53,34 @@ pub(crate) fn build_programs() -> Result<()> {
     Ok(())
 }
 
+/// Who makes the package, and answers for it: as Debian's tools find it out, else as git knows it.
+fn maintainer() -> String {
+    let from_environment = |name: &str| std::env::var(name).ok().filter(|text| !text.is_empty());
+    let from_git = |key: &str| {
+        let said = shell::output("git", &["config", "--get", key]).ok()?;
+        Some(said.trim().to_owned()).filter(|text| !text.is_empty())
+    };
+    let address = from_environment("DEBEMAIL")
+        .or_else(|| from_environment("EMAIL"))
+        .or_else(|| from_git("user.email"));
+    let Some(address) = address else {
+        eprintln!("deb: nobody answers for this package: set DEBFULLNAME and DEBEMAIL");
+        return NOBODY.to_owned();
+    };
+    let name = from_environment("DEBFULLNAME")
+        .or_else(|| from_git("user.name"))
+        .unwrap_or_else(|| "The Relief developers".to_owned());
+    format!("{name} <{address}>")
+}
+
 /// The product's changelog, and one of the package in Debian's form.
 fn changelogs(folder: &Path) -> Result<()> {
     fs::copy(shell::root().join("CHANGELOG.md"), folder.join("changelog"))?;
     let date = shell::output("git", &["log", "-1", "--format=%aD"])?;
     let text = format!(
-        "relief ({}-1) unstable; urgency=medium\n\n  * As upstream; see changelog.gz.\n\n -- {MAINTAINER}  {}\n",
+        "relief ({}-1) unstable; urgency=medium\n\n  * As upstream; see changelog.gz.\n\n -- {}  {}\n",
         env!("CARGO_PKG_VERSION"),
+        maintainer(),
         date.trim()
     );
     fs::write(folder.join("changelog.Debian"), text)?;
@@ -80,6 +102,8 @@ pub(crate) fn pack(version: Option<&str>) -> Result<PathBuf> {
     let out = format!("{}/", folder.display());
     let mut words = vec!["--package", "relief", "--no-build", "--strip"];
     words.extend(["--output", &out]);
+    let maintainer = maintainer();
+    words.extend(["--maintainer", &maintainer]);
     words.extend(
         version
             .iter()

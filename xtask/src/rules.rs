@@ -50,11 +50,26 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "sim-scanner",
         ],
     ),
+    (
+        "relief-throughput",
+        &[
+            "scan-files",
+            "scanner-driver",
+            "scanner-protocol",
+            "sim-scanner",
+        ],
+    ),
     ("relief-tests", &EVERYTHING),
     ("relief-vm-systemd", &["sim-scanner"]),
     (
         "relief-vm-usb",
-        &["scanner-driver", "scanner-protocol", "sim-scanner"],
+        &[
+            "relief-throughput",
+            "scan-files",
+            "scanner-driver",
+            "scanner-protocol",
+            "sim-scanner",
+        ],
     ),
     ("xtask", &[]),
 ];
@@ -108,7 +123,7 @@ const COMMAND_LINE: [&str; 16] = [
     "storage",
 ];
 
-const EVERYTHING: [&str; 18] = [
+const EVERYTHING: [&str; 19] = [
     "cad-exchange",
     "deliverables",
     "nurbs",
@@ -118,6 +133,7 @@ const EVERYTHING: [&str; 18] = [
     "regrid",
     "relief",
     "relief-api",
+    "relief-throughput",
     "reliefd",
     "scan-files",
     "scan-record",

@@ -1,11 +1,12 @@
 //! Studies: longer measurements, with their tables.
 
 use std::ffi::OsString;
+use std::fs;
 
 use anyhow::Result;
 use clap::Subcommand;
 
-use crate::shell;
+use crate::{shell, vm};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Study {
@@ -51,6 +52,16 @@ pub(crate) enum Study {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
+    /// Measure how fast each way to the scanner is, who waits for whom, and what a slow disk does.
+    #[command(disable_help_flag = true)]
+    Throughput {
+        /// Also in the virtual machine of `cargo xtask vm usb`, where there is USB
+        #[arg(long)]
+        usb: bool,
+        /// Options of the study; `--help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
     /// Score the segmentation on scenes whose true faces are known.
     #[command(disable_help_flag = true)]
     Segmentation {
@@ -80,6 +91,15 @@ pub(crate) fn run(study: &Study) -> Result<()> {
         Study::Regrid { options } => program("study-regrid", options),
         Study::Segmentation { options } => program("study-segmentation", options),
         Study::Shapes { options } => program("study-shapes", options),
+        Study::Throughput { usb, options } => {
+            let mut options = options.clone();
+            if *usb {
+                let table = shell::target().join("throughput-usb.md");
+                fs::write(&table, vm::throughput()?)?;
+                options.extend(["--usb-table".into(), table.into()]);
+            }
+            program("study-throughput", &options)
+        }
     }
 }
 

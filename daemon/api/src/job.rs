@@ -65,6 +65,10 @@ pub struct Job {
     /// How often it was begun.
     #[serde(default)]
     pub attempts: u32,
+    /// How often in a row it was begun without coming to an end, since the service died; the
+    /// attempt that runs is one of them. After a few the job is failed.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub cut_short: u32,
     /// When it was made, RFC 3339 in UTC.
     pub queued_at: String,
     /// When the last attempt began.
@@ -85,6 +89,11 @@ pub struct Job {
     /// Settings that differ from the configuration.
     #[serde(default, skip_serializing_if = "SettingOverrides::is_empty")]
     pub settings: SettingOverrides,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // As serde calls it.
+fn is_zero(count: &u32) -> bool {
+    *count == 0
 }
 
 /// How long a stage took.

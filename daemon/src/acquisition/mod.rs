@@ -4,6 +4,7 @@
 pub(crate) mod grid_file;
 mod plan;
 mod run;
+mod view;
 mod watch;
 
 use std::sync::{Mutex, PoisonError};
@@ -14,6 +15,7 @@ use scanner_protocol::Identity;
 pub use plan::PlanError;
 pub(crate) use plan::resolve;
 pub(crate) use run::{Ticket, run};
+pub(crate) use view::check_grid;
 pub(crate) use watch::{describe_trouble, watch};
 
 /// What the device announced, as the geometry needs it.

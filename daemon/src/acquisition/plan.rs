@@ -9,6 +9,12 @@ use scanner_protocol::{Identity, Limits, ScanPlan};
 #[error("{0}")]
 pub struct PlanError(String);
 
+impl PlanError {
+    pub(super) fn new(what: String) -> Self {
+        Self(what)
+    }
+}
+
 /// A plan and what follows from it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ResolvedPlan {

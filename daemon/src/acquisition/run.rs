@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Instant;
 
-use range_image::Calibration;
+use range_image::{Calibration, Column, GridColumn};
 use regrid::Regridder;
 use relief_api::{Event, LiveColumn, Scan, ScanState, ScannerLink};
 use scan_record::{EndCause, Header, JournalWriter, RawColumn, RawSample};
@@ -25,6 +25,7 @@ use super::plan::ResolvedPlan;
 use super::{AbortRequest, calibration};
 use crate::config::{JournalConfig, Processing};
 use crate::error::panic_text;
+use crate::fit::Fit;
 use crate::liveness::Pulse;
 use crate::service::{KeptGrid, Service};
 use crate::space::Promise;
@@ -183,8 +184,25 @@ struct Keeper<'a> {
 /// The regridding that runs along; a scan is kept even when this fails.
 struct Live {
     regridder: Regridder,
+    fit: Fit,
     grid: KeptGrid,
     file: GridFile,
+}
+
+impl Live {
+    /// The grid columns that this column finished.
+    fn push(&mut self, column: Column) -> Result<Vec<GridColumn>, String> {
+        self.fit.add(&column);
+        if self.fit.is_missed() {
+            let (problem, hint) = self.fit.told().unwrap_or_default();
+            return Err(format!("{problem}; {hint}"));
+        }
+        let finished = self.regridder.push(column).map_err(|e| e.to_string())?;
+        for column in &finished {
+            self.file.append(column).map_err(|e| e.to_string())?;
+        }
+        Ok(finished)
+    }
 }
 
 enum Fed {
@@ -209,11 +227,14 @@ impl<'a> Keeper<'a> {
             .processing
             .pipeline_settings(header.column_pitch_mm, header.sample_spacing_mm)
             .regrid;
+        let plan = &ticket.plan.plan;
+        let most_samples = plan.columns as usize * usize::from(plan.samples);
         let live = Regridder::new(settings)
             .map_err(|error| error.to_string())
             .and_then(|regridder| {
                 Ok(Live {
                     regridder,
+                    fit: Fit::new(&settings, most_samples),
                     file: GridFile::create(&service.grid_path(id)).map_err(|e| e.to_string())?,
                     grid: KeptGrid { settings },
                 })
@@ -379,17 +400,7 @@ impl<'a> Keeper<'a> {
         let Some(live) = &mut self.live else {
             return Vec::new();
         };
-        let finished = live
-            .regridder
-            .push(column.calibrated(&self.calibration))
-            .map_err(|error| error.to_string())
-            .and_then(|finished| {
-                for column in &finished {
-                    live.file.append(column).map_err(|e| e.to_string())?;
-                }
-                Ok(finished)
-            });
-        match finished {
+        match live.push(column.calibrated(&self.calibration)) {
             Ok(finished) => finished
                 .iter()
                 .map(|column| LiveColumn::new(column.i, column.j_first, &column.z_mm))

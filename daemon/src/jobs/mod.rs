@@ -3,7 +3,6 @@
 //! A job is begun at least once and published exactly once: the records say what is
 //! waiting, and the result's folder, which appears by one rename, says what is done.
 
-mod fit;
 mod process;
 mod progress;
 mod queue;
@@ -19,6 +18,10 @@ use crate::service::Service;
 
 pub(crate) use queue::Queue;
 pub(crate) use worker::work;
+
+/// A job that was cut short so often is not begun again by itself: it may be what ends the
+/// service, as by the memory that it takes.
+const MOST_CUT_SHORT: u32 = 3;
 
 impl Service {
     /// Queues the job of a scan that has just been completed, and keeps the scan with it.
@@ -100,6 +103,7 @@ impl Service {
             });
         }
         job.state = JobState::Queued;
+        job.cut_short = 0;
         job.error = None;
         job.hint = None;
         job.ended_at = None;
@@ -107,6 +111,32 @@ impl Service {
         self.keep_job(&job)?;
         self.queue.add(id);
         Ok(job)
+    }
+
+    /// Queues a job again that was cut short when the service last ended, or gives it up.
+    pub(crate) fn take_up_job(&self, job: &mut Job) -> Result<(), ServiceError> {
+        job.stage = None;
+        if job.cut_short < MOST_CUT_SHORT {
+            tracing::info!(job = job.id, scan = %job.scan, "taking up a job that was cut short");
+            job.state = JobState::Queued;
+            self.store.put_job(job)?;
+            self.queue.add(job.id);
+            return Ok(());
+        }
+        self.spool.discard(&job.result);
+        job.state = JobState::Failed;
+        job.ended_at = Some(now());
+        let error = format!(
+            "the service ended {} times in a row in the midst of this job, which may be the cause",
+            job.cut_short
+        );
+        tracing::error!(job = job.id, scan = %job.scan, %error, "a job is given up");
+        job.error = Some(error);
+        job.hint = Some(format!(
+            "look in the service's log for why it ended: if it ran out of memory, rerun the scan              with a larger regrid.pitch_mm; if the power failed or it was killed, try again with              `relief retry {}`",
+            job.id
+        ));
+        Ok(self.store.put_job(job)?)
     }
 
     /// Cancels a job: at once if it waits, at its next opportunity if it runs.
@@ -148,6 +178,7 @@ fn new_job(scan: &Scan, result: String, name: String) -> Job {
         error: None,
         hint: None,
         attempts: 0,
+        cut_short: 0,
         queued_at: now(),
         started_at: None,
         ended_at: None,

@@ -11,12 +11,12 @@ use range_image::{Cancelled, Column, Lattice, Monitor, RangeImage};
 use relief_api::{Job, Scan};
 use scan_record::{Ending, Header, JournalReader, ReadError};
 
-use super::fit::Fit;
 use super::kept_processing;
 use super::progress::Progress;
 use super::worker::JobOutcome;
 use crate::acquisition::grid_file;
 use crate::config::Processing;
+use crate::fit::Fit;
 use crate::service::{KeptGrid, Service};
 use crate::spool::SpoolError;
 
@@ -114,7 +114,7 @@ fn attempt(
         Some(image) => (image, count(&mut journal, &header, progress)?),
         None => {
             watch.stage(Stage::Regrid);
-            let mut fit = Fit::new(&settings.regrid, &service.journal_path(&job.scan));
+            let mut fit = Fit::of_journal(&settings.regrid, &service.journal_path(&job.scan));
             regrid(
                 &mut journal,
                 &header,

@@ -74,8 +74,13 @@ fn attempt(
     let mut job = {
         let _order = service.queue.changing();
         let mut job = service.job(id)?;
-        job.state = JobState::Running;
         job.attempts += 1;
+        // Kept before the work begins, which may be the end of this process. One that runs by
+        // its record has come to an end that the disk refused to keep.
+        if job.state != JobState::Running {
+            job.cut_short += 1;
+        }
+        job.state = JobState::Running;
         job.started_at = Some(now());
         job.ended_at = None;
         service.keep_job(&job)?;
@@ -104,6 +109,7 @@ fn attempt(
     // not meet this attempt.
     service.queue.end(id, flag);
     job.timings = timings;
+    job.cut_short = 0;
     job.ended_at = Some(now());
     let mut published = None;
     match outcome {

@@ -10,6 +10,8 @@ mod error;
 mod record;
 mod salvage;
 
+use std::fs::{File, TryLockError};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::{Duration, Instant};
@@ -72,6 +74,7 @@ impl Store {
     /// Opens the records, making them if there are none, and mending them if need be.
     pub(crate) fn open(disk: Arc<dyn Disk>, path: &Path) -> Result<Self, StoreError> {
         let failed = |error: &redb::Error| StoreError::of(path, error);
+        let _making = make_alone(path)?;
         if !path.exists() {
             put_new(&*disk, path).map_err(|error| failed(&error))?;
         }
@@ -255,6 +258,20 @@ fn open_database(disk: &dyn Disk, path: &Path) -> Result<Database, redb::Error> 
     Ok(database)
 }
 
+/// Keeps every other service from making or replacing the file until the lock is dropped. The
+/// file's own lock cannot: it is on what may be moved aside or overwritten by a rename.
+fn make_alone(path: &Path) -> Result<File, StoreError> {
+    let failed = |error: io::Error| StoreError::of(path, &redb::Error::Io(error));
+    let lock = File::create(path.with_extension("lock")).map_err(failed)?;
+    match lock.try_lock() {
+        Ok(()) => Ok(lock),
+        Err(TryLockError::WouldBlock) => Err(StoreError::Locked {
+            path: path.to_owned(),
+        }),
+        Err(TryLockError::Error(error)) => Err(failed(error)),
+    }
+}
+
 /// Makes a file without records. It is made under another name: one that is half made, since
 /// the power failed, could not be told from one that is damaged.
 fn put_new(disk: &dyn Disk, path: &Path) -> Result<(), redb::Error> {
@@ -270,8 +287,49 @@ fn put_new(disk: &dyn Disk, path: &Path) -> Result<(), redb::Error> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Mutex;
+    use std::sync::mpsc::{Receiver, Sender, channel};
+
+    use storage::{Deed, HinderedDisk, Hindrance, LocalDisk};
+
     use super::*;
-    use storage::LocalDisk;
+
+    /// Tells when the new file is about to get its name, and waits for leave.
+    #[derive(Debug, Clone)]
+    struct BeforeTheName(Arc<Mutex<(Sender<()>, Receiver<()>)>>);
+
+    impl Hindrance for BeforeTheName {
+        fn before(&self, deed: Deed, _: &Path) -> io::Result<()> {
+            if deed == Deed::Rename {
+                let (reached, leave) = &*self.0.lock().unwrap();
+                reached.send(()).unwrap();
+                leave.recv().unwrap();
+            }
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn two_first_starts_at_once_make_one_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("reliefd.redb");
+        let (reached, is_reached) = channel();
+        let (give_leave, leave) = channel();
+        let held = HinderedDisk(BeforeTheName(Arc::new(Mutex::new((reached, leave)))));
+        let there = path.clone();
+        let first = std::thread::spawn(move || Store::open(Arc::new(held), &there).unwrap());
+        is_reached.recv().unwrap();
+        // The first has yet to give its file the name.
+        let second = || Store::open(Arc::new(LocalDisk), &path);
+        let error = second().unwrap_err();
+        assert!(matches!(error, StoreError::Locked { .. }), "{error}");
+        give_leave.send(()).unwrap();
+        let first = first.join().unwrap();
+        let error = second().unwrap_err();
+        assert!(matches!(error, StoreError::Locked { .. }), "{error}");
+        first.close();
+        second().unwrap();
+    }
 
     #[tokio::test]
     async fn who_waits_for_the_records_has_them_as_soon_as_they_are_closed() {

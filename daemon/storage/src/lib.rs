@@ -2,7 +2,7 @@
 //!
 //! Everything that must survive a power failure goes through [`Disk`]: journals, records,
 //! results. [`LocalDisk`] is the file system as it is. Tests put others in its place, which
-//! note every step, forget what was never synced, or refuse.
+//! note every step, forget what was never synced, or refuse ([`HinderedDisk`]).
 //!
 //! # What is assumed of a file system
 //!
@@ -17,6 +17,7 @@
 //! Reading needs no seam: what can be read back is what was written.
 
 mod appender;
+mod hindered;
 mod local;
 
 use std::fmt::Debug;
@@ -24,6 +25,7 @@ use std::io;
 use std::path::Path;
 
 pub use appender::Appender;
+pub use hindered::{Deed, HinderedDisk, Hindrance};
 pub use local::LocalDisk;
 
 /// What the service asks of the place where it keeps things.

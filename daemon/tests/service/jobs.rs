@@ -1,7 +1,7 @@
 use std::io::Write as _;
 use std::task::Poll;
 
-use relief_api::{Event, Job, JobState, Rerun, Scan, ScanState, Status, path};
+use relief_api::{Event, Job, JobState, Rerun, Scan, ScanList, ScanState, StartScan, Status, path};
 use rustix::fs::FileType;
 use serde_json::json;
 
@@ -242,5 +242,73 @@ async fn a_grid_that_is_absurdly_fine_is_refused_before_the_work() {
     let least: f64 = least.split(' ').next().unwrap().parse().unwrap();
     // 2^24 nodes on 29.5 x 29.5 mm.
     assert!((least - 29.5 / 4096.0).abs() < 1e-4, "{hint}");
+    rig.daemon.shutdown().await;
+}
+
+fn with_pitch(pitch_mm: f64) -> StartScan {
+    StartScan {
+        settings: [("regrid.pitch_mm".to_owned(), json!(pitch_mm))].into(),
+        ..StartScan::default()
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_scan_with_an_absurdly_fine_grid_is_refused_before_anything_moves() {
+    let rig = Rig::new().await;
+    rig.scanner.on_start(|| panic!("the scan starts"));
+    let mut request = with_pitch(0.001);
+    request.plan.x_last_mm = Some(90.0);
+    let request = serde_json::to_string(&request).unwrap();
+    let reply = rig
+        .client
+        .request("POST", path::SCANS, Some(&request))
+        .await;
+    let problem = reply.problem();
+    assert_eq!(
+        (problem.status, problem.kind.as_str()),
+        (400, "impossible-scan")
+    );
+    assert_eq!(
+        problem.detail,
+        "a grid of 0.001 mm (regrid.pitch_mm) is too fine for 181 columns of 60 samples over \
+         90.0 x 29.5 mm: even a part of 9.0 x 3.0 mm would have 27 million nodes; for one that \
+         fills the view set regrid.pitch_mm to 0.013 or more, or leave it out"
+    );
+    assert_eq!(rig.client.get::<ScanList>(path::SCANS).await.scans, []);
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_grid_too_fine_for_the_part_ends_the_live_picture_and_costs_no_column() {
+    let rig = Rig::new().await;
+    let mut events = rig.client.events().await;
+    let scan: Scan = rig.client.post(path::SCANS, &with_pitch(0.001)).await;
+    let over = |event: &Event| match event {
+        Event::Scan(over) if over.id == scan.id && over.state.is_over() => Some(over.clone()),
+        _ => None,
+    };
+    let (seen, scan) = events.until(over).await;
+    assert_eq!(scan.state, ScanState::Complete, "{:?}", scan.reason);
+    assert_eq!(rig.scanner.acknowledged().len(), 60);
+    let live = |event: &Event| match event {
+        Event::Column { live, .. } => Some(live.len()),
+        _ => None,
+    };
+    let live: Vec<usize> = seen.iter().filter_map(live).collect();
+    assert_eq!(live, [0; 60]);
+    let grid = rig.journal(&scan.id).with_extension("grid");
+    assert!(!grid.exists());
+    let job = job_over(&mut events, &rig, scan.jobs[0]).await;
+    assert_eq!(job.state, JobState::Failed);
+    let error = job.error.unwrap();
+    assert!(error.contains("a grid of 0.001 mm is too fine"), "{error}");
+    // With a sensible grid it is as good as any.
+    let rerun = Rerun {
+        settings: [("regrid.pitch_mm".to_owned(), json!(0.5))].into(),
+        ..Rerun::default()
+    };
+    let job: Job = rig.client.post(&path::scan_rerun(&scan.id), &rerun).await;
+    let job = job_over(&mut events, &rig, job.id).await;
+    assert_eq!(job.state, JobState::Done, "{:?}", job.error);
     rig.daemon.shutdown().await;
 }

@@ -64,18 +64,19 @@ impl Decoder {
     ///
     /// `None` means that `bytes` is used up; a frame begun in it is finished by later calls.
     pub fn next(&mut self, bytes: &mut &[u8]) -> Option<Packet> {
-        while let Some((&byte, rest)) = bytes.split_first() {
-            *bytes = rest;
-            self.counts.bytes += 1;
-            if byte != DELIMITER {
-                self.overflowed |= self.stuffed.push(byte).is_err();
-                continue;
-            }
+        loop {
+            let mut pieces = bytes.splitn(2, |byte| *byte == DELIMITER);
+            let piece = pieces.next()?;
+            let rest = pieces.next();
+            self.overflowed |= self.stuffed.extend_from_slice(piece).is_err();
+            self.counts.bytes += piece.len() as u64 + u64::from(rest.is_some());
+            *bytes = rest.unwrap_or_default();
+            // Without a delimiter they are used up.
+            rest?;
             if let Some(packet) = self.close() {
                 return Some(packet);
             }
         }
-        None
     }
 
     /// Judges what has come since the last delimiter.

@@ -112,15 +112,21 @@ impl Extent {
     /// still to come; millimetres between its nodes.
     #[must_use]
     pub fn finest_pitch_among_mm(&self, samples: usize) -> f64 {
-        let [width, height] = self.sides_mm();
-        let nodes = NODES_ALWAYS.max(samples as f64 * NODES_PER_SAMPLE);
-        let pitch_mm = (width * height / nodes).sqrt();
-        // Two digits, not finer than what is allowed.
-        let digit = libm::pow(10.0, libm::log10(pitch_mm).floor() - 1.0);
-        format!("{:.1e}", (pitch_mm / digit).ceil() * digit)
-            .parse()
-            .unwrap_or(pitch_mm)
+        finest_pitch_mm(self.sides_mm(), samples)
     }
+}
+
+/// The finest grid for so many samples that spread over a rectangle of these sides;
+/// millimetres between its nodes.
+#[must_use]
+pub fn finest_pitch_mm([width_mm, height_mm]: [f64; 2], samples: usize) -> f64 {
+    let nodes = NODES_ALWAYS.max(samples as f64 * NODES_PER_SAMPLE);
+    let pitch_mm = (width_mm * height_mm / nodes).sqrt();
+    // Two digits, not finer than what is allowed.
+    let digit = libm::pow(10.0, libm::log10(pitch_mm).floor() - 1.0);
+    format!("{:.1e}", (pitch_mm / digit).ceil() * digit)
+        .parse()
+        .unwrap_or(pitch_mm)
 }
 
 /// Why no surface can lie between these samples, whatever the settings, in words that

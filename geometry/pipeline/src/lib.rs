@@ -22,7 +22,7 @@ mod settings;
 
 pub use background::{BackgroundPolicy, Crumb, NodeRole, UnknownPolicy};
 pub use columns::{Columns, ReadAgainError};
-pub use extent::{Extent, no_surface, unusual_size};
+pub use extent::{Extent, finest_pitch_mm, no_surface, unusual_size};
 pub use kinds::{Basis, RegionKind};
 pub use method::{Method, UnknownMethod};
 pub use observer::{Observer, Stage};

@@ -68,6 +68,8 @@ pub struct Snapshot {
     pub columns_sent: u32,
     /// Columns of the scan that the host has.
     pub acknowledged_below: u32,
+    /// Frames sent because the host asked for them again, since the start of the simulator.
+    pub frames_resent: u64,
     /// Good frames received since the start of the simulator.
     pub frames_received: u64,
 }

@@ -80,6 +80,7 @@ pub struct Device {
     booted: Duration,
     boots: u64,
     running_tag: u16,
+    frames_resent: u64,
     drive: Drive,
     homed: bool,
     task: Task,
@@ -117,6 +118,7 @@ impl Device {
             booted: now,
             boots: 0,
             running_tag: 0,
+            frames_resent: 0,
             drive: Drive::standing(parked),
             homed: false,
             task: Task::None,
@@ -208,6 +210,7 @@ impl Device {
             faults: self.faults,
             columns_sent: self.scan.as_ref().map_or(0, Scan::sent),
             acknowledged_below: self.scan.as_ref().map_or(0, Scan::acknowledged),
+            frames_resent: self.frames_resent,
             frames_received: self.decoder.counts().frames,
         }
     }

@@ -179,7 +179,10 @@ impl Device {
             };
             if let Some((column, missing)) = scan.resends.pop_front() {
                 if column >= scan.acknowledged_below {
+                    let before = self.running_tag;
                     self.send_column(column, &missing);
+                    let frames = self.running_tag.wrapping_sub(before);
+                    self.frames_resent += u64::from(frames);
                     self.log.push(Event::Resent(column));
                 }
             } else if let Some((reason, faults)) = scan.end {

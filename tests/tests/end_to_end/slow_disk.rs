@@ -8,7 +8,7 @@ use anyhow::Result;
 use relief_tests::rig::{GUARD, Rig, journal_columns, small_house};
 use scanner_protocol::Activity;
 use sim_scanner::device::Event;
-use storage::{Disk, DiskFile, LocalDisk};
+use storage::{Deed, HinderedDisk, Hindrance};
 
 /// Syncs of journals that may still be done; `None` for any number.
 #[derive(Debug, Clone, Default)]
@@ -41,68 +41,12 @@ impl Gate {
     }
 }
 
-/// The file system, with a gate before the syncs of journals.
-#[derive(Debug)]
-struct SlowDisk(Gate);
-
-#[derive(Debug)]
-struct SlowFile(Gate, Box<dyn DiskFile>);
-
-impl Disk for SlowDisk {
-    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
-        let file = LocalDisk.create(path)?;
-        Ok(if path.extension().is_some_and(|e| e == "scan") {
-            Box::new(SlowFile(self.0.clone(), file))
-        } else {
-            file
-        })
-    }
-
-    fn open(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
-        LocalDisk.open(path)
-    }
-
-    fn create_dir(&self, path: &Path) -> io::Result<()> {
-        LocalDisk.create_dir(path)
-    }
-
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        LocalDisk.rename(from, to)
-    }
-
-    fn remove_file(&self, path: &Path) -> io::Result<()> {
-        LocalDisk.remove_file(path)
-    }
-
-    fn remove_dir_all(&self, path: &Path) -> io::Result<()> {
-        LocalDisk.remove_dir_all(path)
-    }
-
-    fn sync_dir(&self, path: &Path) -> io::Result<()> {
-        LocalDisk.sync_dir(path)
-    }
-
-    fn free_bytes(&self, path: &Path) -> io::Result<Option<u64>> {
-        LocalDisk.free_bytes(path)
-    }
-}
-
-impl DiskFile for SlowFile {
-    fn write_at(&self, bytes: &[u8], offset: u64) -> io::Result<()> {
-        self.1.write_at(bytes, offset)
-    }
-
-    fn set_len(&self, bytes: u64) -> io::Result<()> {
-        self.1.set_len(bytes)
-    }
-
-    fn reserve(&self, bytes: u64) -> io::Result<()> {
-        self.1.reserve(bytes)
-    }
-
-    fn sync_data(&self) -> io::Result<()> {
-        self.0.pass();
-        self.1.sync_data()
+impl Hindrance for Gate {
+    fn before(&self, deed: Deed, path: &Path) -> io::Result<()> {
+        if deed == Deed::SyncFile && path.extension().is_some_and(|e| e == "scan") {
+            self.pass();
+        }
+        Ok(())
     }
 }
 
@@ -114,7 +58,7 @@ const SYNC_COLUMNS: u32 = 4;
 #[tokio::test(flavor = "multi_thread")]
 async fn a_slow_disk_makes_the_table_wait_and_loses_nothing() -> Result<()> {
     let gate = Gate::default();
-    let disk = Arc::new(SlowDisk(gate.clone()));
+    let disk = Arc::new(HinderedDisk(gate.clone()));
     let rig = Rig::start_on(&small_house(), disk, |config| {
         config.scanner.credits = Some(CREDITS);
         config.journal.sync_columns = SYNC_COLUMNS;

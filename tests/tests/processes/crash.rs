@@ -184,6 +184,14 @@ pub(crate) fn two_scans_survive_the_death_of_the_service() -> Result<()> {
     service.end()
 }
 
+/// A job slow enough to be found at work.
+fn slow(draws: u32) -> Rerun {
+    let mut rerun = Rerun::default();
+    rerun.settings.insert("regrid.draws".into(), draws.into());
+    rerun.settings.insert("regrid.neighbours".into(), 64.into());
+    rerun
+}
+
 pub(crate) fn a_job_survives_the_death_of_the_service() -> Result<()> {
     let runtime = runtime()?;
     let folder = tempfile::tempdir()?;
@@ -193,11 +201,9 @@ pub(crate) fn a_job_survives_the_death_of_the_service() -> Result<()> {
         let mut events = client.events().await?;
         let scan: Scan = client.post(path::SCANS, &named("house")).await?;
         let scan = events.scan_complete(&scan.id).await?;
-        // The second of these is slow enough to be found at work.
-        let mut rerun = Rerun::default();
-        rerun.settings.insert("regrid.draws".into(), 4_000.into());
-        rerun.settings.insert("regrid.neighbours".into(), 64.into());
-        let job: Job = client.post(&path::scan_rerun(&scan.id), &rerun).await?;
+        let job: Job = client
+            .post(&path::scan_rerun(&scan.id), &slow(4_000))
+            .await?;
         events.stage(job.id, "regrid").await?;
         Ok::<_, anyhow::Error>((scan, job))
     })?;
@@ -242,5 +248,95 @@ pub(crate) fn a_job_survives_the_death_of_the_service() -> Result<()> {
         ensure!(names == expected, "{names:?} instead of {expected:?}");
         Ok(())
     })?;
+    service.end()
+}
+
+pub(crate) fn a_job_that_always_ends_the_service_is_given_up() -> Result<()> {
+    let runtime = runtime()?;
+    let folder = tempfile::tempdir()?;
+    let scanner = small_house().serve_pty(None)?;
+    let (mut service, mut client) = start(folder.path(), scanner.port())?;
+    let (scan, job) = runtime.block_on(async {
+        let mut events = client.events().await?;
+        let scan: Scan = client.post(path::SCANS, &named("house")).await?;
+        let scan = events.scan_complete(&scan.id).await?;
+        let first = scan.jobs.first().copied().context("no job")?;
+        events
+            .until(|event| match event {
+                Event::Published { job, .. } if *job == first => Some(()),
+                _ => None,
+            })
+            .await?;
+        // Far longer than the rest of the test.
+        let mut endless = slow(100_000);
+        endless
+            .settings
+            .insert("regrid.pitch_mm".into(), 0.2.into());
+        let job: Job = client.post(&path::scan_rerun(&scan.id), &endless).await?;
+        Ok::<_, anyhow::Error>((scan, job))
+    })?;
+    let at_work = |client: &Client| {
+        runtime.block_on(async {
+            loop {
+                let job: Job = client.get(&path::job(job.id)).await?;
+                ensure!(!job.state.is_over(), "{job:?}");
+                if job.state == JobState::Running {
+                    return Ok(job);
+                }
+                tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+            }
+        })
+    };
+    for start_number in 1..=3 {
+        let running = at_work(&client)?;
+        ensure!(
+            (running.attempts, running.cut_short) == (start_number, start_number),
+            "{running:?}"
+        );
+        service.kill()?;
+        (service, client) = start(folder.path(), scanner.port())?;
+    }
+    runtime.block_on(async {
+        let given_up: Job = client.get(&path::job(job.id)).await?;
+        ensure!(
+            (given_up.state, given_up.attempts, given_up.cut_short) == (JobState::Failed, 3, 3),
+            "{given_up:?}"
+        );
+        let error = given_up.error.unwrap_or_default();
+        ensure!(error.contains("ended 3 times in a row"), "{error}");
+        let hint = given_up.hint.unwrap_or_default();
+        ensure!(hint.contains(&format!("relief retry {}", job.id)), "{hint}");
+        let incoming = format!("spool/.incoming-{}", job.result);
+        ensure!(!folder.path().join(incoming).exists());
+
+        // Whatever else there is to do is done.
+        let mut events = client.events().await?;
+        let other: Job = client
+            .post(&path::scan_rerun(&scan.id), &Rerun::default())
+            .await?;
+        let done = events
+            .job_becomes(other.id, |state| state == JobState::Done)
+            .await?;
+        ensure!(done.cut_short == 0, "{done:?}");
+        let again: Job = client.ask(&path::job_retry(job.id)).await?;
+        ensure!(
+            (again.state, again.cut_short) == (JobState::Queued, 0),
+            "{again:?}"
+        );
+        Ok(())
+    })?;
+    // An orderly end in the midst of it is none that counts.
+    let running = at_work(&client)?;
+    ensure!(
+        (running.attempts, running.cut_short) == (4, 1),
+        "{running:?}"
+    );
+    service.end()?;
+    let (service, client) = start(folder.path(), scanner.port())?;
+    let running = at_work(&client)?;
+    ensure!(
+        (running.attempts, running.cut_short) == (5, 1),
+        "{running:?}"
+    );
     service.end()
 }

@@ -33,6 +33,10 @@ const TESTS: [Test; 4] = [
         crash::a_job_survives_the_death_of_the_service,
     ),
     (
+        "crash::a_job_that_always_ends_the_service_is_given_up",
+        crash::a_job_that_always_ends_the_service_is_given_up,
+    ),
+    (
         "memory::acquisition_needs_the_same_however_long_the_scan",
         memory::acquisition_needs_the_same_however_long_the_scan,
     ),

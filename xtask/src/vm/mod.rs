@@ -65,6 +65,11 @@ pub(crate) fn run(vm: &Vm) -> Result<()> {
     }
 }
 
+/// Measures how fast each way to the scanner is, those over USB among them; gives the table.
+pub(crate) fn throughput() -> Result<String> {
+    usb::throughput(&Options::default())
+}
+
 /// What the guest's last line says of its checks.
 fn verdict(said: &str) -> Result<()> {
     match said

@@ -1,11 +1,11 @@
 //! A disk that refuses when told to.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use rustix::io::Errno;
-use storage::{Disk, DiskFile, LocalDisk};
+use storage::{Deed, Disk as _, Hindrance, LocalDisk};
 
 /// What the disk refuses.
 #[derive(Debug, Clone, Copy, Default)]
@@ -45,11 +45,15 @@ impl Ailing {
     pub(crate) fn heal(&self) {
         *self.0.lock().unwrap() = Ailment::default();
     }
+}
 
-    fn check(&self, path: &Path) -> io::Result<()> {
+impl Hindrance for Ailing {
+    fn before(&self, deed: Deed, path: &Path) -> io::Result<()> {
         let mut ailment = self.0.lock().unwrap();
         match ailment.error {
-            Some(error) if path.to_string_lossy().ends_with(ailment.ending) => {
+            Some(error)
+                if deed != Deed::Remove && path.to_string_lossy().ends_with(ailment.ending) =>
+            {
                 ailment.refusals += 1;
                 Err(error.into())
             }
@@ -57,78 +61,8 @@ impl Ailing {
         }
     }
 
-    fn file(&self, path: &Path, file: Box<dyn DiskFile>) -> Box<dyn DiskFile> {
-        Box::new(AilingFile {
-            disk: self.clone(),
-            path: path.to_owned(),
-            file,
-        })
-    }
-}
-
-impl Disk for Ailing {
-    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
-        self.check(path)?;
-        Ok(self.file(path, LocalDisk.create(path)?))
-    }
-
-    fn open(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
-        self.check(path)?;
-        Ok(self.file(path, LocalDisk.open(path)?))
-    }
-
-    fn create_dir(&self, path: &Path) -> io::Result<()> {
-        self.check(path)?;
-        LocalDisk.create_dir(path)
-    }
-
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        self.check(to)?;
-        LocalDisk.rename(from, to)
-    }
-
-    fn remove_file(&self, path: &Path) -> io::Result<()> {
-        LocalDisk.remove_file(path)
-    }
-
-    fn remove_dir_all(&self, path: &Path) -> io::Result<()> {
-        LocalDisk.remove_dir_all(path)
-    }
-
-    fn sync_dir(&self, path: &Path) -> io::Result<()> {
-        self.check(path)
-    }
-
     fn free_bytes(&self, path: &Path) -> io::Result<Option<u64>> {
         let free = self.0.lock().unwrap().free_bytes;
         free.map_or_else(|| LocalDisk.free_bytes(path), |free| Ok(Some(free)))
-    }
-}
-
-#[derive(Debug)]
-struct AilingFile {
-    disk: Ailing,
-    path: PathBuf,
-    file: Box<dyn DiskFile>,
-}
-
-impl DiskFile for AilingFile {
-    fn write_at(&self, bytes: &[u8], offset: u64) -> io::Result<()> {
-        self.disk.check(&self.path)?;
-        self.file.write_at(bytes, offset)
-    }
-
-    fn set_len(&self, bytes: u64) -> io::Result<()> {
-        self.disk.check(&self.path)?;
-        self.file.set_len(bytes)
-    }
-
-    fn reserve(&self, bytes: u64) -> io::Result<()> {
-        self.disk.check(&self.path)?;
-        self.file.reserve(bytes)
-    }
-
-    fn sync_data(&self) -> io::Result<()> {
-        self.disk.check(&self.path)
     }
 }

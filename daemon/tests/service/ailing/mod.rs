@@ -10,6 +10,7 @@ use relief_api::{Event, Job, JobState, Rerun, Scan, ScanState, StartScan, Status
 use reliefd::Config;
 use rustix::io::Errno;
 use scan_record::JournalReader;
+use storage::HinderedDisk;
 
 use crate::rig::{Rig, ended, job_over};
 use disk::Ailing;
@@ -18,7 +19,7 @@ use disk::Ailing;
 pub(crate) async fn rig(change: impl FnOnce(&mut Config)) -> (Rig, Ailing) {
     let disk = Ailing::default();
     let folder = tempfile::tempdir().unwrap();
-    let rig = Rig::start_on(folder, Arc::new(disk.clone()), change).await;
+    let rig = Rig::start_on(folder, Arc::new(HinderedDisk(disk.clone())), change).await;
     (rig, disk)
 }
 

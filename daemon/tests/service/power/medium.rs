@@ -20,7 +20,7 @@ pub(crate) enum Loss {
 }
 
 /// Folders and files by number, so that renaming one moves all that is in it.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Medium<'a> {
     root: &'a Path,
     folders: Vec<Folder>,
@@ -37,7 +37,7 @@ enum Node {
 
 type Names = BTreeMap<String, Node>;
 
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 struct Folder {
     /// As running programs see it.
     seen: Names,
@@ -46,14 +46,14 @@ struct Folder {
     changes: Vec<Change>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 enum Change {
     Add(String, Node),
     Move(String, String),
     Remove(String),
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 struct File<'a> {
     synced: Vec<u8>,
     changes: Vec<&'a Step>,
@@ -98,6 +98,35 @@ impl<'a> Medium<'a> {
             folders: vec![Folder::default()],
             files: Vec::new(),
             opened: BTreeMap::new(),
+        }
+    }
+
+    /// A folder that holds what is there now, and for good.
+    pub(crate) fn of(root: &'a Path) -> Self {
+        let mut medium = Self::new(root);
+        medium.load(0, root);
+        medium
+    }
+
+    fn load(&mut self, folder: usize, place: &Path) {
+        for entry in fs::read_dir(place).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+            let node = if path.is_dir() {
+                self.folders.push(Folder::default());
+                let made = self.folders.len() - 1;
+                self.load(made, &path);
+                Node::Folder(made)
+            } else {
+                self.files.push(File {
+                    synced: fs::read(&path).unwrap(),
+                    changes: Vec::new(),
+                });
+                Node::File(self.files.len() - 1)
+            };
+            let folder = &mut self.folders[folder];
+            folder.seen.insert(name.clone(), node);
+            folder.synced.insert(name, node);
         }
     }
 

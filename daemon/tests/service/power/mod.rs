@@ -2,7 +2,8 @@
 //!
 //! A service takes a scan and processes it twice, on a disk that notes every step. From the
 //! notes what a medium would hold is made anew for each moment: with nothing that was not
-//! synced, with all of it, and with chance parts of it. A fresh service is started on each.
+//! synced, with all of it, and with chance parts of it. A fresh service is started on each, and
+//! for some of them the power fails once more while that one takes up what it found.
 
 mod dice;
 mod medium;
@@ -34,9 +35,11 @@ struct Story {
     folder: tempfile::TempDir,
     scan: String,
     columns: Vec<RawColumn>,
-    /// Files by name of each published result.
-    results: BTreeMap<String, BTreeMap<String, Vec<u8>>>,
+    results: Results,
 }
+
+/// Files by name of each published result.
+type Results = BTreeMap<String, BTreeMap<String, Vec<u8>>>;
 
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     fs::read_dir(folder)
@@ -148,7 +151,7 @@ struct Promised {
 }
 
 impl Promised {
-    fn by(steps: &[Step]) -> Self {
+    fn by<'a>(steps: impl IntoIterator<Item = &'a Step>) -> Self {
         let mut promised = Self::default();
         for step in steps {
             match step {
@@ -166,18 +169,83 @@ impl Promised {
     }
 }
 
-/// Starts a service on what is left after so many steps, and holds it to every promise.
-async fn revive(story: &Story, steps: usize, loss: Loss) {
-    let place = format!("{loss:?} of what was not synced lost after {steps} steps");
-    let happened = &story.steps[..steps];
-    let promised = Promised::by(happened);
-    let mut medium = Medium::new(story.folder.path());
+/// What is left when the power fails after these steps.
+fn survivors<'a>(mut medium: Medium<'a>, happened: &'a [Step], loss: Loss) -> tempfile::TempDir {
     for step in happened {
         medium.step(step);
     }
     let folder = tempfile::tempdir().unwrap();
     medium.write_survivors(loss, folder.path());
-    let rig = Rig::start(folder, |_| {}).await;
+    folder
+}
+
+fn place(steps: usize, loss: Loss) -> String {
+    format!("{loss:?} of what was not synced lost after {steps} steps")
+}
+
+/// A service on a disk that waits for no medium.
+async fn start(folder: tempfile::TempDir) -> Rig {
+    Rig::start_on(folder, Arc::new(Recorder::default()), |_| {}).await
+}
+
+/// Starts a service on what is left after so many steps, and holds it to every promise.
+async fn revive(story: &Story, steps: usize, loss: Loss) {
+    let happened = &story.steps[..steps];
+    let folder = survivors(Medium::new(story.folder.path()), happened, loss);
+    let rig = start(folder).await;
+    let promised = Promised::by(happened);
+    hold(story, &story.results, &rig, &promised, &place(steps, loss)).await;
+    rig.daemon.shutdown().await;
+}
+
+/// The same, and the power fails again at every sync of what the service does then. Gives the
+/// number of media on which another was started.
+async fn revive_again(story: &Story, steps: usize, loss: Loss) -> usize {
+    let happened = &story.steps[..steps];
+    let folder = survivors(Medium::new(story.folder.path()), happened, loss);
+    let place_of_first = place(steps, loss);
+    let found = folder.path().to_owned();
+    let medium = Medium::of(&found);
+    let recorder = Recorder::default();
+    let rig = Rig::start_on(folder, Arc::new(recorder.clone()), |_| {}).await;
+    let promised = Promised::by(happened);
+    let results = hold(story, &story.results, &rig, &promised, &place_of_first).await;
+    for result in results.keys() {
+        recorder.tell(Told::Published(result.clone()));
+    }
+    rig.daemon.shutdown().await;
+
+    let recovery = recorder.steps();
+    let mut media = 0;
+    for at in syncs(&recovery) {
+        for (steps, loss) in [(at, Loss::Some(at as u64)), (at + 1, Loss::All)] {
+            let again = &recovery[..steps];
+            let folder = survivors(medium.clone(), again, loss);
+            let rig = start(folder).await;
+            let promised = Promised::by(happened.iter().chain(again));
+            let place = format!("{place_of_first}, then {}", place(steps, loss));
+            hold(story, &results, &rig, &promised, &place).await;
+            rig.daemon.shutdown().await;
+            media += 1;
+        }
+    }
+    media
+}
+
+fn syncs(steps: &[Step]) -> Vec<usize> {
+    let is_sync = |step: &Step| matches!(step, Step::SyncFile { .. } | Step::SyncDir { .. });
+    (0..steps.len()).filter(|&at| is_sync(&steps[at])).collect()
+}
+
+/// Holds a service to what was promised before the power failed, results as they were `seen`;
+/// gives those that it has once all is done.
+async fn hold(
+    story: &Story,
+    seen: &Results,
+    rig: &Rig,
+    promised: &Promised,
+    place: &str,
+) -> Results {
     // Jobs are numbered from 1; whoever comes after hears only of what is done again.
     let mut events = rig.client.events().await;
     let scans: relief_api::ScanList = rig.client.get(path::SCANS).await;
@@ -215,33 +283,31 @@ async fn revive(story: &Story, steps: usize, loss: Loss) {
         assert!(jobs.jobs.iter().any(|j| j.id == job), "{place}: {jobs:?}");
     }
 
-    let mut results = BTreeSet::new();
+    let mut results = Results::new();
     for job in &jobs.jobs {
         let is_promised = promised.published.contains(&job.result);
         if is_promised {
             assert_eq!(job.state, JobState::Done, "{place}: published twice");
         }
-        let done = job_over(&mut events, &rig, job.id).await;
+        let done = job_over(&mut events, rig, job.id).await;
         assert_eq!(done.state, JobState::Done, "{place}: {:?}", done.error);
-        assert!(results.insert(done.result.clone()), "{place}");
         let now = files(&rig.daemon.spool_dir().join(&done.result));
-        check_whole(&now, &place);
+        check_whole(&now, place);
         if is_promised {
-            assert!(
-                now == story.results[&done.result],
-                "{place}: it was changed"
-            );
+            assert!(now == seen[&done.result], "{place}: it was changed");
         }
+        assert!(results.insert(done.result, now).is_none(), "{place}");
     }
     for result in &promised.published {
-        assert!(results.contains(result), "{place}: {result} is gone");
+        assert!(results.contains_key(result), "{place}: {result} is gone");
     }
-    let spooled: BTreeSet<String> = fs::read_dir(rig.daemon.spool_dir())
+    let mut spooled: Vec<String> = fs::read_dir(rig.daemon.spool_dir())
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
-    assert_eq!(spooled, results, "{place}");
-    rig.daemon.shutdown().await;
+    spooled.sort();
+    assert!(spooled.iter().eq(results.keys()), "{place}: {spooled:?}");
+    results
 }
 
 /// Every file that the manifest names is there, as long and with the bytes that it names.
@@ -257,10 +323,7 @@ fn check_whole(files: &BTreeMap<String, Vec<u8>>, place: &str) {
 #[tokio::test(flavor = "multi_thread")]
 async fn nothing_promised_is_lost_wherever_the_power_fails() {
     let story = story().await;
-    let is_sync = |step: &Step| matches!(step, Step::SyncFile { .. } | Step::SyncDir { .. });
-    let syncs: Vec<usize> = (0..story.steps.len())
-        .filter(|&at| is_sync(&story.steps[at]))
-        .collect();
+    let syncs = syncs(&story.steps);
     assert!(syncs.len() > 40, "{} syncs", syncs.len());
     let mut dice = Dice::new(1);
     let mut images = 0;
@@ -282,4 +345,20 @@ async fn nothing_promised_is_lost_wherever_the_power_fails() {
         story.steps.len(),
         syncs.len()
     );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn nothing_promised_is_lost_when_the_power_fails_again_during_the_recovery() {
+    /// First failures, evenly over the story.
+    const FIRST: usize = 6;
+    let story = story().await;
+    let syncs = syncs(&story.steps);
+    let mut media = 0;
+    for number in 0..FIRST {
+        let at = syncs[(2 * number + 1) * syncs.len() / (2 * FIRST)];
+        let loss = [Loss::All, Loss::Some(at as u64), Loss::Nothing][number % 3];
+        media += revive_again(&story, at, loss).await;
+    }
+    println!("{media} media");
+    assert!(media > 10 * FIRST, "{media} media");
 }

@@ -2,14 +2,15 @@
 //!
 //! DO NOT EDIT THE BYTES IN THIS FILE. They were computed apart from this crate. If a test
 //! here fails, the change that made it fail is wrong: devices that speak version 1 would no
-//! longer be understood. A new version gets a file of its own beside this one.
+//! longer be understood. A new version gets a file of its own beside this one; messages that
+//! came to version 1 later stand at the end.
 
 use scanner_protocol::commands::*;
 use scanner_protocol::events::*;
 use scanner_protocol::{Decoder, DeviceMessage, Faults, Frame, HostMessage, Message, text};
 
 /// The message is written as these bytes, and read back from them.
-pub(crate) fn check<M: Message + PartialEq + std::fmt::Debug>(tag: u16, message: M, hex: &str) {
+fn check<M: Message + PartialEq + std::fmt::Debug>(tag: u16, message: M, hex: &str) {
     let bytes: Vec<u8> = hex
         .split(' ')
         .map(|byte| u8::from_str_radix(byte, 16).expect("two hexadecimal digits"))
@@ -330,5 +331,39 @@ fn device_messages() {
             faults: Faults::NONE,
         },
         "00 03 c4 06 02 01 02 f0 01 01 01 01 01 01 01 05 48 2d 40 fd 00",
+    );
+}
+
+/// Taking up an interrupted scan came later: devices without it answer that they do not know
+/// the command.
+#[test]
+fn continuing() {
+    check(
+        15,
+        Continue {
+            scan_id: 2,
+            credits: 33,
+            first_column: 119,
+            plan: ScanPlan {
+                first_table_counts: -6_000,
+                pitch_counts: 50,
+                columns: 240,
+                first_angle_counts: -80_000,
+                angle_step_counts: 650,
+                samples: 256,
+                exposure_us: 0,
+            },
+        },
+        "00 03 0d 0f 02 02 02 21 02 77 01 01 06 90 e8 ff ff 32 01 01 02 f0 01 01 07 80 c7 fe ff 8a 02 01 01 02 01 01 01 01 05 0e 73 24 5a 00",
+    );
+    check(
+        15,
+        ScanContinued {
+            scan_id: 2,
+            columns: 240,
+            spacing_um: 488,
+            uniform: true,
+        },
+        "00 03 8d 0f 02 02 02 f0 01 01 03 e8 01 01 06 01 fd 92 c7 db 00",
     );
 }

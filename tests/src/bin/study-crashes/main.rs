@@ -144,7 +144,8 @@ async fn run(options: &Options) -> Result<()> {
     let (scans, columns, results) = (promises.scans(), promises.columns(), promises.results());
     println!(
         "{scans} scans, {columns} acknowledged columns, {results} results: nothing lost, \
-         nothing half, nothing twice"
+         nothing half, nothing twice; {} jobs were given up after three kills and asked for again",
+        promises.given_up()
     );
     Ok(())
 }

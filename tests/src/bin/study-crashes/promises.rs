@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use deliverables::{MANIFEST_NAME, Manifest};
-use relief_api::{JobList, JobState, Scan, ScanList, ScanState, path};
+use relief_api::{Job, JobList, JobState, Scan, ScanList, ScanState, path};
 use relief_tests::rig::{Client, journal_columns};
 
 /// What somebody outside relies on.
@@ -17,6 +17,8 @@ pub(crate) struct Promises {
     published: BTreeSet<String>,
     /// Results that were seen whole: their files' sizes and sums, as the manifest has them.
     seen: BTreeMap<String, Vec<u8>>,
+    /// Jobs that were begun too often without an end.
+    given_up: u32,
 }
 
 impl Promises {
@@ -26,6 +28,7 @@ impl Promises {
             scans: BTreeMap::new(),
             published: BTreeSet::new(),
             seen: BTreeMap::new(),
+            given_up: 0,
         }
     }
 
@@ -52,6 +55,10 @@ impl Promises {
 
     pub(crate) fn columns(&self) -> u64 {
         self.scans.values().map(|&columns| u64::from(columns)).sum()
+    }
+
+    pub(crate) fn given_up(&self) -> u32 {
+        self.given_up
     }
 
     pub(crate) fn results(&self) -> usize {
@@ -92,7 +99,18 @@ impl Promises {
     pub(crate) async fn check(&mut self, client: &Client) -> Result<()> {
         let jobs = loop {
             let jobs: JobList = client.get(path::JOBS).await?;
-            if jobs.jobs.iter().all(|job| job.state.is_over()) {
+            // One that was met by several kills in a row is given up until somebody asks.
+            for job in &jobs.jobs {
+                if job.state == JobState::Failed && job.cut_short > 0 {
+                    let _: Job = client.ask(&path::job_retry(job.id)).await?;
+                    self.given_up += 1;
+                }
+            }
+            if jobs
+                .jobs
+                .iter()
+                .all(|job| job.state.is_over() && job.cut_short == 0)
+            {
                 break jobs.jobs;
             }
             tokio::time::sleep(std::time::Duration::from_millis(20)).await;

@@ -46,6 +46,12 @@ pub(crate) fn boot() -> Result<()> {
     Ok(())
 }
 
+/// Whether the kernel was started with this word.
+pub(crate) fn is_asked_for(word: &str) -> bool {
+    let line = fs::read_to_string("/proc/cmdline").unwrap_or_default();
+    line.split_whitespace().any(|said| said == word)
+}
+
 /// Loads a module with these parameters.
 pub(crate) fn load(module: &Path, parameters: &CStr) -> Result<()> {
     let image = fs::read(module)?;

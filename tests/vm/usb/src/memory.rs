@@ -1,13 +1,10 @@
 //! The simulated device in this process, without any line: what all others are compared with.
 
 use std::io;
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use scanner_driver::ScannerError;
 use scanner_driver::transport::{Connector, Transport};
-use scanner_protocol::Activity;
-use sim_scanner::control::LineUse;
 use sim_scanner::device::DeviceSettings;
 use sim_scanner::endpoint::memory::MemoryLink;
 use sim_scanner::source::Source;
@@ -18,22 +15,14 @@ pub(crate) struct MemoryConnector {
 }
 
 impl MemoryConnector {
-    pub(crate) fn new(
-        source: Source,
-        settings: DeviceSettings,
-        seed: u64,
-    ) -> (Self, Arc<Mutex<LineUse>>) {
-        let line = Arc::<Mutex<LineUse>>::default();
-        let transport = MemoryTransport {
-            link: MemoryLink::new(source, settings, seed),
-            unread: Vec::new(),
-            since: Instant::now(),
-            line: Arc::clone(&line),
-        };
-        let connector = Self {
-            transport: Some(transport),
-        };
-        (connector, line)
+    pub(crate) fn new(source: Source, settings: DeviceSettings, seed: u64) -> Self {
+        Self {
+            transport: Some(MemoryTransport {
+                link: MemoryLink::new(source, settings, seed),
+                unread: Vec::new(),
+                since: Instant::now(),
+            }),
+        }
     }
 }
 
@@ -55,22 +44,13 @@ struct MemoryTransport {
     link: MemoryLink,
     unread: Vec<u8>,
     since: Instant,
-    line: Arc<Mutex<LineUse>>,
 }
 
 impl MemoryTransport {
     fn catch_up(&mut self) {
-        let waiting =
-            self.link.device().snapshot(self.since.elapsed()).activity == Activity::Waiting;
         let passed = self.since.elapsed().saturating_sub(self.link.now());
         self.link.pass(passed);
-        let came = self.link.take();
-        let mut line = self.line.lock().unwrap_or_else(PoisonError::into_inner);
-        line.to_host_bytes += came.len() as u64;
-        if waiting {
-            line.waited_for_host += passed;
-        }
-        self.unread.extend(came);
+        self.unread.extend(self.link.take());
     }
 }
 

@@ -94,7 +94,7 @@ pub(crate) fn reference() -> Result<&'static [RawColumn]> {
         return Ok(columns);
     }
     let config = config();
-    let (connector, _) = MemoryConnector::new(config.source()?, config.device, config.seed);
+    let connector = MemoryConnector::new(config.source()?, config.device, config.seed);
     let scanner = LinkScanner::start(connector, link())?;
     let columns = whole_scan(&scanner).context("in memory")?;
     ensure!(

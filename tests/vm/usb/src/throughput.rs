@@ -1,118 +1,85 @@
-//! How fast each way to the device is. The figures are of an emulated machine: only their
-//! relation says something about another.
+//! How fast each way to the device is, USB among them. The figures are of an emulated machine:
+//! only their relation says something about another.
 
-use std::fs;
-use std::io::Write;
-use std::path::Path;
-use std::sync::PoisonError;
-use std::time::Duration;
-
-use anyhow::{Context, Result, ensure};
-use scanner_driver::{
-    LinkScanner, LinkSettings, Scanner, SerialScanner, SerialSettings, UsbScanner,
-};
-use sim_scanner::config::{Object, SimConfig};
-use sim_scanner::control::LineUse;
-use sim_scanner::endpoint::usb::{Attachment, Personality};
+use anyhow::Result;
+use scanner_driver::transport::serial::{SerialConnector, SerialSettings};
+use scanner_driver::transport::usb::UsbConnector;
+use scanner_driver::{LinkSettings, UsbSettings};
+use sim_scanner::config::SimConfig;
+use sim_scanner::device::DeviceSettings;
+use sim_scanner::endpoint::usb::{Attachment, Personality, UsbServer};
+use sim_scanner::source::Source;
+use throughput::{Attached, Case, Encoding, TABLE_HEAD, fastest_of, memory, pseudo_terminal};
 
 use crate::checks::{serial, wait_for_path};
-use crate::memory::MemoryConnector;
-use crate::scan::{link, plan, usb, wait_for};
+use crate::scan::link;
 
-const COLUMNS: u32 = 300;
-const SAMPLES: u32 = 200;
-const RECORDING: &str = "/tmp/recording.xyz";
+/// Columns by samples of each: as many as take an emulated machine a second or two.
+const SIZES: [(u32, u32); 2] = [(256, 240), (2000, 40)];
+
+/// Scans of which the fastest counts.
+const SCANS: u32 = 3;
+
+/// As fast as it goes, and as slow as a table with a spinning mirror.
+const LINE_RATES_HZ: [Option<f64>; 2] = [None, Some(50.0)];
+
+type Way = (&'static str, fn(Source, DeviceSettings) -> Result<Attached>);
+
+const WAYS: [Way; 4] = [
+    ("memory", memory),
+    ("pseudo-terminal", pseudo_terminal),
+    ("USB, bulk", bulk),
+    ("USB, CDC-ACM", cdc_acm),
+];
 
 pub(crate) fn table() -> Result<()> {
-    record(Path::new(RECORDING))?;
-    let config = SimConfig {
-        object: Object::Recording(RECORDING.into()),
-        ..SimConfig::default()
-    };
-    let source = config.source()?;
-    println!("        way to the device        MB/s   waiting for the host");
-
-    let (connector, line) = MemoryConnector::new(source.clone(), config.device.clone(), 1);
-    let scanner = LinkScanner::start(connector, fast())?;
-    let line = || *line.lock().unwrap_or_else(PoisonError::into_inner);
-    measure("memory", &scanner, line)?;
-
-    let server = config.serve_with(source.clone(), None)?;
-    let control = server.control();
-    let port = server.port().display().to_string();
-    measure("pseudo-terminal", &open_port(port)?, || control.line_use())?;
-
-    let here = Attachment::ThisMachine;
-    let server = config.serve_usb(source.clone(), Personality::Vendor, here)?;
-    let control = server.control();
-    let mut settings = usb();
-    settings.link = fast();
-    measure(
-        "USB, vendor's interface",
-        &UsbScanner::open(settings)?,
-        || control.line_use(),
-    )?;
-    drop(server);
-
-    wait_for_path(serial::PORT, false)?;
-    let server = config.serve_usb(source, Personality::CdcAcm, here)?;
-    let control = server.control();
-    let scanner = open_port(serial::PORT.into())?;
-    measure("USB, serial port", &scanner, || control.line_use())
-}
-
-fn open_port(path: String) -> Result<SerialScanner> {
-    let mut settings = SerialSettings::new(path);
-    settings.link = fast();
-    Ok(SerialScanner::open(settings)?)
-}
-
-/// As many columns in flight as the simulator keeps.
-fn fast() -> LinkSettings {
-    LinkSettings {
-        credits: 64,
-        ..link()
-    }
-}
-
-/// A bent sheet: a recording takes no time to measure.
-fn record(path: &Path) -> Result<()> {
-    let mut file = std::io::BufWriter::new(fs::File::create(path)?);
-    for column in 0..COLUMNS {
-        for sample in 0..SAMPLES {
-            let (x, y) = (f64::from(column) * 0.5, f64::from(sample) * 0.5);
-            writeln!(file, "{x} {y} {}", x * y * 0.001)?;
+    println!("{TABLE_HEAD}");
+    for line_rate_hz in LINE_RATES_HZ {
+        for (samples, columns) in SIZES {
+            for encoding in [Encoding::Uniform, Encoding::Listed] {
+                let case = Case {
+                    columns,
+                    samples,
+                    encoding,
+                    line_rate_hz,
+                };
+                for (way, attach) in WAYS {
+                    // As many columns in flight as the simulator keeps.
+                    let link = LinkSettings {
+                        credits: 64,
+                        ..link()
+                    };
+                    let scans = if line_rate_hz.is_some() { 1 } else { SCANS };
+                    println!("{}", fastest_of(scans, way, &case, &link, attach)?);
+                }
+            }
         }
     }
-    Ok(file.flush()?)
+    Ok(())
 }
 
-fn measure(way: &str, scanner: &dyn Scanner, line: impl Fn() -> LineUse) -> Result<()> {
-    wait_for(scanner)?;
-    scanner.home().context("homing")?;
-    let mut stream = scanner.start_scan(&plan(scanner)?).context("start")?;
-    let acknowledger = stream.acknowledger();
-    // From the first column on: what comes before is the table's way.
-    let mut begin = None;
-    let mut samples = 0;
-    while let Some(column) = stream.next().with_context(|| way.to_owned())? {
-        acknowledger.acknowledge(column.index);
-        samples += column.samples.len();
-        begin.get_or_insert_with(|| (std::time::Instant::now(), line()));
-    }
-    let after = line();
-    let (start, before) = begin.context("no column")?;
-    ensure!(
-        samples == (COLUMNS * SAMPLES) as usize,
-        "{way}: {samples} samples"
-    );
-    let elapsed = start.elapsed();
-    let bytes = after.to_host_bytes - before.to_host_bytes;
-    let waited: Duration = after.waited_for_host - before.waited_for_host;
-    println!(
-        "        {way:<24} {:>5.2}   {:>3.0} %",
-        bytes as f64 / elapsed.as_secs_f64() / 1e6,
-        100.0 * waited.as_secs_f64() / elapsed.as_secs_f64()
-    );
-    Ok(())
+fn serve(source: Source, device: DeviceSettings, as_what: Personality) -> Result<UsbServer> {
+    let config = SimConfig {
+        device,
+        ..SimConfig::default()
+    };
+    Ok(config.serve_usb(source, as_what, Attachment::ThisMachine)?)
+}
+
+fn bulk(source: Source, device: DeviceSettings) -> Result<Attached> {
+    let settings = UsbSettings {
+        serial: Some(device.serial.clone()),
+        ..UsbSettings::default()
+    };
+    let server = serve(source, device, Personality::Vendor)?;
+    let control = server.control();
+    Ok(Attached::new(UsbConnector::new(&settings), control, server))
+}
+
+fn cdc_acm(source: Source, device: DeviceSettings) -> Result<Attached> {
+    // Whatever was there before must be gone, or this becomes another port.
+    wait_for_path(serial::PORT, false)?;
+    let server = serve(source, device, Personality::CdcAcm)?;
+    let connector = SerialConnector::new(&SerialSettings::new(serial::PORT));
+    Ok(Attached::new(connector, server.control(), server))
 }

@@ -131,6 +131,16 @@ pub(super) fn purge(bench: &mut Bench) -> Result<()> {
     ] {
         ensure!(!exists(path), "{path} is still there");
     }
+    // The user stays, so that nobody else gets its number, and nobody can be it.
+    id_of("/etc/passwd", "relief")?;
+    let account = run("getent", &["passwd", "relief"])?;
+    ensure!(account.trim_end().ends_with("/nologin"), "{account}");
+    let shadow = fs::read_to_string("/etc/shadow")?;
+    let password = shadow
+        .lines()
+        .find_map(|line| line.strip_prefix("relief:"))
+        .unwrap_or_default();
+    ensure!(password.starts_with(['!', '*']), "it has a password");
     let (known, _, _) = try_run("dpkg-query", &["--status", "relief"])?;
     ensure!(!known, "dpkg still knows it");
     bench.first = None;

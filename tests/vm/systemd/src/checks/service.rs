@@ -72,8 +72,11 @@ pub(super) fn journal(bench: &mut Bench) -> Result<()> {
                 .is_some_and(|m| m.starts_with("scan complete"))
         })
         .with_context(|| format!("no entry on the end of the scan in {entries:?}"))?;
+    // What `journalctl` shows names the scan too.
+    let message = format!("scan complete scan={}", bench.first()?);
     let user = id_of("/etc/passwd", "relief")?.to_string();
     for (field, wanted) in [
+        ("MESSAGE", message.as_str()),
         ("RELIEF_SCAN", bench.first()?),
         ("PRIORITY", "6"),
         ("SYSLOG_IDENTIFIER", "reliefd"),

@@ -10,27 +10,35 @@ use range_image::Column;
 use regrid::{RegridSettings, Roi};
 
 /// What is known so far of a scan's extent, beside the grid it shall have.
-pub(super) struct Fit {
+#[derive(Debug)]
+pub(crate) struct Fit {
     roi: Roi,
     pitch_mm: f64,
-    /// As many as the journal has room for.
+    /// Those to come included.
     most_samples: usize,
     extent: Option<Extent>,
 }
 
 impl Fit {
-    pub(super) fn new(settings: &RegridSettings, journal: &Path) -> Self {
-        let bytes = std::fs::metadata(journal).map_or(0, |metadata| metadata.len());
+    /// Of a scan that has at most so many samples.
+    pub(crate) fn new(settings: &RegridSettings, most_samples: usize) -> Self {
         Self {
             roi: settings.roi,
             pitch_mm: settings.pitch_mm,
-            most_samples: usize::try_from(bytes).unwrap_or(usize::MAX) / scan_record::SAMPLE_BYTES,
+            most_samples,
             extent: None,
         }
     }
 
+    /// Of a scan that has as many samples as its journal has room for.
+    pub(crate) fn of_journal(settings: &RegridSettings, journal: &Path) -> Self {
+        let bytes = std::fs::metadata(journal).map_or(0, |metadata| metadata.len());
+        let most_samples = usize::try_from(bytes).unwrap_or(usize::MAX) / scan_record::SAMPLE_BYTES;
+        Self::new(settings, most_samples)
+    }
+
     /// Takes the next column into account.
-    pub(super) fn add(&mut self, column: &Column) {
+    pub(crate) fn add(&mut self, column: &Column) {
         let more = Extent::within(std::slice::from_ref(column), &self.roi);
         self.extent = match (self.extent, more) {
             (Some(extent), Some(more)) => Some(extent.joined(more)),
@@ -39,7 +47,7 @@ impl Fit {
     }
 
     /// The grid is too fine, whatever the columns to come.
-    pub(super) fn is_missed(&self) -> bool {
+    pub(crate) fn is_missed(&self) -> bool {
         self.extent.is_some_and(|extent| {
             let most = self.most_samples.max(extent.samples());
             self.pitch_mm < extent.finest_pitch_among_mm(most)
@@ -47,7 +55,7 @@ impl Fit {
     }
 
     /// What is wrong, and what to do, in words that follow the scan's name.
-    pub(super) fn told(&self) -> Option<(String, String)> {
+    pub(crate) fn told(&self) -> Option<(String, String)> {
         let extent = self.extent?;
         let [width, height] = extent.sides_mm();
         let error = format!(
