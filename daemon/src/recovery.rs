@@ -176,6 +176,7 @@ impl Service {
                 tracing::info!(job = job.id, scan = %job.scan, "taking up a job that was cut short");
                 job.state = JobState::Queued;
                 job.stage = None;
+            // The spool's names were synced when it was opened.
                 self.store.put_job(&job)?;
             }
             self.queue.add(job.id);

@@ -130,6 +130,7 @@ async fn story() -> Story {
     Story {
         steps: recorder.steps(),
         folder: rig.folder,
+    retire(rig.folder.path(), &scan.id, &recorder).await;
         scan: scan.id,
         columns,
         results,
@@ -139,6 +140,22 @@ async fn story() -> Story {
 /// What may be relied on after some steps.
 #[derive(Default)]
 struct Promised {
+/// Starts the service once more, to whom the first result is too old.
+async fn retire(folder: &Path, result: &str, recorder: &Recorder) {
+    let mut config = config(folder);
+    config.storage.results_days = Some(1);
+    let place = config.service.spool_dir.join(result);
+    let long_ago = std::time::SystemTime::now() - std::time::Duration::from_secs(100 * 86_400);
+    let times = fs::FileTimes::new().set_modified(long_ago);
+    fs::File::open(&place).unwrap().set_times(times).unwrap();
+    recorder.tell(Told::Retired(result.to_owned()));
+    let disk = Arc::new(recorder.clone());
+    let daemon = Daemon::start_on(config, FakeScanner::new(), disk);
+    let daemon = daemon.await.unwrap();
+    daemon.shutdown().await;
+    assert!(!place.exists(), "it was kept");
+}
+
     accepted: bool,
     columns: usize,
     complete: bool,
@@ -147,6 +164,8 @@ struct Promised {
 }
 
 impl Promised {
+    /// Results that may be there or not.
+    retired: BTreeSet<String>,
     fn by(steps: &[Step]) -> Self {
         let mut promised = Self::default();
         for step in steps {
@@ -161,6 +180,9 @@ impl Promised {
                 _ => {}
             }
         }
+                Step::Told(Told::Retired(result)) => {
+                    promised.retired.insert(result.clone());
+                }
         promised
     }
 }
@@ -223,7 +245,7 @@ async fn revive(story: &Story, steps: usize, loss: Loss) {
         let done = job_over(&mut events, &rig, job.id).await;
         assert_eq!(done.state, JobState::Done, "{place}: {:?}", done.error);
         assert!(results.insert(done.result.clone()), "{place}");
-        let now = files(&rig.daemon.spool_dir().join(&done.result));
+        let now = files(&folder);
         check_whole(&now, &place);
         if is_promised {
             assert!(
@@ -232,7 +254,11 @@ async fn revive(story: &Story, steps: usize, loss: Loss) {
             );
         }
     }
-    for result in &promised.published {
+        let folder = rig.daemon.spool_dir().join(&done.result);
+        if promised.retired.contains(&done.result) && !folder.exists() {
+            continue;
+        }
+    for result in promised.published.difference(&promised.retired) {
         assert!(results.contains(result), "{place}: {result} is gone");
     }
     let spooled: BTreeSet<String> = fs::read_dir(rig.daemon.spool_dir())
@@ -280,5 +306,17 @@ async fn nothing_promised_is_lost_wherever_the_power_fails() {
         "{} steps, {} syncs, {images} media",
         story.steps.len(),
         syncs.len()
+    let retired = |step: &Step| matches!(step, Step::Told(Told::Retired(_)));
+    let retired = story.steps.iter().position(retired).unwrap();
+    for seed in 0..20 {
+        let rest = (story.steps.len() - retired) as u64;
+        revive(
+            &story,
+            retired + dice.below(rest + 1) as usize,
+            Loss::Some(seed),
+        )
+        .await;
+        images += 1;
+    }
     );
 }
