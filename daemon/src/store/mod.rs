@@ -10,6 +10,7 @@ mod error;
 mod record;
 mod salvage;
 
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::{Duration, Instant};
@@ -72,7 +73,7 @@ impl Store {
     /// Opens the records, making them if there are none, and mending them if need be.
     pub(crate) fn open(disk: Arc<dyn Disk>, path: &Path) -> Result<Self, StoreError> {
         let failed = |error: &redb::Error| StoreError::of(path, error);
-        if !path.exists() {
+        if !path.exists() && !salvage::take_up(&*disk, path)? {
             put_new(&*disk, path).map_err(|error| failed(&error))?;
         }
         let database = match salvage::open_whole(&*disk, path)? {
@@ -262,10 +263,11 @@ fn put_new(disk: &dyn Disk, path: &Path) -> Result<(), redb::Error> {
     remove_file_if_there(disk, &new)?;
     open_database(disk, &new)?.close()?;
     disk.rename(&new, path)?;
-    if let Some(folder) = path.parent() {
-        disk.sync_dir(folder)?;
-    }
-    Ok(())
+    Ok(sync_folder(disk, path)?)
+}
+
+fn sync_folder(disk: &dyn Disk, path: &Path) -> io::Result<()> {
+    path.parent().map_or(Ok(()), |folder| disk.sync_dir(folder))
 }
 
 #[cfg(test)]
