@@ -167,6 +167,7 @@ impl Daemon {
 
         let stop = CancellationToken::new();
         let context = Context {
+        service.measure_free();
             service: Arc::clone(&service),
             stop: stop.clone(),
             listeners: Arc::new(Semaphore::new(limits.listeners)),

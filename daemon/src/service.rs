@@ -21,6 +21,7 @@ use crate::jobs::Queue;
 use crate::laser::{Laser, Watched};
 use crate::liveness::Liveness;
 use crate::scans::Slot;
+use crate::space::Measured;
 use crate::spool::Spool;
 use crate::store::Store;
 use crate::tokens::Tokens;
@@ -57,8 +58,8 @@ pub(crate) struct Service {
     grids: Mutex<BTreeMap<String, KeptGrid>>,
     /// Scans that are over and whose records the disk refused.
     pub(crate) unkept: Mutex<Vec<Scan>>,
-    /// Bytes of kept scans and of results, as of the last look.
-    pub(crate) kept_bytes: Mutex<(u64, u64)>,
+    /// Room on the disks, as of the last look.
+    pub(crate) measured: Mutex<Measured>,
     started_at: String,
     stopping: Mutex<bool>,
     stop_told: Condvar,
@@ -112,7 +113,7 @@ impl Service {
             }),
             grids: Mutex::default(),
             unkept: Mutex::default(),
-            kept_bytes: Mutex::default(),
+            measured: Mutex::default(),
             started_at: now(),
             stopping: Mutex::new(false),
             stop_told: Condvar::new(),

@@ -84,14 +84,15 @@ fn complete(tokens: Router<Context>, context: &Context) -> Router {
         .with_state(context.clone())
 }
 
-async fn status(State(context): State<Context>) -> Json<Status> {
-    Json(context.service.status())
+// Both wait for whoever just writes a line to the log of the laser.
+async fn status(State(context): State<Context>) -> Result<Json<Status>, Refusal> {
+    let status = blocking(context, |service| Ok(service.status()));
+    status.await.map(Json)
 }
 
-async fn laser(State(context): State<Context>) -> Json<LaserLog> {
-    Json(LaserLog {
-        entries: context.service.laser.entries(),
-    })
+async fn laser(State(context): State<Context>) -> Result<Json<LaserLog>, Refusal> {
+    let entries = blocking(context, |service| Ok(service.laser.entries())).await?;
+    Ok(Json(LaserLog { entries }))
 }
 
 /// Runs something that may block where blocking is allowed.
