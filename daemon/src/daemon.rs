@@ -147,8 +147,11 @@ impl Daemon {
         let store = Store::open_soon(&disk, &records, HANDOVER).await?;
         remove_grids(&scans_dir);
         let spool = Spool::open(Arc::clone(&disk), &config.service.spool_dir)?;
-        let tokens = Tokens::open(&config.service.state_dir.join("tokens.json"))?;
-        let laser = Laser::open(&config.service.state_dir.join("laser.jsonl"))?;
+        let tokens = Tokens::open(
+            Arc::clone(&disk),
+            &config.service.state_dir.join("tokens.json"),
+        )?;
+        let laser = Laser::open(&*disk, &config.service.state_dir.join("laser.jsonl"))?;
         let offered = inherited.or_bind(&config.service).await?;
         let workers = config.queue.workers;
         let limits = config.http;
@@ -164,10 +167,10 @@ impl Daemon {
         service.adopt_journals().map_err(StartError::Recover)?;
         service.recover_jobs().map_err(StartError::Recover)?;
         service.sweep();
+        service.measure_free();
 
         let stop = CancellationToken::new();
         let context = Context {
-        service.measure_free();
             service: Arc::clone(&service),
             stop: stop.clone(),
             listeners: Arc::new(Semaphore::new(limits.listeners)),

@@ -1,28 +1,26 @@
 //! The laser: whether it is on, and a log of every change with its cause.
 //!
 //! The log is `laser.jsonl` in the state folder: one JSON object a line, only ever appended
-//! to. A line that says `on` is on disk before the scanner is asked.
+//! to. A line that says `on` is on disk before the scanner is asked, if the disk takes it.
+
+mod log;
 
 use std::collections::VecDeque;
-use std::fs::{File, OpenOptions};
-use std::io::{self, Read, Seek, SeekFrom, Write};
-use std::os::unix::fs::OpenOptionsExt;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use relief_api::{LaserEntry, LaserState, ScanState};
 use scanner_driver::{DeviceStatus, ScanStream, Scanner, ScannerError};
 use scanner_protocol::{Identity, ScanPlan};
+use storage::Disk;
 
 use crate::ids::now;
 use crate::service::lock;
+use log::Log;
 
 /// Entries that are kept for showing; the file has all.
 const MOST_SHOWN: usize = 1_000;
-/// How much of the file's end is read at the start: more than that many entries take.
-const TAIL_BYTES: u64 = 512 * 1024;
-/// For the service's user to write, and for its group to read.
-const FILE_MODE: u32 = 0o640;
 
 /// The log of the laser cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -46,7 +44,7 @@ pub(crate) struct Laser {
 
 #[derive(Debug)]
 struct Known {
-    file: File,
+    log: Log,
     entries: VecDeque<LaserEntry>,
     /// The scan that is about to begin.
     next_scan: Option<String>,
@@ -60,22 +58,14 @@ struct Known {
 
 impl Laser {
     /// Opens the log, and notes if the service last ended with the laser on.
-    pub(crate) fn open(path: &Path) -> Result<Self, LaserLogError> {
-        let failed = |source| LaserLogError {
+    pub(crate) fn open(disk: &dyn Disk, path: &Path) -> Result<Self, LaserLogError> {
+        let (log, entries) = Log::open(disk, path).map_err(|source| LaserLogError {
             path: path.to_owned(),
             source,
-        };
-        let mut file = OpenOptions::new()
-            .read(true)
-            .append(true)
-            .create(true)
-            .mode(FILE_MODE)
-            .open(path)
-            .map_err(failed)?;
-        let entries = read_tail(&mut file).map_err(failed)?;
+        })?;
         let laser = Self {
             known: Mutex::new(Known {
-                file,
+                log,
                 entries,
                 next_scan: None,
                 scan: None,
@@ -195,39 +185,18 @@ impl Known {
             LaserState::Off => tracing::info!(cause, scan = entry.scan, "laser off"),
             LaserState::Unknown => tracing::warn!(cause, scan = entry.scan, "laser unknown"),
         }
-        if let Err(error) = append(&mut self.file, &entry) {
-            tracing::error!(%error, "the log of the laser cannot be written");
+        if let Err(error) = self.log.append(&entry) {
+            tracing::error!(
+                %error,
+                cause,
+                "the log of the laser cannot be written now; its next line brings this one along"
+            );
         }
         self.entries.push_back(entry);
         if self.entries.len() > MOST_SHOWN {
             self.entries.pop_front();
         }
     }
-}
-
-fn append(file: &mut File, entry: &LaserEntry) -> io::Result<()> {
-    let mut line = serde_json::to_vec(entry)?;
-    line.push(b'\n');
-    // In one piece, so that no line is ever mixed with another.
-    file.write_all(&line)?;
-    file.sync_data()
-}
-
-/// The last entries of the log. A line that a crash cut short is passed over, and ended.
-fn read_tail(file: &mut File) -> io::Result<VecDeque<LaserEntry>> {
-    let bytes = file.seek(SeekFrom::End(0))?;
-    file.seek(SeekFrom::Start(bytes.saturating_sub(TAIL_BYTES)))?;
-    let mut tail = Vec::new();
-    file.take(TAIL_BYTES).read_to_end(&mut tail)?;
-    if tail.last().is_some_and(|&last| last != b'\n') {
-        file.write_all(b"\n")?;
-    }
-    let mut entries: VecDeque<LaserEntry> = tail
-        .split(|&b| b == b'\n')
-        .filter_map(|line| serde_json::from_slice(line).ok())
-        .collect();
-    entries.drain(..entries.len().saturating_sub(MOST_SHOWN));
-    Ok(entries)
 }
 
 /// A scanner whose laser is watched: every call that may switch it is noted.
@@ -308,13 +277,18 @@ impl Scanner for Watched {
 
 #[cfg(test)]
 mod tests {
+    use std::fs::OpenOptions;
+    use std::io::Write;
+
+    use storage::LocalDisk;
+
     use super::*;
 
     #[test]
     fn the_log_is_appended_to_and_survives_torn_lines() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("laser.jsonl");
-        let laser = Laser::open(&path).unwrap();
+        let laser = Laser::open(&LocalDisk, &path).unwrap();
         assert_eq!(laser.latest(), None);
         laser.scan_begins("s");
         laser.begin();
@@ -324,14 +298,14 @@ mod tests {
         let mut file = OpenOptions::new().append(true).open(&path).unwrap();
         file.write_all(b"{\"at\":\"2026").unwrap();
 
-        let laser = Laser::open(&path).unwrap();
+        let laser = Laser::open(&LocalDisk, &path).unwrap();
         laser.note(LaserState::Off, "the scanner says that it is off");
         let states: Vec<LaserState> = laser.entries().iter().map(|e| e.laser).collect();
         let expected = [LaserState::On, LaserState::Unknown, LaserState::Off];
         assert_eq!(states, expected);
         assert_eq!(laser.entries()[0].scan.as_deref(), Some("s"));
         assert!(laser.entries()[1].cause.contains("dead-man"));
-        let again = Laser::open(&path).unwrap();
+        let again = Laser::open(&LocalDisk, &path).unwrap();
         assert_eq!(again.entries(), laser.entries());
         let text = std::fs::read_to_string(&path).unwrap();
         assert_eq!(text.lines().count(), 4, "{text}");
@@ -340,7 +314,7 @@ mod tests {
     #[test]
     fn nobody_knows_of_a_pause_whether_the_laser_is_on() {
         let folder = tempfile::tempdir().unwrap();
-        let laser = Laser::open(&folder.path().join("laser.jsonl")).unwrap();
+        let laser = Laser::open(&LocalDisk, &folder.path().join("laser.jsonl")).unwrap();
         laser.scan_begins("s");
         laser.begin();
         laser.scan_paused("the cable was pulled");
@@ -368,7 +342,7 @@ mod tests {
             .map(|n| serde_json::to_string(&entry(n)).unwrap() + "\n")
             .collect();
         std::fs::write(&path, text).unwrap();
-        let laser = Laser::open(&path).unwrap();
+        let laser = Laser::open(&LocalDisk, &path).unwrap();
         assert_eq!(laser.entries().len(), MOST_SHOWN);
         assert_eq!(laser.latest(), Some(entry(8_999)));
     }

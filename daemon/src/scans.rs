@@ -343,8 +343,9 @@ mod tests {
                 disk: Arc::new(LocalDisk),
                 store: Store::open(Arc::new(LocalDisk), &folder.path().join("store")).unwrap(),
                 spool: Spool::open(Arc::new(LocalDisk), &folder.path().join("spool")).unwrap(),
-                tokens: Tokens::open(&folder.path().join("tokens.json")).unwrap(),
-                laser: Laser::open(&folder.path().join("laser.jsonl")).unwrap(),
+                tokens: Tokens::open(Arc::new(LocalDisk), &folder.path().join("tokens.json"))
+                    .unwrap(),
+                laser: Laser::open(&LocalDisk, &folder.path().join("laser.jsonl")).unwrap(),
             },
             folder.path().to_owned(),
         );
@@ -363,8 +364,8 @@ mod tests {
             settings: relief_api::SettingOverrides::new(),
             jobs: Vec::new(),
             removed_at: None,
-        };
             put_back_at: None,
+        };
         service.store.put_scan(&scan).unwrap();
         let header = Header {
             calibration: Calibration {
@@ -387,20 +388,20 @@ mod tests {
             };
             journal.append(&column).unwrap();
         }
-        drop(journal);
         let path = service.journal_path(&scan.id);
         let taken = || std::fs::metadata(&path).unwrap().blocks() * 512;
         let before = taken();
         journal.reserve(1_000, 1_000).unwrap();
         let set_aside = taken() - before;
+        drop(journal);
 
         service.recover_scans().unwrap();
-        let found = service.scan(&scan.id).unwrap();
         if set_aside == 0 {
             println!("skipped: this file system sets no room aside");
         } else {
             assert_eq!(taken(), before, "room that a crash left set aside");
         }
+        let found = service.scan(&scan.id).unwrap();
         assert_eq!((found.state, found.columns), (ScanState::Interrupted, 4));
         let reason = found.reason.unwrap();
         assert!(

@@ -6,7 +6,9 @@ mod room;
 
 use std::sync::Arc;
 
-use relief_api::{Event, Job, JobState, Rerun, Scan, ScanState, StartScan, Status, path};
+use relief_api::{
+    Event, Job, JobState, LaserEntry, LaserLog, Rerun, Scan, ScanState, StartScan, Status, path,
+};
 use reliefd::Config;
 use rustix::io::Errno;
 use scan_record::JournalReader;

@@ -14,7 +14,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use deliverables::Manifest;
-use relief_api::{Event, Job, JobState, PlanRequest, Rerun, Scan, ScanState, StartScan, path};
+use relief_api::{
+    Event, Job, JobState, LaserLog, LaserState, PlanRequest, Rerun, Scan, ScanState, StartScan,
+    path,
+};
 use reliefd::Daemon;
 use scan_record::{JournalReader, RawColumn};
 
@@ -127,19 +130,16 @@ async fn story() -> Story {
         })
         .into();
     rig.daemon.shutdown().await;
+    retire(rig.folder.path(), &scan.id, &recorder).await;
     Story {
         steps: recorder.steps(),
         folder: rig.folder,
-    retire(rig.folder.path(), &scan.id, &recorder).await;
         scan: scan.id,
         columns,
         results,
     }
 }
 
-/// What may be relied on after some steps.
-#[derive(Default)]
-struct Promised {
 /// Starts the service once more, to whom the first result is too old.
 async fn retire(folder: &Path, result: &str, recorder: &Recorder) {
     let mut config = config(folder);
@@ -156,16 +156,19 @@ async fn retire(folder: &Path, result: &str, recorder: &Recorder) {
     assert!(!place.exists(), "it was kept");
 }
 
+/// What may be relied on after some steps.
+#[derive(Default)]
+struct Promised {
     accepted: bool,
     columns: usize,
     complete: bool,
     queued: Option<u64>,
     published: BTreeSet<String>,
+    /// Results that may be there or not.
+    retired: BTreeSet<String>,
 }
 
 impl Promised {
-    /// Results that may be there or not.
-    retired: BTreeSet<String>,
     fn by(steps: &[Step]) -> Self {
         let mut promised = Self::default();
         for step in steps {
@@ -177,12 +180,12 @@ impl Promised {
                 Step::Told(Told::Published(result)) => {
                     promised.published.insert(result.clone());
                 }
-                _ => {}
-            }
-        }
                 Step::Told(Told::Retired(result)) => {
                     promised.retired.insert(result.clone());
                 }
+                _ => {}
+            }
+        }
         promised
     }
 }
@@ -232,6 +235,13 @@ async fn revive(story: &Story, steps: usize, loss: Loss) {
         let known: Vec<u64> = jobs.jobs.iter().rev().map(|job| job.id).collect();
         assert_eq!(scan.jobs, known, "{place}");
     }
+    // The laser was on before there was a column.
+    let log: LaserLog = rig.client.get(path::LASER).await;
+    let was_on = log
+        .entries
+        .iter()
+        .any(|entry| entry.laser == LaserState::On);
+    assert!(was_on || promised.columns == 0, "{place}: {log:?}");
     if let Some(job) = promised.queued {
         assert!(jobs.jobs.iter().any(|j| j.id == job), "{place}: {jobs:?}");
     }
@@ -244,6 +254,10 @@ async fn revive(story: &Story, steps: usize, loss: Loss) {
         }
         let done = job_over(&mut events, &rig, job.id).await;
         assert_eq!(done.state, JobState::Done, "{place}: {:?}", done.error);
+        let folder = rig.daemon.spool_dir().join(&done.result);
+        if promised.retired.contains(&done.result) && !folder.exists() {
+            continue;
+        }
         assert!(results.insert(done.result.clone()), "{place}");
         let now = files(&folder);
         check_whole(&now, &place);
@@ -254,10 +268,6 @@ async fn revive(story: &Story, steps: usize, loss: Loss) {
             );
         }
     }
-        let folder = rig.daemon.spool_dir().join(&done.result);
-        if promised.retired.contains(&done.result) && !folder.exists() {
-            continue;
-        }
     for result in promised.published.difference(&promised.retired) {
         assert!(results.contains(result), "{place}: {result} is gone");
     }
@@ -296,16 +306,6 @@ async fn nothing_promised_is_lost_wherever_the_power_fails() {
         revive(&story, at + 1, Loss::All).await;
         images += 3;
     }
-    for seed in 0..60 {
-        let at = dice.below(story.steps.len() as u64 + 1) as usize;
-        revive(&story, at, Loss::Some(seed)).await;
-        revive(&story, at, Loss::Nothing).await;
-        images += 2;
-    }
-    println!(
-        "{} steps, {} syncs, {images} media",
-        story.steps.len(),
-        syncs.len()
     let retired = |step: &Step| matches!(step, Step::Told(Told::Retired(_)));
     let retired = story.steps.iter().position(retired).unwrap();
     for seed in 0..20 {
@@ -318,5 +318,15 @@ async fn nothing_promised_is_lost_wherever_the_power_fails() {
         .await;
         images += 1;
     }
+    for seed in 0..60 {
+        let at = dice.below(story.steps.len() as u64 + 1) as usize;
+        revive(&story, at, Loss::Some(seed)).await;
+        revive(&story, at, Loss::Nothing).await;
+        images += 2;
+    }
+    println!(
+        "{} steps, {} syncs, {images} media",
+        story.steps.len(),
+        syncs.len()
     );
 }
