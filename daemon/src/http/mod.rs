@@ -27,7 +27,7 @@ use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
 pub use listen::ListenError;
-pub(crate) use listen::{bind_loopback, bind_socket};
+pub(crate) use listen::{bind_loopback, bind_socket, check_handed_over};
 pub(crate) use serve::serve;
 
 use crate::service::Service;
