@@ -56,7 +56,13 @@ pub(crate) fn on_loopback(context: &Context) -> Router {
     let tokens = Router::new()
         .route(path::TOKENS, any(tokens::only_on_the_socket))
         .route(path::TOKEN_REVOKE, any(tokens::only_on_the_socket));
-    complete(tokens, context).layer(from_fn_with_state(context.clone(), guard::bearers_only))
+    // Places of their own: bearers of tokens must not take those of the socket.
+    let listeners = context.service.config().http.listeners;
+    let context = Context {
+        listeners: Arc::new(Semaphore::new(listeners)),
+        ..context.clone()
+    };
+    complete(tokens, &context).layer(from_fn_with_state(context, guard::bearers_only))
 }
 
 fn complete(tokens: Router<Context>, context: &Context) -> Router {
