@@ -168,9 +168,12 @@ impl Daemon {
         let store = Store::open_soon(&disk, &records, HANDOVER).await?;
         remove_grids(&scans_dir);
         let spool = Spool::open(Arc::clone(&disk), &config.service.spool_dir)?;
-        let tokens = Tokens::open(&config.service.state_dir.join("tokens.json"))?;
+        let tokens = Tokens::open(
+            Arc::clone(&disk),
+            &config.service.state_dir.join("tokens.json"),
+        )?;
         let hub = Arc::new(Hub::default());
-        let stations = make_all(&config, scanners, &hub)?;
+        let stations = make_all(&config, scanners, &hub, &*disk)?;
         let offered = inherited.or_bind(&config.service).await?;
         let workers = config.queue.workers;
         let limits = config.http;
@@ -185,6 +188,7 @@ impl Daemon {
         service.adopt_journals().map_err(StartError::Recover)?;
         service.recover_jobs().map_err(StartError::Recover)?;
         service.sweep();
+        service.measure_free();
 
         let stop = CancellationToken::new();
         let context = Context {

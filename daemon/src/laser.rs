@@ -1,28 +1,26 @@
 //! The laser: whether it is on, and a log of every change with its cause.
 //!
 //! Each scanner has a log in the state folder: one JSON object a line, only ever appended
-//! to. A line that says `on` is on disk before the scanner is asked.
+//! to. A line that says `on` is on disk before the scanner is asked, if the disk takes it.
+
+mod log;
 
 use std::collections::VecDeque;
-use std::fs::{File, OpenOptions};
-use std::io::{self, Read, Seek, SeekFrom, Write};
-use std::os::unix::fs::OpenOptionsExt;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use relief_api::{LaserEntry, LaserState, ScanState, THE_SCANNER};
 use scanner_driver::{DeviceStatus, ScanStream, Scanner, ScannerError};
 use scanner_protocol::{Identity, ScanPlan};
+use storage::Disk;
 
 use crate::ids::now;
 use crate::service::lock;
+use log::Log;
 
 /// Entries that are kept for showing; the file has all.
 pub(crate) const MOST_SHOWN: usize = 1_000;
-/// How much of the file's end is read at the start: more than that many entries take.
-const TAIL_BYTES: u64 = 512 * 1024;
-/// For the service's user to write, and for its group to read.
-const FILE_MODE: u32 = 0o640;
 
 /// The log of the laser cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -47,7 +45,7 @@ pub(crate) struct Laser {
 #[derive(Debug)]
 struct Known {
     scanner: String,
-    file: File,
+    log: Log,
     entries: VecDeque<LaserEntry>,
     /// The scan that is about to begin.
     next_scan: Option<String>,
@@ -62,20 +60,14 @@ struct Known {
 impl Laser {
     /// Opens a scanner's log in the state folder, and notes if the service last ended with the
     /// laser on.
-    pub(crate) fn open(state_dir: &Path, scanner: &str) -> Result<Self, LaserLogError> {
+    pub(crate) fn open(
+        disk: &dyn Disk,
+        state_dir: &Path,
+        scanner: &str,
+    ) -> Result<Self, LaserLogError> {
         let path = state_dir.join(file_name(scanner));
-        let failed = |source| LaserLogError {
-            path: path.clone(),
-            source,
-        };
-        let mut file = OpenOptions::new()
-            .read(true)
-            .append(true)
-            .create(true)
-            .mode(FILE_MODE)
-            .open(&path)
-            .map_err(failed)?;
-        let mut entries = read_tail(&mut file).map_err(failed)?;
+        let (log, mut entries) =
+            Log::open(disk, &path).map_err(|source| LaserLogError { path, source })?;
         for entry in &mut entries {
             // Of a version in which scanners had no names.
             if entry.scanner.is_empty() {
@@ -85,7 +77,7 @@ impl Laser {
         let laser = Self {
             known: Mutex::new(Known {
                 scanner: scanner.to_owned(),
-                file,
+                log,
                 entries,
                 next_scan: None,
                 scan: None,
@@ -207,8 +199,12 @@ impl Known {
             LaserState::Off => tracing::info!(scanner, cause, scan, "laser off"),
             LaserState::Unknown => tracing::warn!(scanner, cause, scan, "laser unknown"),
         }
-        if let Err(error) = append(&mut self.file, &entry) {
-            tracing::error!(%error, "the log of the laser cannot be written");
+        if let Err(error) = self.log.append(&entry) {
+            tracing::error!(
+                %error,
+                cause,
+                "the log of the laser cannot be written now; its next line brings this one along"
+            );
         }
         self.entries.push_back(entry);
         if self.entries.len() > MOST_SHOWN {
@@ -235,41 +231,16 @@ fn scanner_of(file_name: &str) -> Option<&str> {
 
 /// Ends the logs of scanners that are configured no more, so that none says for ever that a
 /// laser is on.
-pub(crate) fn end_other_logs(state_dir: &Path, configured: &[&str]) {
+pub(crate) fn end_other_logs(disk: &dyn Disk, state_dir: &Path, configured: &[&str]) {
     for entry in std::fs::read_dir(state_dir).into_iter().flatten().flatten() {
         let file = entry.file_name();
         let scanner = file.to_str().and_then(scanner_of);
         if let Some(scanner) = scanner.filter(|name| !configured.contains(name))
-            && let Err(error) = Laser::open(state_dir, scanner)
+            && let Err(error) = Laser::open(disk, state_dir, scanner)
         {
             tracing::warn!(scanner, %error, "the log of a laser is left as it is");
         }
     }
-}
-
-fn append(file: &mut File, entry: &LaserEntry) -> io::Result<()> {
-    let mut line = serde_json::to_vec(entry)?;
-    line.push(b'\n');
-    // In one piece, so that no line is ever mixed with another.
-    file.write_all(&line)?;
-    file.sync_data()
-}
-
-/// The last entries of the log. A line that a crash cut short is passed over, and ended.
-fn read_tail(file: &mut File) -> io::Result<VecDeque<LaserEntry>> {
-    let bytes = file.seek(SeekFrom::End(0))?;
-    file.seek(SeekFrom::Start(bytes.saturating_sub(TAIL_BYTES)))?;
-    let mut tail = Vec::new();
-    file.take(TAIL_BYTES).read_to_end(&mut tail)?;
-    if tail.last().is_some_and(|&last| last != b'\n') {
-        file.write_all(b"\n")?;
-    }
-    let mut entries: VecDeque<LaserEntry> = tail
-        .split(|&b| b == b'\n')
-        .filter_map(|line| serde_json::from_slice(line).ok())
-        .collect();
-    entries.drain(..entries.len().saturating_sub(MOST_SHOWN));
-    Ok(entries)
 }
 
 /// A scanner whose laser is watched: every call that may switch it is noted.
@@ -350,13 +321,18 @@ impl Scanner for Watched {
 
 #[cfg(test)]
 mod tests {
+    use std::fs::OpenOptions;
+    use std::io::Write;
+
+    use storage::LocalDisk;
+
     use super::*;
 
     #[test]
     fn the_log_is_appended_to_and_survives_torn_lines() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("laser.jsonl");
-        let laser = Laser::open(folder.path(), THE_SCANNER).unwrap();
+        let laser = Laser::open(&LocalDisk, folder.path(), THE_SCANNER).unwrap();
         assert_eq!(laser.latest(), None);
         laser.scan_begins("s");
         laser.begin();
@@ -366,14 +342,14 @@ mod tests {
         let mut file = OpenOptions::new().append(true).open(&path).unwrap();
         file.write_all(b"{\"at\":\"2026").unwrap();
 
-        let laser = Laser::open(folder.path(), THE_SCANNER).unwrap();
+        let laser = Laser::open(&LocalDisk, folder.path(), THE_SCANNER).unwrap();
         laser.note(LaserState::Off, "the scanner says that it is off");
         let states: Vec<LaserState> = laser.entries().iter().map(|e| e.laser).collect();
         let expected = [LaserState::On, LaserState::Unknown, LaserState::Off];
         assert_eq!(states, expected);
         assert_eq!(laser.entries()[0].scan.as_deref(), Some("s"));
         assert!(laser.entries()[1].cause.contains("dead-man"));
-        let again = Laser::open(folder.path(), THE_SCANNER).unwrap();
+        let again = Laser::open(&LocalDisk, folder.path(), THE_SCANNER).unwrap();
         assert_eq!(again.entries(), laser.entries());
         let text = std::fs::read_to_string(&path).unwrap();
         assert_eq!(text.lines().count(), 4, "{text}");
@@ -382,7 +358,7 @@ mod tests {
     #[test]
     fn nobody_knows_of_a_pause_whether_the_laser_is_on() {
         let folder = tempfile::tempdir().unwrap();
-        let laser = Laser::open(folder.path(), "left").unwrap();
+        let laser = Laser::open(&LocalDisk, folder.path(), "left").unwrap();
         laser.scan_begins("s");
         laser.begin();
         laser.scan_paused("the cable was pulled");
@@ -402,7 +378,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         for scanner in [THE_SCANNER, "left", "right"] {
-            Laser::open(at, scanner).unwrap().begin();
+            Laser::open(&LocalDisk, at, scanner).unwrap().begin();
         }
         std::fs::write(at.join("laser-notes.txt"), "mine").unwrap();
         let states = |scanner: &str| -> Vec<String> {
@@ -412,8 +388,8 @@ mod tests {
                 .map(|e: LaserEntry| format!("{} {}", e.scanner, e.laser.as_str()))
                 .collect()
         };
-        end_other_logs(at, &["left"]);
-        end_other_logs(at, &["left"]);
+        end_other_logs(&LocalDisk, at, &["left"]);
+        end_other_logs(&LocalDisk, at, &["left"]);
         assert_eq!(states("left"), ["left on"]);
         assert_eq!(states("right"), ["right on", "right unknown"]);
         assert_eq!(states(THE_SCANNER), ["scanner on", "scanner unknown"]);
@@ -425,7 +401,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let old = r#"{"at":"2026-11-22T11:11:36.320Z","laser":"off","cause":"c","scan":"s"}"#;
         std::fs::write(folder.path().join("laser.jsonl"), format!("{old}\n")).unwrap();
-        let laser = Laser::open(folder.path(), THE_SCANNER).unwrap();
+        let laser = Laser::open(&LocalDisk, folder.path(), THE_SCANNER).unwrap();
         assert_eq!(laser.entries()[0].scanner, "scanner");
         assert_eq!(laser.entries()[0].scan.as_deref(), Some("s"));
     }
@@ -445,7 +421,7 @@ mod tests {
             .map(|n| serde_json::to_string(&entry(n)).unwrap() + "\n")
             .collect();
         std::fs::write(&path, text).unwrap();
-        let laser = Laser::open(folder.path(), THE_SCANNER).unwrap();
+        let laser = Laser::open(&LocalDisk, folder.path(), THE_SCANNER).unwrap();
         assert_eq!(laser.entries().len(), MOST_SHOWN);
         assert_eq!(laser.latest(), Some(entry(8_999)));
     }

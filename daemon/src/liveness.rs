@@ -14,12 +14,12 @@ use crate::service::lock;
 /// Every loop that is running.
 #[derive(Debug, Default)]
 pub(crate) struct Liveness {
-    loops: Mutex<Vec<Watched>>,
+    loops: Mutex<Vec<Loop>>,
 }
 
 /// What the watchdog knows of one loop.
 #[derive(Debug)]
-struct Watched {
+struct Loop {
     state: Arc<State>,
     /// When it was last seen to turn, or to wait.
     turned: Option<Instant>,
@@ -70,7 +70,7 @@ impl Liveness {
             ended: AtomicBool::new(false),
             panicked: AtomicBool::new(false),
         });
-        lock(&self.loops).push(Watched {
+        lock(&self.loops).push(Loop {
             state: Arc::clone(&state),
             turned: None,
         });
@@ -95,7 +95,7 @@ impl Liveness {
     }
 }
 
-impl Watched {
+impl Loop {
     fn check(&mut self, now: Instant) -> Result<(), Stuck> {
         let state = &self.state;
         let name = || state.name.clone();

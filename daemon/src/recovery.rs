@@ -74,6 +74,7 @@ impl Service {
                 continue;
             }
             Found::in_journal(&self.journal_path(&scan.id)).end(&mut scan);
+            self.give_back_room(&scan.id);
             if scan.state == ScanState::Complete {
                 tracing::info!(scan = %scan.id, "a scan was complete when the service last ended");
             } else {
@@ -117,6 +118,7 @@ impl Service {
             // What the header says of jobs and settings is of the scan's beginning.
             scan.jobs.clear();
             found.end(&mut scan);
+            self.give_back_room(&scan.id);
             tracing::warn!(
                 scan = %scan.id,
                 columns = scan.columns,
@@ -126,6 +128,17 @@ impl Service {
             self.keep_ended(&mut scan)?;
         }
         Ok(())
+    }
+
+    /// Gives back what was set aside for the rest of a scan that was cut short.
+    fn give_back_room(&self, scan: &str) {
+        let path = self.journal_path(scan);
+        // One that is not there is not to be made.
+        let cut =
+            fs::metadata(&path).and_then(|metadata| self.disk.open(&path)?.set_len(metadata.len()));
+        if let Err(error) = cut {
+            tracing::warn!(scan, %error, "cannot give back the room set aside for a scan");
+        }
     }
 
     /// Keeps the record of a scan that is over, with its job if it is complete. Where the
@@ -163,6 +176,7 @@ impl Service {
             if job.state.is_over() {
                 continue;
             }
+            // The spool's names were synced when it was opened.
             if self.spool.has(&job.result) {
                 self.queue.remove(job.id);
                 job.state = JobState::Done;

@@ -16,7 +16,7 @@ use crate::ids::{Ids, now};
 use crate::jobs::Queue;
 use crate::laser::MOST_SHOWN;
 use crate::liveness::Liveness;
-use crate::space::Promises;
+use crate::space::{Measured, Promises};
 use crate::spool::Spool;
 use crate::station::Station;
 use crate::store::Store;
@@ -50,8 +50,8 @@ pub(crate) struct Service {
     grids: Mutex<BTreeMap<String, KeptGrid>>,
     /// Scans that are over and whose records the disk refused.
     pub(crate) unkept: Mutex<Vec<Scan>>,
-    /// Bytes of kept scans and of results, as of the last look.
-    pub(crate) kept_bytes: Mutex<(u64, u64)>,
+    /// Room on the disks, as of the last look.
+    pub(crate) measured: Mutex<Measured>,
     started_at: String,
     stopping: Mutex<bool>,
     stop_told: Condvar,
@@ -93,7 +93,7 @@ impl Service {
             scans_dir,
             grids: Mutex::default(),
             unkept: Mutex::default(),
-            kept_bytes: Mutex::default(),
+            measured: Mutex::default(),
             started_at: now(),
             stopping: Mutex::new(false),
             stop_told: Condvar::new(),

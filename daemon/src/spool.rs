@@ -76,6 +76,8 @@ impl Spool {
             .create_dir(&probe)
             .and_then(|()| spool.disk.remove_dir_all(&probe))
             .map_err(error("write", &spool.root))?;
+        // What an earlier run put in place may have its name in memory alone.
+        spool.sync_names()?;
         Ok(spool)
     }
 
@@ -94,6 +96,22 @@ impl Spool {
     pub(crate) fn has(&self, result: &str) -> bool {
         let found = self.directory(result).symlink_metadata();
         found.is_ok_and(|metadata| metadata.is_dir())
+    }
+
+    /// Where the result is, if it is there, and safe: who put it there may have failed before
+    /// its name was on the medium.
+    pub(crate) fn published(&self, result: &str) -> Result<Option<PathBuf>, SpoolError> {
+        if !self.has(result) {
+            return Ok(None);
+        }
+        self.sync_names()?;
+        Ok(Some(self.directory(result)))
+    }
+
+    fn sync_names(&self) -> Result<(), SpoolError> {
+        self.disk
+            .sync_dir(&self.root)
+            .map_err(error("sync the folder", &self.root))
     }
 
     /// A new empty folder for the making of a result.
@@ -118,11 +136,11 @@ impl Spool {
     /// Puts the new folder, whose files are synced, in its place. Publishing what is
     /// published already changes nothing.
     pub(crate) fn publish(&self, result: &str) -> Result<PathBuf, SpoolError> {
-        let directory = self.directory(result);
-        if self.has(result) {
+        if let Some(directory) = self.published(result)? {
             self.discard(result);
             return Ok(directory);
         }
+        let directory = self.directory(result);
         let incoming = self.root.join(format!("{INCOMING}{result}"));
         self.disk
             .sync_dir(&incoming)
@@ -130,17 +148,17 @@ impl Spool {
         self.disk
             .rename(&incoming, &directory)
             .map_err(error("put a result in place", &self.root))?;
-        self.disk
-            .sync_dir(&self.root)
-            .map_err(error("sync the folder", &self.root))?;
+        self.sync_names()?;
         Ok(directory)
     }
 
-    /// Removes a result. It is gone at once, and never half.
+    /// Removes a result. It is gone at once, and never half: its files go only when its name is
+    /// gone from the medium.
     pub(crate) fn remove(&self, result: &str) -> Result<(), SpoolError> {
         let gone = self.root.join(format!("{INCOMING}removed-{result}"));
         self.disk
             .rename(&self.directory(result), &gone)
+            .and_then(|()| self.disk.sync_dir(&self.root))
             .and_then(|()| self.disk.remove_dir_all(&gone))
             .map_err(error("remove a result", &self.root))
     }

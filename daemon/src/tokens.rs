@@ -4,16 +4,17 @@
 //! service's user alone may read: as nobody can guess 32 random bytes, a slower hash would
 //! protect nothing more.
 
-use std::fmt::Write as _;
-use std::fs::{File, OpenOptions};
-use std::io::{self, Read, Write as _};
-use std::os::unix::fs::OpenOptionsExt;
+use std::fs::{self, File, Permissions};
+use std::io::{self, Read};
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
+use deliverables::hexadecimal;
 use relief_api::{MAX_TOKEN_NAME_CHARS, NewToken, Token};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use storage::{Disk, remove_file_if_there};
 use subtle::ConstantTimeEq;
 
 use crate::ids::now;
@@ -86,13 +87,13 @@ pub enum TokenError {
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Kept {
+struct KeptToken {
     name: String,
     created_at: String,
     sha256: String,
 }
 
-impl Kept {
+impl KeptToken {
     fn shown(&self) -> Token {
         Token {
             name: self.name.clone(),
@@ -105,28 +106,34 @@ impl Kept {
 #[serde(deny_unknown_fields)]
 struct Contents {
     version: u32,
-    tokens: Vec<Kept>,
+    tokens: Vec<KeptToken>,
 }
 
 /// The tokens that hold.
 #[derive(Debug)]
 pub(crate) struct Tokens {
+    disk: Arc<dyn Disk>,
     path: PathBuf,
-    kept: Mutex<Vec<Kept>>,
+    /// Held only for moments: each request on a loopback address waits for it.
+    kept: Mutex<Vec<KeptToken>>,
+    /// Held while the tokens change, until that is on disk.
+    changing: Mutex<()>,
 }
 
 impl Tokens {
     /// Reads the tokens; where there is no file there are none.
-    pub(crate) fn open(path: &Path) -> Result<Self, TokenError> {
+    pub(crate) fn open(disk: Arc<dyn Disk>, path: &Path) -> Result<Self, TokenError> {
         Ok(Self {
+            disk,
             kept: Mutex::new(read(path)?),
             path: path.to_owned(),
+            changing: Mutex::default(),
         })
     }
 
     /// The tokens, oldest first.
     pub(crate) fn list(&self) -> Vec<Token> {
-        lock(&self.kept).iter().map(Kept::shown).collect()
+        lock(&self.kept).iter().map(KeptToken::shown).collect()
     }
 
     /// Makes a token, which is on disk when this returns.
@@ -136,25 +143,25 @@ impl Tokens {
                 name: name.chars().take(MAX_TOKEN_NAME_CHARS).collect(),
             });
         }
-        let mut kept = lock(&self.kept);
-        if kept.iter().any(|token| token.name == name) {
+        let _order = lock(&self.changing);
+        let mut tokens = lock(&self.kept).clone();
+        if tokens.iter().any(|token| token.name == name) {
             return Err(TokenError::Taken { name: name.into() });
         }
-        if kept.len() >= MOST_TOKENS {
+        if tokens.len() >= MOST_TOKENS {
             return Err(TokenError::TooMany);
         }
         let mut secret = [0; SECRET_BYTES];
         getrandom::fill(&mut secret).map_err(TokenError::Random)?;
-        let token = format!("{PREFIX}{}", hex(&secret));
-        let new = Kept {
+        let token = format!("{PREFIX}{}", hexadecimal(&secret));
+        let new = KeptToken {
             name: name.to_owned(),
             created_at: now(),
             sha256: hash(&token),
         };
-        let mut tokens = kept.clone();
         tokens.push(new.clone());
         self.write(&tokens)?;
-        *kept = tokens;
+        *lock(&self.kept) = tokens;
         Ok(NewToken {
             name: new.name,
             created_at: new.created_at,
@@ -164,14 +171,14 @@ impl Tokens {
 
     /// Takes a token back: it is refused from now on, and after a restart.
     pub(crate) fn revoke(&self, name: &str) -> Result<Token, TokenError> {
-        let mut kept = lock(&self.kept);
-        let Some(index) = kept.iter().position(|token| token.name == name) else {
+        let _order = lock(&self.changing);
+        let mut tokens = lock(&self.kept).clone();
+        let Some(index) = tokens.iter().position(|token| token.name == name) else {
             return Err(TokenError::NoSuch { name: name.into() });
         };
-        let mut tokens = kept.clone();
         let revoked = tokens.remove(index);
         self.write(&tokens)?;
-        *kept = tokens;
+        *lock(&self.kept) = tokens;
         Ok(revoked.shown())
     }
 
@@ -185,7 +192,7 @@ impl Tokens {
         Some(found.name.clone())
     }
 
-    fn write(&self, tokens: &[Kept]) -> Result<(), TokenError> {
+    fn write(&self, tokens: &[KeptToken]) -> Result<(), TokenError> {
         let contents = Contents {
             version: VERSION,
             tokens: tokens.to_vec(),
@@ -197,11 +204,11 @@ impl Tokens {
         };
         let text = serde_json::to_vec_pretty(&contents)
             .map_err(|error| failed(io::Error::other(error)))?;
-        replace(&self.path, &text).map_err(failed)
+        replace(&*self.disk, &self.path, &text).map_err(failed)
     }
 }
 
-fn read(path: &Path) -> Result<Vec<Kept>, TokenError> {
+fn read(path: &Path) -> Result<Vec<KeptToken>, TokenError> {
     let failed = |source| TokenError::File {
         action: "read",
         path: path.to_owned(),
@@ -235,24 +242,16 @@ fn read(path: &Path) -> Result<Vec<Kept>, TokenError> {
 }
 
 /// Puts new contents in a file's place: whole, or not at all.
-fn replace(path: &Path, text: &[u8]) -> io::Result<()> {
+fn replace(disk: &dyn Disk, path: &Path, text: &[u8]) -> io::Result<()> {
     let beside = path.with_extension("json.new");
-    match std::fs::remove_file(&beside) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-        _ => {}
-    }
-    let mut file = OpenOptions::new()
-        .write(true)
-        .create_new(true)
-        .mode(FILE_MODE)
-        .open(&beside)?;
-    file.write_all(text)?;
-    file.sync_all()?;
-    std::fs::rename(&beside, path)?;
-    match path.parent() {
-        Some(folder) => File::open(folder)?.sync_all(),
-        None => Ok(()),
-    }
+    remove_file_if_there(disk, &beside)?;
+    let file = disk.create(&beside)?;
+    // Before there is anything in it.
+    fs::set_permissions(&beside, Permissions::from_mode(FILE_MODE))?;
+    file.write_at(text, 0)?;
+    file.sync_data()?;
+    disk.rename(&beside, path)?;
+    path.parent().map_or(Ok(()), |folder| disk.sync_dir(folder))
 }
 
 fn is_name(name: &str) -> bool {
@@ -263,35 +262,33 @@ fn is_name(name: &str) -> bool {
 }
 
 fn hash(token: &str) -> String {
-    hex(&Sha256::digest(token.as_bytes()))
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
+    hexadecimal(&Sha256::digest(token.as_bytes()))
 }
 
 #[cfg(test)]
 mod tests {
     use std::os::unix::fs::PermissionsExt;
 
+    use storage::LocalDisk;
+
     use super::*;
+
+    fn open(path: &Path) -> Result<Tokens, TokenError> {
+        Tokens::open(Arc::new(LocalDisk), path)
+    }
 
     #[test]
     fn tokens_hold_until_revoked_and_survive_a_restart() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("tokens.json");
-        let tokens = Tokens::open(&path).unwrap();
+        let tokens = open(&path).unwrap();
         assert!(!path.exists(), "nothing is written before there is a token");
         let desk = tokens.create("desk").unwrap();
         let robot = tokens.create("robot").unwrap();
         assert_ne!(desk.token, robot.token);
         assert_eq!(desk.token.len(), PREFIX.len() + 64);
 
-        let tokens = Tokens::open(&path).unwrap();
+        let tokens = open(&path).unwrap();
         assert_eq!(tokens.bearer(&desk.token).as_deref(), Some("desk"));
         assert_eq!(tokens.bearer(&robot.token).as_deref(), Some("robot"));
         let longer = format!("{}0", desk.token);
@@ -300,7 +297,7 @@ mod tests {
         }
         assert_eq!(tokens.revoke("desk").unwrap().name, "desk");
         assert_eq!(tokens.bearer(&desk.token), None);
-        let tokens = Tokens::open(&path).unwrap();
+        let tokens = open(&path).unwrap();
         assert_eq!(tokens.bearer(&desk.token), None);
         let names: Vec<String> = tokens.list().into_iter().map(|t| t.name).collect();
         assert_eq!(names, ["robot"]);
@@ -310,7 +307,7 @@ mod tests {
     fn what_lies_on_disk_is_no_token_and_for_the_service_alone() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("tokens.json");
-        let token = Tokens::open(&path).unwrap().create("desk").unwrap().token;
+        let token = open(&path).unwrap().create("desk").unwrap().token;
         let text = std::fs::read_to_string(&path).unwrap();
         assert!(!text.contains(&token[PREFIX.len()..]), "{text}");
         let mode = std::fs::metadata(&path).unwrap().permissions().mode();
@@ -320,7 +317,7 @@ mod tests {
     #[test]
     fn names_are_plain_and_given_once() {
         let folder = tempfile::tempdir().unwrap();
-        let tokens = Tokens::open(&folder.path().join("tokens.json")).unwrap();
+        let tokens = open(&folder.path().join("tokens.json")).unwrap();
         tokens.create("A.b_c-9").unwrap();
         let twice = tokens.create("A.b_c-9").unwrap_err();
         assert_eq!(twice.to_string(), "there is a token A.b_c-9 already");
@@ -355,7 +352,7 @@ mod tests {
             (" ".repeat(200_000), "more than 131072 bytes"),
         ] {
             std::fs::write(&path, text).unwrap();
-            let error = Tokens::open(&path).unwrap_err().to_string();
+            let error = open(&path).unwrap_err().to_string();
             assert!(error.contains(why), "{error}");
             assert!(error.contains("move the file away"), "{error}");
         }

@@ -195,6 +195,9 @@ pub struct Scan {
     /// When its columns were removed to make room, RFC 3339; it cannot be run again.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub removed_at: Option<String>,
+    /// When columns that had been removed were found again, RFC 3339.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub put_back_at: Option<String>,
 }
 
 /// The scans that were asked to end: read as a [`Scan`], it is the first of them.

@@ -1,6 +1,6 @@
 //! Files that are whole: hashed while written, synced, put in place in one step.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -95,7 +95,7 @@ pub fn write_atomically<E: From<io::Error>>(
         .and_then(|file| fill(file, &name, content))
         .and_then(|entry| {
             fs::rename(&temporary, path)?;
-            sync_directory(&directory)?;
+            LocalDisk.sync_dir(&directory)?;
             Ok(entry)
         });
     if written.is_err() {
@@ -103,14 +103,6 @@ pub fn write_atomically<E: From<io::Error>>(
         let _ = fs::remove_file(&temporary);
     }
     written
-}
-
-/// Makes names created in a directory survive a power cut.
-///
-/// # Errors
-/// What the file system reports.
-pub fn sync_directory(directory: &Path) -> io::Result<()> {
-    File::open(directory)?.sync_all()
 }
 
 /// SHA-256 of all that a reader gives, 64 lower-case hexadecimal digits.
@@ -130,7 +122,9 @@ pub fn sha256_of(mut reader: impl Read) -> io::Result<String> {
     }
 }
 
-fn hexadecimal(bytes: &[u8]) -> String {
+/// Bytes as lower-case hexadecimal digits.
+#[must_use]
+pub fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

@@ -17,7 +17,7 @@ mod summary;
 mod write;
 
 pub use export::{CadOptions, Entities, WriteError, file_stem, write_iges};
-pub use file::{sha256_of, sync_directory, write_atomically};
+pub use file::{hexadecimal, sha256_of, write_atomically};
 pub use manifest::{MANIFEST_NAME, Manifest, ManifestFile};
 pub use report::{Report, ScanReport};
 pub use stopwatch::Stopwatch;

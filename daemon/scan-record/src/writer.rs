@@ -233,8 +233,11 @@ impl<S: Storage> JournalWriter<S> {
         self.payload.push(code);
         self.payload.extend_from_slice(&self.columns.to_le_bytes());
         self.payload.extend_from_slice(&reason.as_bytes()[..cut]);
-        self.write_record(KIND_END)?;
-        self.storage.release()?;
+        let written = self.write_record(KIND_END);
+        // Also of a journal that could not be written to its end, which gets no longer.
+        let released = self.storage.release();
+        written?;
+        released?;
         self.sync()?;
         Ok(self.storage)
     }

@@ -9,8 +9,8 @@ use futures_util::{Stream, StreamExt, future, stream};
 use relief_api::Event;
 use tokio::sync::OwnedSemaphorePermit;
 
-use super::Context;
 use super::problem::{Refusal, too_many_listeners};
+use super::{Context, blocking};
 use crate::events::{Heard, Subscriber, Told};
 
 /// First the status, then whatever happens from then on.
@@ -22,9 +22,8 @@ pub(super) async fn stream(
         .map_err(|_| too_many_listeners(context.service.config().http.listeners))?;
     // In this order, so that what happens between the two is told and not lost.
     let subscriber = context.service.hub.subscribe();
-    let status = sent(&Told::new(&Event::Status(Box::new(
-        context.service.status(),
-    ))));
+    let status = blocking(context.clone(), |service| Ok(service.status())).await?;
+    let status = sent(&Told::new(&Event::Status(Box::new(status))));
     let events = stream::once(future::ready(status))
         .chain(stream::unfold((subscriber, place), next))
         .take_until(context.stop.cancelled_owned())

@@ -2,7 +2,7 @@
 
 use std::io;
 use std::net::SocketAddr;
-use std::os::unix::fs::{FileTypeExt, PermissionsExt};
+use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
 use nix::unistd::Group;
@@ -64,6 +64,34 @@ pub enum ListenError {
         /// What the system says.
         source: io::Error,
     },
+    /// A socket that was handed over lets in users whom the configuration keeps out.
+    #[error(
+        "the socket {} of reliefd.socket has mode {found:04o}, and service.socket_mode is \
+         {wanted:04o}: set SocketMode={wanted:04o} in `systemctl edit reliefd.socket`, then \
+         `systemctl restart reliefd.socket`",
+        path.display()
+    )]
+    TooOpen {
+        /// The socket.
+        path: PathBuf,
+        /// Its mode.
+        found: u32,
+        /// That of the configuration.
+        wanted: u32,
+    },
+    /// A socket that was handed over lets in another group.
+    #[error(
+        "the socket {} of reliefd.socket is another group's than {group} (service.socket_group): \
+         set SocketGroup={group} in `systemctl edit reliefd.socket`, then `systemctl restart \
+         reliefd.socket`",
+        path.display()
+    )]
+    OtherGroup {
+        /// The socket.
+        path: PathBuf,
+        /// That of the configuration.
+        group: String,
+    },
     /// The unit that this process runs in has no network.
     #[error(
         "cannot listen on {address}: reliefd.service has no network; remove service.listen and \
@@ -112,6 +140,37 @@ pub(crate) async fn bind_socket(config: &ServiceConfig) -> Result<UnixListener, 
     socket.listen(BACKLOG).map_err(failed)
 }
 
+/// A socket that was handed over must let in nobody whom the configuration keeps out: its mode and
+/// group are those of reliefd.socket, whatever the configuration says.
+pub(crate) fn check_handed_over(path: &Path, config: &ServiceConfig) -> Result<(), ListenError> {
+    /// Who may write to a socket may connect.
+    const MAY_CONNECT: u32 = 0o222;
+    const GROUP_MAY_CONNECT: u32 = 0o020;
+    let metadata = path.symlink_metadata();
+    let metadata = metadata.map_err(|source| ListenError::Socket {
+        path: path.to_owned(),
+        source,
+    })?;
+    let found = metadata.mode() & 0o7777;
+    if found & MAY_CONNECT & !config.socket_mode != 0 {
+        return Err(ListenError::TooOpen {
+            path: path.to_owned(),
+            found,
+            wanted: config.socket_mode,
+        });
+    }
+    if let Some(name) = &config.socket_group
+        && found & GROUP_MAY_CONNECT != 0
+        && find_group(name)?.gid.as_raw() != metadata.gid()
+    {
+        return Err(ListenError::OtherGroup {
+            path: path.to_owned(),
+            group: name.clone(),
+        });
+    }
+    Ok(())
+}
+
 fn find_group(name: &str) -> Result<Group, ListenError> {
     // A directory of users that does not answer is no reason to let others in, or to guess.
     Group::from_name(name)
@@ -157,4 +216,40 @@ pub(crate) async fn bind_loopback(address: SocketAddr) -> Result<TcpListener, Li
             _ => ListenError::Address { address, source },
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_socket_that_was_handed_over_lets_in_nobody_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("reliefd.sock");
+        let _socket = std::os::unix::net::UnixListener::bind(&path).unwrap();
+        let own = Group::from_gid(nix::unistd::getegid()).unwrap().unwrap();
+        let other = ["root", "daemon"]
+            .into_iter()
+            .find(|name| *name != own.name);
+        let check = |mode, wanted, group: Option<&str>| {
+            std::fs::set_permissions(&path, std::fs::Permissions::from_mode(mode)).unwrap();
+            let config = ServiceConfig {
+                socket_mode: wanted,
+                socket_group: group.map(str::to_owned),
+                ..ServiceConfig::default()
+            };
+            check_handed_over(&path, &config).map_err(|error| error.to_string())
+        };
+        assert_eq!(check(0o660, 0o660, None), Ok(()));
+        assert_eq!(check(0o600, 0o660, other), Ok(()), "no group is let in");
+        // As it is bound without more ado: readers cannot connect.
+        assert_eq!(check(0o755, 0o600, None), Ok(()));
+        assert_eq!(check(0o660, 0o660, Some(&own.name)), Ok(()));
+        let error = check(0o660, 0o600, None).unwrap_err();
+        assert!(error.contains("SocketMode=0600"), "{error}");
+        assert!(check(0o666, 0o660, None).is_err());
+        let error = check(0o660, 0o660, other).unwrap_err();
+        let cure = format!("SocketGroup={}", other.unwrap());
+        assert!(error.contains(&cure), "{error}");
+    }
 }

@@ -28,7 +28,7 @@ use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
 pub use listen::ListenError;
-pub(crate) use listen::{bind_loopback, bind_socket};
+pub(crate) use listen::{bind_loopback, bind_socket, check_handed_over};
 pub(crate) use serve::serve;
 
 use crate::service::Service;
@@ -57,7 +57,13 @@ pub(crate) fn on_loopback(context: &Context) -> Router {
     let tokens = Router::new()
         .route(path::TOKENS, any(tokens::only_on_the_socket))
         .route(path::TOKEN_REVOKE, any(tokens::only_on_the_socket));
-    complete(tokens, context).layer(from_fn_with_state(context.clone(), guard::bearers_only))
+    // Places of their own: bearers of tokens must not take those of the socket.
+    let listeners = context.service.config().http.listeners;
+    let context = Context {
+        listeners: Arc::new(Semaphore::new(listeners)),
+        ..context.clone()
+    };
+    complete(tokens, &context).layer(from_fn_with_state(context, guard::bearers_only))
 }
 
 fn complete(tokens: Router<Context>, context: &Context) -> Router {
@@ -90,8 +96,10 @@ fn complete(tokens: Router<Context>, context: &Context) -> Router {
         .with_state(context.clone())
 }
 
-async fn status(State(context): State<Context>) -> Json<Status> {
-    Json(context.service.status())
+// Both wait for whoever just writes a line to the log of the laser.
+async fn status(State(context): State<Context>) -> Result<Json<Status>, Refusal> {
+    let status = blocking(context, |service| Ok(service.status()));
+    status.await.map(Json)
 }
 
 /// Runs something that may block where blocking is allowed.

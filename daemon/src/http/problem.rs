@@ -214,9 +214,9 @@ fn scanner_problem(error: &ScannerError) -> (StatusCode, &'static str, Option<&'
             "wrong-device",
             Some("set scanner.vendor_id and product_id to those of the scanner"),
         ),
-        ScannerError::Permission { .. } | ScannerError::UsbPermission { .. } => {
-            (S::SERVICE_UNAVAILABLE, "no-permission", None)
-        }
+        ScannerError::Permission { .. }
+        | ScannerError::Forbidden { .. }
+        | ScannerError::UsbPermission { .. } => (S::SERVICE_UNAVAILABLE, "no-permission", None),
         ScannerError::NotAPort { .. } | ScannerError::Port { .. } => (
             S::SERVICE_UNAVAILABLE,
             "port-unusable",

@@ -4,8 +4,8 @@ use axum::extract::{Path, State};
 use axum::response::Json;
 use relief_api::{LaserLog, ScannerList, ScannerSummary};
 
-use super::Context;
 use super::problem::Refusal;
+use super::{Context, blocking};
 
 pub(super) async fn list(State(context): State<Context>) -> Json<ScannerList> {
     Json(context.service.scanners())
@@ -19,17 +19,22 @@ pub(super) async fn get(
     Ok(Json(station.summary()))
 }
 
+// Both wait for whoever just writes a line to the log of a laser.
+
 /// The lasers of all scanners.
-pub(super) async fn lasers(State(context): State<Context>) -> Json<LaserLog> {
-    Json(LaserLog {
-        entries: context.service.laser_entries(),
-    })
+pub(super) async fn lasers(State(context): State<Context>) -> Result<Json<LaserLog>, Refusal> {
+    let entries = blocking(context, |service| Ok(service.laser_entries())).await?;
+    Ok(Json(LaserLog { entries }))
 }
 
 pub(super) async fn laser(
     State(context): State<Context>,
     Path(scanner): Path<String>,
 ) -> Result<Json<LaserLog>, Refusal> {
-    let entries = context.service.station(&scanner)?.laser.entries();
-    Ok(Json(LaserLog { entries }))
+    let entries = blocking(context, move |service| {
+        Ok(service.station(&scanner)?.laser.entries())
+    });
+    Ok(Json(LaserLog {
+        entries: entries.await?,
+    }))
 }

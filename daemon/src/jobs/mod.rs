@@ -48,7 +48,10 @@ impl Service {
             id: id.to_owned(),
             why,
         };
-        if let Some(at) = &scan.removed_at {
+        // A journal that was put back may be run again at once.
+        if let Some(at) = &scan.removed_at
+            && !self.journal_path(id).exists()
+        {
             return Err(nothing(format!(
                 "its columns were removed at {at}, by the limits of [storage]"
             )));

@@ -89,8 +89,8 @@ fn attempt(
     job: &Job,
     progress: &Progress<'_>,
 ) -> Result<std::path::PathBuf, Stop> {
-    if service.spool.has(&job.result) {
-        return Ok(service.spool.directory(&job.result));
+    if let Some(directory) = service.spool.published(&job.result)? {
+        return Ok(directory);
     }
     // First, so that an unwritable spool is told at once and not after minutes.
     let incoming = service.spool.begin(&job.result)?;

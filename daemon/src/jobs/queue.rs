@@ -21,6 +21,8 @@ pub(crate) struct Queue {
 struct State {
     waiting: BTreeSet<JobId>,
     running: BTreeMap<JobId, Arc<StopFlag>>,
+    /// Of those that wait after an attempt whose outcome could not be kept.
+    begun: BTreeMap<JobId, Arc<StopFlag>>,
     stopping: bool,
 }
 
@@ -63,9 +65,23 @@ impl Queue {
         self.wake.notify_one();
     }
 
+    /// A job counts as running although its attempt has ended, so that it can be cancelled.
+    pub(crate) fn hold(&self, id: JobId, flag: &Arc<StopFlag>) {
+        lock(&self.state).running.insert(id, Arc::clone(flag));
+    }
+
+    /// A job that is held waits for another attempt, which stops if this one was to stop.
+    pub(crate) fn add_again(&self, id: JobId, flag: Arc<StopFlag>) {
+        self.end(id, &flag);
+        lock(&self.state).begun.insert(id, flag);
+        self.add(id);
+    }
+
     /// Takes a job out; false if it does not wait.
     pub(crate) fn remove(&self, id: JobId) -> bool {
-        lock(&self.state).waiting.remove(&id)
+        let mut state = lock(&self.state);
+        state.begun.remove(&id);
+        state.waiting.remove(&id)
     }
 
     /// Asks a running job to stop; false if it does not run.
@@ -86,7 +102,7 @@ impl Queue {
                 return None;
             }
             if let Some(id) = state.waiting.pop_first() {
-                let flag = Arc::new(StopFlag::default());
+                let flag = state.begun.remove(&id).unwrap_or_default();
                 state.running.insert(id, Arc::clone(&flag));
                 return Some((id, flag));
             }
@@ -123,5 +139,37 @@ impl Queue {
     pub(crate) fn counts(&self) -> (usize, usize) {
         let state = lock(&self.state);
         (state.waiting.len(), state.running.len())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cancel_outlasts_an_attempt_whose_outcome_is_not_kept() {
+        for cancelled_while_held in [false, true] {
+            let queue = Queue::default();
+            queue.add(1);
+            let (id, flag) = queue.take().unwrap();
+            if !cancelled_while_held {
+                assert!(queue.cancel_running(id));
+            }
+            queue.end(id, &flag);
+            assert!(!queue.cancel_running(id));
+            queue.hold(id, &flag);
+            if cancelled_while_held {
+                assert!(queue.cancel_running(id));
+            }
+            queue.add_again(id, flag);
+            assert_eq!(queue.counts(), (1, 0));
+            let (again, flag) = queue.take().unwrap();
+            assert_eq!(again, id);
+            assert!(flag.is_cancelled());
+            // A job that is retried later begins afresh.
+            queue.end(id, &flag);
+            queue.add(id);
+            assert!(!queue.take().unwrap().1.is_set());
+        }
     }
 }

@@ -57,10 +57,11 @@ pub(crate) fn work(service: &Arc<Service>) {
             // The record still says that the job waits or runs. A result that is in its place
             // is not made again.
             tracing::error!(job = id, %error, "cannot keep the record of a job; trying again");
+            service.queue.hold(id, &flag);
             if service.wait_for_stop(RETRY) {
                 return;
             }
-            service.queue.add(id);
+            service.queue.add_again(id, flag);
         }
     }
 }

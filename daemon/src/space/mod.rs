@@ -8,12 +8,13 @@ mod promise;
 mod sweep;
 
 use std::fs;
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 use jiff::Timestamp;
-use relief_api::{Event, Job, JobState, Scan, StorageStatus};
+use relief_api::{Event, Job, JobState, Scan, ScanState, StorageStatus};
 use storage::remove_file_if_there;
 
 use crate::error::ServiceError;
@@ -27,15 +28,31 @@ const TICK: Duration = Duration::from_secs(1);
 /// ... and after how many times it looks for what may go.
 const SWEEP_TICKS: u32 = 60;
 
+/// A turn that takes longer hangs: on a disk that answers no more, or on a lock.
+const LONGEST_TURN: Duration = Duration::from_secs(15 * 60);
+
+/// What kept scans and results take, and what is free, as of the last look.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Measured {
+    scans_bytes: u64,
+    results_bytes: u64,
+    scans_free_bytes: Option<u64>,
+    results_free_bytes: Option<u64>,
+}
+
 /// Looks after the disk until the service stops. Runs on a thread of its own.
 pub(crate) fn tidy(service: &Arc<Service>) {
+    let pulse = service.liveness.begin("tidy");
     let mut ticks = 0;
     while !service.wait_for_stop(TICK) {
+        pulse.work(LONGEST_TURN);
         service.keep_unkept();
         ticks = (ticks + 1) % SWEEP_TICKS;
         if ticks == 0 {
             service.sweep();
         }
+        service.measure_free();
+        pulse.rest();
     }
 }
 
@@ -51,7 +68,8 @@ impl Service {
         let reserve_bytes = self.config().storage.reserve_bytes();
         let journal_bytes = scan_record::most_bytes(columns, samples.into());
         let journal = self.journal_path(scan);
-        self.promises
+        let promise = self
+            .promises
             .make(journal, journal_bytes, |promised_bytes| {
                 let look = || {
                     let folders = [
@@ -85,7 +103,9 @@ impl Service {
                     self.sweep();
                     look()
                 })
-            })
+            });
+        self.measure_free();
+        promise
     }
 
     /// True when so little room is left that what can be done without is done without.
@@ -96,15 +116,25 @@ impl Service {
             .is_ok_and(|free| free.is_some_and(|free| free < reserve))
     }
 
-    /// What kept scans and results take, as of the last look, and what is free.
-    pub(crate) fn storage_status(&self) -> StorageStatus {
+    /// Notes what is free. Waits for as long as the disks take to say so.
+    pub(crate) fn measure_free(&self) {
         let free = |folder| self.disk.free_bytes(folder).ok().flatten();
-        let (scans_bytes, results_bytes) = *lock(&self.kept_bytes);
+        let scans = free(self.scans_dir());
+        let results = free(self.spool.root());
+        let mut measured = lock(&self.measured);
+        measured.scans_free_bytes = scans;
+        measured.results_free_bytes = results;
+    }
+
+    /// What kept scans and results take, and what is free, as of the last look: a disk that
+    /// hangs must not keep those waiting who ask how the service does.
+    pub(crate) fn storage_status(&self) -> StorageStatus {
+        let measured = *lock(&self.measured);
         StorageStatus {
-            scans_bytes,
-            scans_free_bytes: free(self.scans_dir()),
-            results_bytes,
-            results_free_bytes: free(self.spool.root()),
+            scans_bytes: measured.scans_bytes,
+            scans_free_bytes: measured.scans_free_bytes,
+            results_bytes: measured.results_bytes,
+            results_free_bytes: measured.results_free_bytes,
             reserve_bytes: self.config().storage.reserve_bytes(),
         }
     }
@@ -123,16 +153,20 @@ impl Service {
         // Nobody asks for a job of a scan that just goes.
         let _order = self.queue.changing();
         let limits = self.config().storage;
-        let (scans, jobs) = (self.scans()?, self.jobs()?);
+        let (mut scans, jobs) = (self.scans()?, self.jobs()?);
         let mut scans_bytes = 0;
         let mut kept = Vec::new();
-        for scan in &scans {
+        for scan in &mut scans {
             if let Ok(metadata) = fs::metadata(self.journal_path(&scan.id)) {
-                scans_bytes += metadata.len();
+                if scan.removed_at.is_some() {
+                    self.note_put_back(scan)?;
+                }
+                let bytes = on_disk(&metadata);
+                scans_bytes += bytes;
                 kept.push(Kept {
                     id: scan.id.clone(),
-                    bytes: metadata.len(),
-                    age_s: age_s(scan.ended_at.as_deref()),
+                    bytes,
+                    age_s: age_s(scan.put_back_at.as_ref().or(scan.ended_at.as_ref())),
                     needed: is_needed(scan, &jobs),
                 });
             }
@@ -157,7 +191,20 @@ impl Service {
                 Err(error) => tracing::warn!(%error, "cannot remove a result"),
             }
         }
-        *lock(&self.kept_bytes) = (scans_bytes, results_bytes);
+        let mut measured = lock(&self.measured);
+        measured.scans_bytes = scans_bytes;
+        measured.results_bytes = results_bytes;
+        Ok(())
+    }
+
+    /// The columns of a scan are there again that were removed; it is as young as if it had
+    /// just been taken, or it would be removed again at once.
+    fn note_put_back(&self, scan: &mut Scan) -> Result<(), ServiceError> {
+        scan.removed_at = None;
+        scan.put_back_at = Some(now());
+        self.store.put_scan(scan)?;
+        tracing::info!(scan = %scan.id, "columns of a scan put back");
+        self.hub.tell(Event::Scan(scan.clone()));
         Ok(())
     }
 
@@ -171,6 +218,11 @@ impl Service {
         let removed = self.store.put_scan(&scan).map_err(ServiceError::from);
         let removed = removed.and_then(|()| {
             remove_file_if_there(&*self.disk, &self.journal_path(&scan.id)).map_err(|source| {
+                // Or the next look would take them for put back.
+                scan.removed_at = None;
+                if let Err(error) = self.store.put_scan(&scan) {
+                    tracing::warn!(scan = %scan.id, %error, "cannot keep the record of a scan");
+                }
                 ServiceError::Io {
                     what: scan.id.clone(),
                     source,
@@ -193,7 +245,10 @@ impl Service {
 
 /// Its columns may still be asked for.
 fn is_needed(scan: &Scan, jobs: &[Job]) -> bool {
+    // Its record was refused, and its job is still to come.
+    let is_unprocessed = scan.state == ScanState::Complete && scan.jobs.is_empty();
     !scan.state.is_over()
+        || is_unprocessed
         || jobs
             .iter()
             .filter(|job| job.scan == scan.id)
@@ -203,7 +258,7 @@ fn is_needed(scan: &Scan, jobs: &[Job]) -> bool {
 fn kept_result(folder: &Path, result: &str) -> Option<Kept> {
     let mut bytes = 0;
     for entry in fs::read_dir(folder).ok()? {
-        bytes += entry.ok()?.metadata().ok()?.len();
+        bytes += on_disk(&entry.ok()?.metadata().ok()?);
     }
     let changed = fs::metadata(folder).ok()?.modified().ok()?;
     let age = SystemTime::now().duration_since(changed);
@@ -215,11 +270,56 @@ fn kept_result(folder: &Path, result: &str) -> Option<Kept> {
     })
 }
 
+/// Bytes that a file takes, room set aside for it included.
+fn on_disk(metadata: &fs::Metadata) -> u64 {
+    /// Of `st_blocks`, whatever the file system's own are.
+    const BLOCK_BYTES: u64 = 512;
+    metadata.blocks() * BLOCK_BYTES
+}
+
 /// Seconds since a time; 0 where it is not known or lies ahead.
-fn age_s(since: Option<&str>) -> u64 {
+fn age_s(since: Option<&String>) -> u64 {
     let since: Option<Timestamp> = since.and_then(|since| since.parse().ok());
     since
         .map(|since| Timestamp::now().as_second() - since.as_second())
         .and_then(|age| u64::try_from(age).ok())
         .unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn what_is_still_to_be_processed_is_needed() {
+        let scan = |state: &str, jobs: &[u64]| -> Scan {
+            let started_at = "2026-11-21T11:08:30.123Z";
+            let scan = json!({
+                "id": "s", "name": "s", "state": state, "started_at": started_at, "jobs": jobs,
+            });
+            serde_json::from_value(scan).unwrap()
+        };
+        let job = |state: &str| -> Job {
+            let job = json!({
+                "id": 1, "scan": "s", "result": "s", "name": "s", "state": state, "attempts": 1,
+                "queued_at": "2026-11-21T11:08:30.123Z", "timings": [],
+            });
+            serde_json::from_value(job).unwrap()
+        };
+        assert!(is_needed(&scan("scanning", &[]), &[]));
+        // Its job is not queued yet.
+        assert!(is_needed(&scan("complete", &[]), &[]));
+        assert!(!is_needed(&scan("aborted", &[]), &[]));
+        for (state, needed) in [
+            ("queued", true),
+            ("running", true),
+            ("failed", true),
+            ("done", false),
+            ("cancelled", false),
+        ] {
+            let found = is_needed(&scan("complete", &[1]), &[job(state)]);
+            assert_eq!(found, needed, "{state}");
+        }
+    }
 }

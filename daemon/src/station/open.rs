@@ -5,6 +5,8 @@ use std::sync::Arc;
 use scanner_driver::{Scanner, ScannerError, SerialScanner, UsbScanner};
 
 use super::Station;
+use storage::Disk;
+
 use crate::config::{Config, NamedScanner, Transport};
 use crate::daemon::StartError;
 use crate::events::Hub;
@@ -43,13 +45,14 @@ pub(crate) fn make_all(
     config: &Config,
     scanners: Vec<Arc<dyn Scanner>>,
     hub: &Arc<Hub>,
+    disk: &dyn Disk,
 ) -> Result<Vec<Arc<Station>>, StartError> {
     let state_dir = &config.service.state_dir;
     let named = config.each_scanner();
     let names: Vec<&str> = named.iter().map(|named| named.name).collect();
-    end_other_logs(state_dir, &names);
+    end_other_logs(disk, state_dir, &names);
     let stations = named.into_iter().zip(scanners).map(|(named, scanner)| {
-        let laser = Laser::open(state_dir, named.name)?;
+        let laser = Laser::open(disk, state_dir, named.name)?;
         let station = Station::new(named, scanner, laser, Arc::clone(hub));
         Ok(Arc::new(station))
     });

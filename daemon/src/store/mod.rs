@@ -75,7 +75,7 @@ impl Store {
     pub(crate) fn open(disk: Arc<dyn Disk>, path: &Path) -> Result<Self, StoreError> {
         let failed = |error: &redb::Error| StoreError::of(path, error);
         let _making = make_alone(path)?;
-        if !path.exists() {
+        if !path.exists() && !salvage::take_up(&*disk, path)? {
             put_new(&*disk, path).map_err(|error| failed(&error))?;
         }
         let database = match salvage::open_whole(&*disk, path)? {
@@ -279,10 +279,11 @@ fn put_new(disk: &dyn Disk, path: &Path) -> Result<(), redb::Error> {
     remove_file_if_there(disk, &new)?;
     open_database(disk, &new)?.close()?;
     disk.rename(&new, path)?;
-    if let Some(folder) = path.parent() {
-        disk.sync_dir(folder)?;
-    }
-    Ok(())
+    Ok(sync_folder(disk, path)?)
+}
+
+fn sync_folder(disk: &dyn Disk, path: &Path) -> io::Result<()> {
+    path.parent().map_or(Ok(()), |folder| disk.sync_dir(folder))
 }
 
 #[cfg(test)]

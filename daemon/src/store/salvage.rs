@@ -1,17 +1,24 @@
 //! Records that are damaged: what can still be read is kept, and the file is moved aside.
 
+use std::collections::BTreeMap;
+use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use jiff::Timestamp;
-use redb::{Database, ReadableDatabase, ReadableTable};
+use redb::{Database, Key, ReadableDatabase, ReadableTable, TableDefinition, TableHandle};
 use relief_api::{Job, JobId, Scan};
-use storage::Disk;
+use storage::{Disk, remove_file_if_there};
 
 use super::error::{StoreError, is_damage};
 use super::record::decode;
-use super::{CACHE_BYTES, JOBS, SCANS, open_database, put_new};
+use super::{CACHE_BYTES, JOBS, SCANS, open_database, sync_folder};
 use crate::error::panic_text;
+
+/// Ends the name of a file with what could be read of a damaged one, until that is moved aside ...
+const FILLED: &str = "redb.salvaged";
+/// ... to a name that goes on so.
+const ASIDE: &str = "damaged-";
 
 /// What is wrong with the file.
 #[derive(Debug)]
@@ -26,30 +33,51 @@ struct Rows {
     lost: Vec<String>,
 }
 
+/// The rows of one table that can be read, in the order of their keys. What cannot be read is
+/// passed over as far as may be: rows are read up to it from either end.
+fn read_table<K: Key, T: Ord>(
+    database: &impl ReadableDatabase,
+    definition: TableDefinition<'_, K, &[u8]>,
+    key: impl Fn(K::SelfType<'_>) -> T,
+    lost: &mut Vec<String>,
+) -> Vec<(T, Vec<u8>)> {
+    let mut found = BTreeMap::new();
+    let mut read = |backwards: bool| -> Result<(), redb::Error> {
+        let table = database.begin_read()?.open_table(definition)?;
+        let mut rows = table.iter()?;
+        let mut next = || {
+            if backwards {
+                rows.next_back()
+            } else {
+                rows.next()
+            }
+        };
+        while let Some(row) = next() {
+            let (id, bytes) = row?;
+            found.insert(key(id.value()), bytes.value().to_vec());
+        }
+        Ok(())
+    };
+    for backwards in [false, true] {
+        let what = match catch_unwind(AssertUnwindSafe(|| read(backwards))) {
+            Ok(Ok(())) => break,
+            Ok(Err(error)) => error.to_string(),
+            Err(panic) => panic_text(&*panic).to_owned(),
+        };
+        lost.push(format!("{}: {what}", definition.name()));
+    }
+    found.into_iter().collect()
+}
+
 impl Rows {
     /// As many as can be read.
     fn read(database: &impl ReadableDatabase) -> Self {
-        let mut rows = Self::default();
-        let mut read = || -> Result<(), redb::Error> {
-            let transaction = database.begin_read()?;
-            for row in transaction.open_table(SCANS)?.iter()? {
-                let (id, bytes) = row?;
-                rows.scans
-                    .push((id.value().to_owned(), bytes.value().to_vec()));
-            }
-            for row in transaction.open_table(JOBS)?.iter()? {
-                let (id, bytes) = row?;
-                rows.jobs.push((id.value(), bytes.value().to_vec()));
-            }
-            Ok(())
-        };
-        let what = match catch_unwind(AssertUnwindSafe(&mut read)) {
-            Ok(Ok(())) => None,
-            Ok(Err(error)) => Some(error.to_string()),
-            Err(panic) => Some(panic_text(&*panic).to_owned()),
-        };
-        rows.lost.extend(what);
-        rows
+        let mut lost = Vec::new();
+        Self {
+            scans: read_table(database, SCANS, str::to_owned, &mut lost),
+            jobs: read_table(database, JOBS, |id| id, &mut lost),
+            lost,
+        }
     }
 
     /// Leaves out and names what is no record. That of a newer service is an error.
@@ -98,7 +126,8 @@ pub(super) fn open_whole(
     }
 }
 
-/// Moves the file aside, and puts a new one in its place with what can be read of it.
+/// Moves the file aside, and puts a new one in its place with what can be read of it. The new one
+/// is complete before the old one moves: [`take_up`] ends what is cut short between the two.
 pub(super) fn replace(disk: &dyn Disk, path: &Path, damage: &Damage) -> Result<(), StoreError> {
     let mut rows = match catch_unwind(|| {
         Database::builder()
@@ -110,10 +139,10 @@ pub(super) fn replace(disk: &dyn Disk, path: &Path, damage: &Damage) -> Result<(
     };
     rows.check(path)?;
     let aside = free_name(path);
+    let filled = path.with_extension(FILLED);
     let put = || -> Result<(), redb::Error> {
-        disk.rename(path, &aside)?;
-        put_new(disk, path)?;
-        let database = open_database(disk, path)?;
+        remove_file_if_there(disk, &filled)?;
+        let database = open_database(disk, &filled)?;
         let transaction = database.begin_write()?;
         {
             let mut scans = transaction.open_table(SCANS)?;
@@ -126,7 +155,10 @@ pub(super) fn replace(disk: &dyn Disk, path: &Path, damage: &Damage) -> Result<(
             }
         }
         transaction.commit()?;
-        Ok(database.close()?)
+        database.close()?;
+        disk.rename(path, &aside)?;
+        disk.rename(&filled, path)?;
+        Ok(sync_folder(disk, path)?)
     };
     put().map_err(|error| StoreError::of(path, &error))?;
     tracing::error!(
@@ -144,14 +176,45 @@ pub(super) fn replace(disk: &dyn Disk, path: &Path, damage: &Damage) -> Result<(
     Ok(())
 }
 
+/// Where there is no file: puts the one in its place that [`replace`] has filled, if it was cut
+/// short. True if there is a file then.
+pub(super) fn take_up(disk: &dyn Disk, path: &Path) -> Result<bool, StoreError> {
+    let filled = path.with_extension(FILLED);
+    if filled.exists() {
+        disk.rename(&filled, path)
+            .and_then(|()| sync_folder(disk, path))
+            .map_err(|error| StoreError::of(path, &error.into()))?;
+        tracing::warn!(
+            file = %path.display(),
+            "the records were damaged when the service last ran: what could be read of them is kept"
+        );
+        return Ok(true);
+    }
+    let beside = path.parent().and_then(|folder| fs::read_dir(folder).ok());
+    let aside = path.with_extension(ASIDE);
+    for entry in beside.into_iter().flatten().flatten() {
+        let found = entry.path();
+        let name = found.to_string_lossy();
+        if name.starts_with(&*aside.to_string_lossy()) {
+            tracing::warn!(
+                file = %path.display(),
+                aside = %found.display(),
+                "there are no records, but damaged ones that were moved aside: scans are looked \
+                 for in their journals"
+            );
+        }
+    }
+    Ok(false)
+}
+
 /// A name beside the file that nothing has.
 fn free_name(path: &Path) -> PathBuf {
     let stamp = Timestamp::now().strftime("%Y%m%dT%H%M%SZ").to_string();
     let mut number = 0;
     loop {
         let ending = match number {
-            0 => format!("damaged-{stamp}"),
-            number => format!("damaged-{stamp}-{number}"),
+            0 => format!("{ASIDE}{stamp}"),
+            number => format!("{ASIDE}{stamp}-{number}"),
         };
         let aside = path.with_extension(ending);
         if !aside.exists() {
@@ -160,3 +223,6 @@ fn free_name(path: &Path) -> PathBuf {
         number += 1;
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use listenfd::ListenFd;
 
 use crate::config::ServiceConfig;
-use crate::http::{ListenError, bind_loopback, bind_socket};
+use crate::http::{ListenError, bind_loopback, bind_socket, check_handed_over};
 
 /// What was handed over cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -95,6 +95,7 @@ impl Inherited {
                         "the API's socket is that of reliefd.socket, not service.socket"
                     );
                 }
+                check_handed_over(&path, config)?;
                 let unix = tokio::net::UnixListener::from_std(unix);
                 let unix = unix.map_err(|source| ListenError::Socket {
                     path: path.clone(),

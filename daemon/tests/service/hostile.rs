@@ -333,7 +333,7 @@ async fn connections_are_limited_on_each_door_alone() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn listeners_are_limited() {
+async fn listeners_are_limited_on_each_door_alone() {
     let doors = Doors::open(HttpConfig {
         listeners: 2,
         ..HttpConfig::default()
@@ -348,6 +348,17 @@ async fn listeners_are_limited() {
         (503, "too-many-listeners")
     );
     assert!(problem.hint.unwrap().contains("http.listeners"));
+    // The other door has places of its own, and no more of them.
+    let request = format!("GET {} HTTP/1.1\r\n{}\r\n", path::EVENTS, doors.fields());
+    let mut bearers = Vec::new();
+    for expected in [b"HTTP/1.1 200", b"HTTP/1.1 200", b"HTTP/1.1 503"] {
+        let mut bearer = doors.connect(Way::Loopback).await;
+        bearer.write_all(request.as_bytes()).await.unwrap();
+        let mut begin = [0; 12];
+        bearer.read_exact(&mut begin).await.unwrap();
+        assert_eq!(&begin, expected);
+        bearers.push(bearer);
+    }
     drop(first);
     let again = async {
         // The service notices the end when it next has something to tell, or to ask.

@@ -88,6 +88,15 @@ pub enum ScannerError {
         /// The group that may open it, by name or number.
         group: String,
     },
+    /// The system keeps this program from the port, whatever groups its user is in.
+    #[error(
+        "the system keeps this program from {port}, whatever its group: where systemd runs it, \
+         DeviceAllow= of its unit must name the port's kind, and the unit be started anew"
+    )]
+    Forbidden {
+        /// The port's path.
+        port: String,
+    },
     /// The path is not a serial port.
     #[error("{port} is not a serial port")]
     NotAPort {

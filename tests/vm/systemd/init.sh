@@ -15,6 +15,7 @@ while [ ! -b /dev/vda ] && [ $tries -lt 100 ]; do
 done
 $b mount -t ext4 /dev/vda /disk && $b cp -a /inject/. /disk/ || echo "there is no disk"
 $b chmod 644 /disk/etc/systemd/system/relief-vm.service /disk/etc/machine-id
+$b chroot /disk /sbin/depmod || echo "the disk's modules are not found"
 for place in dev proc sys; do
     $b mount -o move /$place /disk/$place
 done

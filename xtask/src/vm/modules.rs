@@ -21,6 +21,26 @@ pub(super) fn add_in_order(archive: &mut Archive, folder: &Path, wanted: &[&str]
     Ok(())
 }
 
+/// Puts these modules and all that they need into an archive, where an installed system has them.
+pub(super) fn add_as_installed(
+    archive: &mut Archive,
+    folder: &Path,
+    wanted: &[&str],
+) -> Result<()> {
+    let version = folder
+        .parent()
+        .and_then(Path::file_name)
+        .context("modules without a kernel's version")?;
+    let place = Path::new("inject/usr/lib/modules")
+        .join(version)
+        .join("kernel");
+    for module in in_order(folder, wanted)? {
+        let name = place.join(module.strip_prefix(folder)?);
+        archive.file(&name.display().to_string(), &module)?;
+    }
+    Ok(())
+}
+
 /// The files of these modules and of all that they need, each after what it needs.
 pub(super) fn in_order(folder: &Path, wanted: &[&str]) -> Result<Vec<PathBuf>> {
     let mut files = BTreeMap::new();

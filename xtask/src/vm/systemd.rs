@@ -17,15 +17,17 @@ const PATIENCE_S: u64 = 900;
 
 const MEMORY_MB: u32 = 1024;
 
-/// Before the disk can be read, and for the scanner.
-const MODULES: [&str; 6] = [
+/// Before the disk can be read, and for the scanner's plug.
+const MODULES: [&str; 5] = [
     "virtio_pci",
     "virtio_blk",
     "crc32c_generic",
     "ext4",
     "vhci-hcd",
-    "cdc-acm",
 ];
+
+/// On the disk, where the system finds them when it needs them, as on any machine.
+const DRIVERS: [&str; 2] = ["cdc-acm", "usbserial"];
 
 /// Nobody logs in at the console, which is the checks'.
 const PARAMETERS: &str = "mitigations=off systemd.show_status=0 systemd.mask=getty.target \
@@ -72,6 +74,7 @@ pub(super) fn run(options: &Options) -> Result<()> {
     archive.file("bin/busybox", &packages.file("bin/busybox")?)?;
     modules::add_in_order(&mut archive, packages.modules(), &MODULES)?;
     // From here on: what is put upon the disk.
+    modules::add_as_installed(&mut archive, packages.modules(), &DRIVERS)?;
     archive.file(
         "inject/usr/local/bin/relief-vm-systemd",
         &programs.join("relief-vm-systemd"),

@@ -82,8 +82,14 @@ fn encode(canvas: &Canvas, sink: impl Write) -> std::io::Result<()> {
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Balanced);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(canvas.pixels())?;
-    writer.finish()?;
-    Ok(())
+    let write = || {
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(canvas.pixels())?;
+        writer.finish()
+    };
+    // Its own conversion would hide of which kind an error of the sink is.
+    write().map_err(|error| match error {
+        png::EncodingError::IoError(error) => error,
+        other => std::io::Error::other(other),
+    })
 }

@@ -2,6 +2,8 @@
 #![allow(dead_code, reason = "each test program uses its part")]
 
 use std::io::{self, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use range_image::{Calibration, calibration::Head};
 use scan_record::{EndCause, Header, JournalWriter, RawColumn, RawSample, Storage};
@@ -61,6 +63,7 @@ pub(crate) struct Medium {
     pub(crate) written: Vec<u8>,
     pub(crate) synced: usize,
     pub(crate) room: usize,
+    pub(crate) released: Arc<AtomicBool>,
 }
 
 impl Default for Medium {
@@ -69,6 +72,7 @@ impl Default for Medium {
             written: Vec::new(),
             synced: 0,
             room: usize::MAX,
+            released: Arc::default(),
         }
     }
 }
@@ -91,6 +95,11 @@ impl Write for Medium {
 impl Storage for Medium {
     fn sync_data(&mut self) -> io::Result<()> {
         self.synced = self.written.len();
+        Ok(())
+    }
+
+    fn release(&mut self) -> io::Result<()> {
+        self.released.store(true, Ordering::Relaxed);
         Ok(())
     }
 }

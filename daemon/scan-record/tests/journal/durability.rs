@@ -1,3 +1,6 @@
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
 use scan_record::{EndCause, Ending, JournalReader, JournalWriter, WriteError};
 
 use crate::common::{Medium, column, header, journal};
@@ -74,6 +77,7 @@ fn a_full_disk_ends_the_journal_for_good() {
         room,
         ..Medium::default()
     };
+    let released = Arc::clone(&medium.released);
     let mut writer = JournalWriter::new(medium, &header()).unwrap();
     writer.append(&column(0, 4)).unwrap();
     let error = writer.append(&column(1, 4)).unwrap_err();
@@ -83,6 +87,12 @@ fn a_full_disk_ends_the_journal_for_good() {
         Err(WriteError::Failed)
     ));
     assert!(matches!(writer.sync(), Err(WriteError::Failed)));
+    assert!(!released.load(Ordering::Relaxed));
+    assert!(matches!(
+        writer.finish(&EndCause::Complete),
+        Err(WriteError::Failed)
+    ));
+    assert!(released.load(Ordering::Relaxed), "room set aside is kept");
 }
 
 #[test]

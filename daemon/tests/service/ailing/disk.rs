@@ -2,7 +2,7 @@
 
 use std::io;
 use std::path::Path;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Condvar, Mutex};
 
 use rustix::io::Errno;
 use storage::{Deed, Disk as _, Hindrance, LocalDisk};
@@ -13,13 +13,19 @@ struct Ailment {
     error: Option<Errno>,
     /// Only for files whose names end so.
     ending: &'static str,
+    /// Files can be made and opened all the same, as on a full disk.
+    only_writes: bool,
     free_bytes: Option<u64>,
     /// How often it has refused something.
     refusals: u32,
+    /// It does not say what is free until it is healed.
+    hangs: bool,
+    /// How many wait for it to say so.
+    waiting: u32,
 }
 
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Ailing(Arc<Mutex<Ailment>>);
+pub(crate) struct Ailing(Arc<Mutex<Ailment>>, Arc<Condvar>);
 
 impl Ailing {
     /// From now on writing to files whose names end so is refused.
@@ -27,6 +33,12 @@ impl Ailing {
         let mut ailment = self.0.lock().unwrap();
         ailment.error = Some(error);
         ailment.ending = ending;
+    }
+
+    /// From now on such files can be made, but nothing is written to them.
+    pub(crate) fn refuse_writes(&self, ending: &'static str, error: Errno) {
+        self.refuse(ending, error);
+        self.0.lock().unwrap().only_writes = true;
     }
 
     /// From now on so much is free.
@@ -41,9 +53,18 @@ impl Ailing {
         }
     }
 
+    /// From now on nobody is told what is free. Returns once somebody waits to be told.
+    pub(crate) async fn hang(&self) {
+        self.0.lock().unwrap().hangs = true;
+        while self.0.lock().unwrap().waiting == 0 {
+            tokio::time::sleep(std::time::Duration::from_millis(1)).await;
+        }
+    }
+
     /// All is well again.
     pub(crate) fn heal(&self) {
         *self.0.lock().unwrap() = Ailment::default();
+        self.1.notify_all();
     }
 }
 
@@ -52,7 +73,9 @@ impl Hindrance for Ailing {
         let mut ailment = self.0.lock().unwrap();
         match ailment.error {
             Some(error)
-                if deed != Deed::Remove && path.to_string_lossy().ends_with(ailment.ending) =>
+                if deed != Deed::Remove
+                    && !(deed == Deed::Open && ailment.only_writes)
+                    && path.to_string_lossy().ends_with(ailment.ending) =>
             {
                 ailment.refusals += 1;
                 Err(error.into())
@@ -62,7 +85,12 @@ impl Hindrance for Ailing {
     }
 
     fn free_bytes(&self, path: &Path) -> io::Result<Option<u64>> {
-        let free = self.0.lock().unwrap().free_bytes;
+        let mut ailment = self.0.lock().unwrap();
+        ailment.waiting += 1;
+        let mut ailment = self.1.wait_while(ailment, |ailment| ailment.hangs).unwrap();
+        ailment.waiting = ailment.waiting.saturating_sub(1);
+        let free = ailment.free_bytes;
+        drop(ailment);
         free.map_or_else(|| LocalDisk.free_bytes(path), |free| Ok(Some(free)))
     }
 }

@@ -6,7 +6,9 @@ mod room;
 
 use std::sync::Arc;
 
-use relief_api::{Event, Job, JobState, Rerun, Scan, ScanState, StartScan, Status, path};
+use relief_api::{
+    Event, Job, JobState, LaserEntry, LaserLog, Rerun, Scan, ScanState, StartScan, Status, path,
+};
 use reliefd::Config;
 use rustix::io::Errno;
 use scan_record::JournalReader;
@@ -151,4 +153,51 @@ async fn a_job_whose_record_is_refused_is_published_once_all_the_same() {
     let after = std::fs::metadata(&place).unwrap();
     assert_eq!(before.modified().unwrap(), after.modified().unwrap());
     rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_result_whose_name_is_not_safe_is_not_told_as_done() {
+    let (rig, disk) = rig(|_| {}).await;
+    let mut events = rig.client.events().await;
+    disk.refuse("spool", Errno::IO);
+    let scan = rig.start_scan("a").await;
+    let scan = ended(&mut events, &scan.id).await;
+    let job = job_over(&mut events, &rig, scan.jobs[0]).await;
+    // It has its name by now, which the power might still take back.
+    assert!(rig.daemon.spool_dir().join(&job.result).is_dir());
+    for attempt in 1..=2 {
+        let job = job_over(&mut events, &rig, job.id).await;
+        assert_eq!((job.state, job.attempts), (JobState::Failed, attempt));
+        let error = job.error.unwrap();
+        assert!(error.starts_with("cannot sync the folder"), "{error}");
+        if attempt == 2 {
+            disk.heal();
+        }
+        let _: Job = rig.client.ask(&path::job_retry(job.id)).await;
+    }
+    let job = job_over(&mut events, &rig, job.id).await;
+    assert_eq!(job.state, JobState::Done, "{:?}", job.error);
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_laser_log_is_made_up_for_once_the_disk_takes_it() {
+    let (rig, disk) = rig(|_| {}).await;
+    rig.scan_to_result("a").await;
+    disk.refuse_writes(".jsonl", Errno::NOSPC);
+    let (unlogged, _) = rig.scan_to_result("b").await;
+    disk.heal();
+    rig.scan_to_result("c").await;
+    let shown: LaserLog = rig.client.get(path::LASER).await;
+    rig.daemon.shutdown().await;
+    let text = std::fs::read_to_string(rig.folder.path().join("state/laser.jsonl")).unwrap();
+    let written: Vec<LaserEntry> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(written, shown.entries);
+    let of_it = written
+        .iter()
+        .filter(|e| e.scan.as_ref() == Some(&unlogged.id));
+    assert!(of_it.count() >= 2, "{text}");
 }

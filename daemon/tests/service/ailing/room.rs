@@ -1,6 +1,12 @@
 //! What is done when room is short.
 
-use relief_api::{Event, PlanRequest, Scan, ScanState, SpoolEntry, StartScan, Status, path};
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
+
+use redb::ReadableTable;
+use relief_api::{
+    Event, Job, JobState, PlanRequest, Scan, ScanState, SpoolEntry, StartScan, Status, path,
+};
 use rustix::io::Errno;
 
 use crate::fake::{COLUMNS, SAMPLES};
@@ -51,13 +57,19 @@ const BARE: [&str; 3] = ["a.igs", "manifest.json", "report.json"];
 #[tokio::test(flavor = "multi_thread")]
 async fn pictures_are_the_first_to_go_when_the_disk_is_full() {
     let (rig, disk) = super::rig(|_| {}).await;
-    // The third of four does not fit.
-    disk.refuse("residuals.png", Errno::NOSPC);
-    let (scan, _) = rig.scan_to_result("a").await;
-    let (names, warnings) = result(&rig, &scan.id).await;
-    assert_eq!(names, BARE);
-    assert!(warnings.contains("pictures were left out"), "{warnings}");
-    disk.heal();
+    // The third of four cannot be made, or finds no room.
+    for only_writes in [false, true] {
+        if only_writes {
+            disk.refuse_writes("residuals.png", Errno::NOSPC);
+        } else {
+            disk.refuse("residuals.png", Errno::NOSPC);
+        }
+        let (scan, _) = rig.scan_to_result("a").await;
+        let (names, warnings) = result(&rig, &scan.id).await;
+        assert_eq!(names, BARE);
+        assert!(warnings.contains("pictures were left out"), "{warnings}");
+        disk.heal();
+    }
     let (scan, _) = rig.scan_to_result("a").await;
     let (names, warnings) = result(&rig, &scan.id).await;
     assert_eq!(names.len(), BARE.len() + 4);
@@ -122,8 +134,74 @@ async fn the_oldest_scans_go_when_all_take_more_than_they_may() {
     assert_eq!(problem.kind, "nothing-kept");
     assert!(problem.detail.contains("were removed at"), "{problem:?}");
     let status: Status = rig.client.get(path::STATUS).await;
-    let kept = std::fs::metadata(rig.journal(&new.id)).unwrap().len();
-    assert_eq!(status.storage.unwrap().scans_bytes, kept);
+    let kept = std::fs::metadata(rig.journal(&new.id)).unwrap();
+    assert_eq!(status.storage.unwrap().scans_bytes, kept.blocks() * 512);
+    rig.daemon.shutdown().await;
+}
+
+/// Changes a scan's record behind the back of a service that has ended.
+fn change_record(folder: &Path, scan: &str, change: impl FnOnce(&mut serde_json::Value)) {
+    let table = redb::TableDefinition::<&str, &[u8]>::new("scans");
+    let records = redb::Database::open(folder.join("state/reliefd.redb")).unwrap();
+    let transaction = records.begin_write().unwrap();
+    {
+        let mut scans = transaction.open_table(table).unwrap();
+        let kept = scans.get(scan).unwrap().unwrap().value().to_vec();
+        let mut kept: serde_json::Value = serde_json::from_slice(&kept).unwrap();
+        change(&mut kept["record"]);
+        let kept = serde_json::to_vec(&kept).unwrap();
+        scans.insert(scan, kept.as_slice()).unwrap();
+    }
+    transaction.commit().unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_journal_that_is_put_back_can_be_run_again_and_is_as_young_as_that() {
+    let rig = Rig::new().await;
+    let (scan, _) = rig.scan_to_result("a").await;
+    let journal = rig.journal(&scan.id);
+    let aside = rig.folder.path().join("aside");
+    std::fs::copy(&journal, &aside).unwrap();
+    rig.daemon.shutdown().await;
+    // As if it had been taken a year ago.
+    let year_ago =
+        (jiff::Timestamp::now() - jiff::SignedDuration::from_hours(24 * 365)).to_string();
+    change_record(rig.folder.path(), &scan.id, |record| {
+        record["ended_at"] = year_ago.clone().into();
+    });
+    let month = |config: &mut reliefd::Config| config.storage.scans_days = Some(30);
+    let rig = Rig::start(rig.folder, month).await;
+    let gone: Scan = rig.client.get(&path::scan(&scan.id)).await;
+    assert!(gone.removed_at.is_some() && !journal.exists());
+
+    // While the service runs ...
+    std::fs::copy(&aside, &journal).unwrap();
+    let mut events = rig.client.events().await;
+    let job: Job = rig.client.ask(&path::scan_rerun(&scan.id)).await;
+    let job = crate::rig::job_over(&mut events, &rig, job.id).await;
+    assert_eq!(job.state, JobState::Done, "{:?}", job.error);
+    // ... and across a start, which looks for what is too old.
+    rig.daemon.shutdown().await;
+    let rig = Rig::start(rig.folder, month).await;
+    let back: Scan = rig.client.get(&path::scan(&scan.id)).await;
+    assert!(journal.exists() && back.removed_at.is_none() && back.put_back_at.is_some());
+    assert_eq!(back.ended_at.as_deref(), Some(year_ago.as_str()));
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_disk_that_hangs_keeps_nobody_from_the_status() {
+    let (rig, disk) = super::rig(|_| {}).await;
+    disk.hang().await;
+    let status = async {
+        let status: Status = rig.client.get(path::STATUS).await;
+        assert!(status.storage.unwrap().scans_free_bytes.is_some());
+        rig.client.events().await;
+    };
+    // Far longer than an answer takes.
+    let answered = tokio::time::timeout(std::time::Duration::from_secs(60), status).await;
+    disk.heal();
+    assert!(answered.is_ok(), "the status waits for the disk");
     rig.daemon.shutdown().await;
 }
 

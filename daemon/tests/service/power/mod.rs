@@ -15,7 +15,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use deliverables::Manifest;
-use relief_api::{Event, Job, JobState, PlanRequest, Rerun, Scan, ScanState, StartScan, path};
+use relief_api::{
+    Event, Job, JobState, LaserLog, LaserState, PlanRequest, Rerun, Scan, ScanState, StartScan,
+    path,
+};
 use reliefd::Daemon;
 use scan_record::{JournalReader, RawColumn};
 
@@ -131,6 +134,7 @@ async fn story() -> Story {
         })
         .into();
     rig.daemon.shutdown().await;
+    retire(rig.folder.path(), &scan.id, &recorder).await;
     Story {
         steps: recorder.steps(),
         folder: rig.folder,
@@ -138,6 +142,22 @@ async fn story() -> Story {
         columns,
         results,
     }
+}
+
+/// Starts the service once more, to whom the first result is too old.
+async fn retire(folder: &Path, result: &str, recorder: &Recorder) {
+    let mut config = config(folder);
+    config.storage.results_days = Some(1);
+    let place = config.service.spool_dir.join(result);
+    let long_ago = std::time::SystemTime::now() - std::time::Duration::from_secs(100 * 86_400);
+    let times = fs::FileTimes::new().set_modified(long_ago);
+    fs::File::open(&place).unwrap().set_times(times).unwrap();
+    recorder.tell(Told::Retired(result.to_owned()));
+    let disk = Arc::new(recorder.clone());
+    let daemon = Daemon::start_on(config, FakeScanner::new(), disk);
+    let daemon = daemon.await.unwrap();
+    daemon.shutdown().await;
+    assert!(!place.exists(), "it was kept");
 }
 
 /// What may be relied on after some steps.
@@ -148,6 +168,8 @@ struct Promised {
     complete: bool,
     queued: Option<u64>,
     published: BTreeSet<String>,
+    /// Results that may be there or not.
+    retired: BTreeSet<String>,
 }
 
 impl Promised {
@@ -161,6 +183,9 @@ impl Promised {
                 Step::Told(Told::Queued(job)) => promised.queued = Some(*job),
                 Step::Told(Told::Published(result)) => {
                     promised.published.insert(result.clone());
+                }
+                Step::Told(Told::Retired(result)) => {
+                    promised.retired.insert(result.clone());
                 }
                 _ => {}
             }
@@ -279,6 +304,13 @@ async fn hold(
         let known: Vec<u64> = jobs.jobs.iter().rev().map(|job| job.id).collect();
         assert_eq!(scan.jobs, known, "{place}");
     }
+    // The laser was on before there was a column.
+    let log: LaserLog = rig.client.get(path::LASER).await;
+    let was_on = log
+        .entries
+        .iter()
+        .any(|entry| entry.laser == LaserState::On);
+    assert!(was_on || promised.columns == 0, "{place}: {log:?}");
     if let Some(job) = promised.queued {
         assert!(jobs.jobs.iter().any(|j| j.id == job), "{place}: {jobs:?}");
     }
@@ -291,14 +323,18 @@ async fn hold(
         }
         let done = job_over(&mut events, rig, job.id).await;
         assert_eq!(done.state, JobState::Done, "{place}: {:?}", done.error);
-        let now = files(&rig.daemon.spool_dir().join(&done.result));
+        let folder = rig.daemon.spool_dir().join(&done.result);
+        if promised.retired.contains(&done.result) && !folder.exists() {
+            continue;
+        }
+        let now = files(&folder);
         check_whole(&now, place);
         if is_promised {
             assert!(now == seen[&done.result], "{place}: it was changed");
         }
         assert!(results.insert(done.result, now).is_none(), "{place}");
     }
-    for result in &promised.published {
+    for result in promised.published.difference(&promised.retired) {
         assert!(results.contains_key(result), "{place}: {result} is gone");
     }
     let mut spooled: Vec<String> = fs::read_dir(rig.daemon.spool_dir())
@@ -333,6 +369,18 @@ async fn nothing_promised_is_lost_wherever_the_power_fails() {
         revive(&story, at, Loss::Some(at as u64)).await;
         revive(&story, at + 1, Loss::All).await;
         images += 3;
+    }
+    let retired = |step: &Step| matches!(step, Step::Told(Told::Retired(_)));
+    let retired = story.steps.iter().position(retired).unwrap();
+    for seed in 0..20 {
+        let rest = (story.steps.len() - retired) as u64;
+        revive(
+            &story,
+            retired + dice.below(rest + 1) as usize,
+            Loss::Some(seed),
+        )
+        .await;
+        images += 1;
     }
     for seed in 0..60 {
         let at = dice.below(story.steps.len() as u64 + 1) as usize;

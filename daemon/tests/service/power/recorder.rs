@@ -59,6 +59,8 @@ pub(crate) enum Told {
     Queued(u64),
     /// The result is in the spool.
     Published(String),
+    /// From here on the result may go.
+    Retired(String),
 }
 
 /// The disk, and its notes.
@@ -141,7 +143,16 @@ impl Disk for Recorder {
         self.noted(|| LocalDisk.remove_file(path), step)
     }
 
+    /// One after the other, since the power may fail in between.
     fn remove_dir_all(&self, path: &Path) -> io::Result<()> {
+        for entry in std::fs::read_dir(path)? {
+            let entry = entry?;
+            if entry.file_type()?.is_dir() {
+                self.remove_dir_all(&entry.path())?;
+            } else {
+                self.remove_file(&entry.path())?;
+            }
+        }
         let step = || Step::Remove {
             path: path.to_owned(),
         };

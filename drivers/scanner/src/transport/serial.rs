@@ -66,10 +66,11 @@ impl SerialConnector {
             Errno::NOENT | Errno::NXIO | Errno::NODEV | Errno::IO => {
                 ScannerError::NoSuchPort { port }
             }
-            Errno::ACCESS | Errno::PERM => ScannerError::Permission {
+            Errno::ACCESS => ScannerError::Permission {
                 group: group_of(Path::new(&port)),
                 port,
             },
+            Errno::PERM => ScannerError::Forbidden { port },
             Errno::BUSY | Errno::WOULDBLOCK => self.busy(),
             Errno::ISDIR | Errno::NOTTY | Errno::NOTDIR => ScannerError::NotAPort { port },
             errno => ScannerError::Port {
@@ -253,4 +254,22 @@ pub fn port_holder(path: &str) -> Option<String> {
 #[must_use]
 pub fn port_group(path: &str) -> String {
     group_of(Path::new(path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_may_not_use_a_port_is_told_why() {
+        let connector = SerialConnector::new(&SerialSettings::new("/dev/null"));
+        let told = |errno| connector.refused(errno).to_string();
+        assert!(told(Errno::ACCESS).contains("belongs to the group `root`"));
+        // The device policy of a unit, which no group changes.
+        let told = told(Errno::PERM);
+        assert!(
+            told.contains("DeviceAllow=") && !told.contains("group `"),
+            "{told}"
+        );
+    }
 }

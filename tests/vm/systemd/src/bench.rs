@@ -14,6 +14,9 @@ use crate::system::{self, LIMIT, SERVICE, number, run, try_run, wait};
 /// The name that the udev rules give the scanner.
 pub(crate) const PORT: &str = "/dev/relief/scanner-SIM-0001";
 
+/// Kinds of USB serial ports that the service may use, as `/proc/devices` names them.
+pub(crate) const SERIAL_PORTS: [&str; 2] = ["ttyACM", "ttyUSB"];
+
 pub(crate) const COLUMNS: u32 = 40;
 const SAMPLES: u32 = 48;
 
@@ -24,14 +27,26 @@ const LINE_RATE_HZ: f64 = 6.0;
 const COLUMNS_BEFORE: u64 = 5;
 
 pub(crate) struct Bench {
-    server: UsbServer,
+    /// None until it is first plugged in.
+    server: Option<UsbServer>,
     /// The first whole scan, which must survive everything.
     pub(crate) first: Option<String>,
 }
 
 impl Bench {
-    /// Plugs the scanner in.
+    /// A machine to which no scanner was ever connected.
     pub(crate) fn new() -> Result<Self> {
+        for kind in SERIAL_PORTS {
+            ensure!(!system::knows_device(kind)?, "the kernel knows {kind}");
+        }
+        Ok(Self {
+            server: None,
+            first: None,
+        })
+    }
+
+    /// Plugs the scanner in.
+    pub(crate) fn plug_in(&mut self) -> Result<()> {
         let mut config = SimConfig {
             overrides: Overrides {
                 columns: Some(COLUMNS),
@@ -44,14 +59,13 @@ impl Bench {
         config.device.line_rate_hz = Some(LINE_RATE_HZ);
         let source = config.source()?;
         let server = config.serve_usb(source, Personality::CdcAcm, Attachment::ThisMachine)?;
-        Ok(Self {
-            server,
-            first: None,
-        })
+        self.server = Some(server);
+        Ok(())
     }
 
-    pub(crate) fn control(&self) -> Control {
-        self.server.control()
+    pub(crate) fn control(&self) -> Result<Control> {
+        let server = self.server.as_ref();
+        Ok(server.context("the scanner is not plugged in")?.control())
     }
 
     pub(crate) fn first(&self) -> Result<&str> {
@@ -69,7 +83,7 @@ impl Bench {
             Ok(scan["columns"].as_u64() >= Some(COLUMNS_BEFORE))
         })?;
         ensure!(
-            self.control().snapshot().laser_on,
+            self.control()?.snapshot().laser_on,
             "a scan without its laser"
         );
         Ok(id)
@@ -77,7 +91,7 @@ impl Bench {
 
     /// The laser goes off; the time that took.
     pub(crate) fn laser_goes_off(&self) -> Result<Duration> {
-        let control = self.control();
+        let control = self.control()?;
         wait("the laser goes off", || Ok(!control.snapshot().laser_on))
     }
 

@@ -71,6 +71,14 @@ pub(crate) fn is_active(unit: &str) -> Result<bool> {
     Ok(try_run("systemctl", &["is-active", "--quiet", unit])?.0)
 }
 
+/// True if the kernel has a driver of devices of this kind.
+pub(crate) fn knows_device(kind: &str) -> Result<bool> {
+    let devices = fs::read_to_string("/proc/devices")?;
+    Ok(devices
+        .lines()
+        .any(|line| line.split_whitespace().nth(1) == Some(kind)))
+}
+
 pub(crate) fn exists(path: &str) -> bool {
     Path::new(path).exists()
 }

@@ -82,15 +82,18 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
     findings.push(port::present());
     findings.push(usb::present());
     findings.extend(machine::disturbers());
+    let reserve_bytes = config.storage.reserve_bytes();
     findings.push(disk::check(
         "kept scans",
         "service.state_dir",
         &config.service.state_dir,
+        reserve_bytes,
     ));
     findings.push(disk::check(
         "spool",
         "service.spool_dir",
         &config.service.spool_dir,
+        reserve_bytes,
     ));
     findings.push(machine::clock());
     findings.push(reach::check(args.endpoint.endpoint()?).await);

@@ -7,19 +7,33 @@ use anyhow::{Context, Result, ensure};
 use rustix::process::{Pid, Signal, kill_process};
 
 use crate::bench::{
-    Bench, COLUMNS, PORT, is_over, ready, relief, replaced, scan as scan_of, text, wait_for_path,
+    Bench, COLUMNS, PORT, SERIAL_PORTS, is_over, ready, relief, replaced, scan as scan_of, text,
+    wait_for_path,
 };
-use crate::system::{SERVICE, SOCKET, id_of, number, owner, property, systemctl, wait};
+use crate::system::{
+    SERVICE, SOCKET, id_of, knows_device, number, owner, property, systemctl, wait,
+};
 
 const CONFIGURATION: &str = "/etc/relief/reliefd.toml";
 
-pub(super) fn scan(bench: &mut Bench) -> Result<()> {
+/// The service is not started anew between this and the first scan: it must be able to use a
+/// port of a kind that no device had when it started.
+pub(super) fn first_plug(bench: &mut Bench) -> Result<()> {
+    configure()?;
+    bench.plug_in()?;
     wait_for_path(PORT, true)?;
     let device = owner(PORT)?;
     ensure!(
         (device.0, device.2) == (0o660, id_of("/etc/group", "relief")?),
         "{device:?}"
     );
+    for kind in SERIAL_PORTS {
+        ensure!(knows_device(kind)?, "{kind} is unknown to the kernel");
+    }
+    ready().map(drop)
+}
+
+fn configure() -> Result<()> {
     let configuration = fs::read_to_string(CONFIGURATION)?
         .replace("\"/dev/ttyUSB0\"", &format!("{PORT:?}"))
         // An emulated machine may have little of its host.
@@ -28,12 +42,15 @@ pub(super) fn scan(bench: &mut Bench) -> Result<()> {
     ensure!(configuration.contains(PORT));
     fs::write(CONFIGURATION, configuration)?;
     systemctl(&["restart", SERVICE])?;
-    ready()?;
+    Ok(())
+}
+
+pub(super) fn scan(bench: &mut Bench) -> Result<()> {
     let told = relief(&["scan", "--name", "house", "--wait"])?;
     ensure!(told["scan"]["state"] == "complete", "{told}");
     ensure!(told["job"]["state"] == "done", "{told}");
     bench.first = Some(text(&told["scan"]["id"])?);
-    ensure!(!bench.control().snapshot().laser_on, "the laser is on");
+    ensure!(!bench.control()?.snapshot().laser_on, "the laser is on");
     bench.first_is_kept()
 }
 
@@ -92,7 +109,7 @@ fn comes_to_an_end(bench: &Bench, id: &str) -> Result<()> {
 pub(super) fn cable(bench: &mut Bench) -> Result<()> {
     let id = bench.amid_a_scan("cable")?;
     let (pid, restarts) = (number("MainPID")?, number("NRestarts")?);
-    bench.control().unplug();
+    bench.control()?.unplug();
     wait_for_path(PORT, false)?;
     bench.laser_goes_off()?;
     wait("the service notices", || {
@@ -100,7 +117,7 @@ pub(super) fn cable(bench: &mut Bench) -> Result<()> {
         Ok(status["scanner"]["link"] != "scanning")
     })?;
     ensure!(scan_of(&id)?["columns"].as_u64() > Some(0));
-    bench.control().replug();
+    bench.control()?.replug();
     wait_for_path(PORT, true)?;
     comes_to_an_end(bench, &id)?;
     ready()?;
@@ -116,7 +133,7 @@ pub(super) fn cable(bench: &mut Bench) -> Result<()> {
 pub(super) fn stopped(bench: &mut Bench) -> Result<()> {
     let id = bench.amid_a_scan("stopped")?;
     systemctl(&["stop", SOCKET, SERVICE])?;
-    ensure!(!bench.control().snapshot().laser_on, "the laser is on");
+    ensure!(!bench.control()?.snapshot().laser_on, "the laser is on");
     ensure!(property("Result")? == "success", "{}", property("Result")?);
     systemctl(&["start", SERVICE])?;
     bench.first_is_kept()?;

@@ -30,14 +30,15 @@ const fn long(name: &'static str, run: fn(&mut Bench) -> Result<()>) -> Check {
     }
 }
 
-pub(crate) fn all() -> [Check; 15] {
+pub(crate) fn all() -> [Check; 16] {
     [
         check("package: installed, enabled, started", package::install),
         check("service: in its sandbox", service::sandbox),
         check(
-            "scan: through udev and sandbox, to the CAD file",
-            life::scan,
+            "scanner: plugged in for the first time, under the running service",
+            life::first_plug,
         ),
+        check("scan: through the sandbox, to the CAD file", life::scan),
         check("journal: fields of their own", service::journal),
         check("killed in mid-scan: started anew, scans kept", life::killed),
         check(

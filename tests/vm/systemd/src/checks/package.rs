@@ -46,6 +46,8 @@ pub(super) fn install(_: &mut Bench) -> Result<()> {
         "/usr/share/man/man8/reliefd.8.gz",
         "/usr/share/man/man5/reliefd.toml.5.gz",
         "/usr/share/doc/relief/changelog.Debian.gz",
+        "/usr/share/doc/relief/safety.md",
+        "/usr/share/doc/relief/schema/commands.schema.json",
         "/usr/share/bash-completion/completions/relief",
         "/usr/share/zsh/vendor-completions/_relief",
         "/usr/share/fish/vendor_completions.d/relief.fish",
