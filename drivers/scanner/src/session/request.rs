@@ -188,6 +188,16 @@ impl Requests {
             })
     }
 
+    /// A column is safe: a scan that the device is being asked to take up counts from there.
+    pub(super) fn acknowledge(&mut self, column: u32) {
+        for open in self.open.iter_mut().chain(&mut self.queue) {
+            if let Purpose::Continue(go_on) = &mut open.purpose {
+                let taken = &mut go_on.taken;
+                taken.acknowledged.add(column, taken.handed);
+            }
+        }
+    }
+
     pub(super) fn retries(&self) -> u64 {
         self.retries
     }

@@ -7,6 +7,7 @@
 mod bench;
 mod device;
 mod faults;
+mod going_on;
 mod hostile;
 mod link;
 mod opening;
