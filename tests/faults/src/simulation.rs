@@ -352,6 +352,7 @@ impl Simulation {
                     identity,
                     plan,
                     info,
+                    self.now,
                 ));
             }
             (Stage::Home(Some(ours)) | Stage::Scan(Some(ours)), Err(error)) if ours == ticket => {

@@ -11,6 +11,9 @@ use scanner_driver::protocol::*;
 pub(crate) struct Device {
     pub(crate) boot_id: u32,
     pub(crate) version: u8,
+    pub(crate) serial: &'static str,
+    /// Depth of a count, picometres.
+    pub(crate) count_pm: u32,
     pub(crate) homed: bool,
     pub(crate) faults: Faults,
     /// Faults whose cause is there still.
@@ -81,6 +84,8 @@ impl Device {
         Self {
             boot_id: 77,
             version: MAX_VERSION,
+            serial: "0001",
+            count_pm: 10_000,
             homed: false,
             faults: Faults::NONE,
             lasting: Faults::NONE,
@@ -235,7 +240,7 @@ impl Device {
                 tag,
                 &Nameplate {
                     model: text("Bench"),
-                    serial: text("0001"),
+                    serial: text(self.serial),
                     firmware: text("1.2.3"),
                 },
             ),
@@ -244,7 +249,9 @@ impl Device {
                 &Calibration {
                     table_count_pm: 10_000_000,
                     table_origin_nm: 0,
-                    head: Head::Cartesian { count_pm: 10_000 },
+                    head: Head::Cartesian {
+                        count_pm: self.count_pm,
+                    },
                 },
             ),
             HostMessage::GetLimits(_) => Frame::new(tag, &self.limits()),

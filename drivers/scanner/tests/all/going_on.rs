@@ -84,9 +84,14 @@ fn more_columns_are_measured_again_than_the_device_can_keep() {
         acknowledged.add(column, HANDED);
     }
     let now = bench.now;
-    bench
-        .session
-        .go_on(TICKET, plan(COLUMNS), HANDED - 30, HANDED, acknowledged, now);
+    bench.session.go_on(
+        TICKET,
+        plan(COLUMNS),
+        HANDED - 30,
+        HANDED,
+        acknowledged,
+        now,
+    );
     bench.run_until("end", |bench| bench.over.is_some());
     assert_eq!(bench.columns.len() as u32, COLUMNS - HANDED + 30);
     // One column is in flight at a time, and none waits for a heartbeat.

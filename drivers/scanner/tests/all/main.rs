@@ -2,7 +2,7 @@
 //! the thread over memory and over a pseudo-terminal.
 
 // A helper that unwraps fails its test, as it should.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 mod bench;
 mod device;
@@ -12,6 +12,7 @@ mod hostile;
 mod link;
 mod opening;
 mod pty;
+mod recovery;
 mod resume;
 mod scans;
 mod usb;
