@@ -23,6 +23,7 @@ use std::time::Duration;
 
 use scanner_protocol::{Faults, Head, Identity, ScanPlan};
 
+use overlap::Kept;
 pub use pause::Pause;
 use pause::{Class, class, for_a_person};
 
@@ -64,7 +65,7 @@ pub struct Recovery {
     handed: u32,
     acknowledged: Acknowledged,
     /// The last columns handed on, to be compared.
-    kept: VecDeque<RawColumn>,
+    kept: Kept,
     /// Those of them that have come again.
     again: Vec<RawColumn>,
     pause: Option<Paused>,
@@ -125,7 +126,7 @@ impl Recovery {
             measured: now,
             handed: 0,
             acknowledged: Acknowledged::default(),
-            kept: VecDeque::new(),
+            kept: Kept::default(),
             again: Vec::new(),
             pause: None,
             attempts: 0,
@@ -251,7 +252,7 @@ impl Recovery {
                 let ticket = self.ticket();
                 self.state = State::Continuing(ticket);
                 self.attempts += 1;
-                let first_column = self.kept.front().map_or(self.handed, |column| column.index);
+                let first_column = self.kept.first_index().unwrap_or(self.handed);
                 session.go_on(
                     ticket,
                     self.plan,
@@ -302,8 +303,7 @@ impl Recovery {
         self.handed = column.index + 1;
         self.attempts = 0;
         if let Some(settings) = &self.settings {
-            self.kept.push_back(column.clone());
-            overlap::trim(&mut self.kept, settings.overlap_columns);
+            self.kept.push(column.clone(), settings.overlap_columns);
         }
         self.progress.push_back(Progress::Column(column));
     }
@@ -311,7 +311,9 @@ impl Recovery {
     /// A column that is there already, measured again; the last of them decides.
     fn compare(&mut self, again: RawColumn, now: Duration) {
         let last = again.index + 1 == self.handed;
-        self.again.push(again);
+        if self.kept.has(again.index) {
+            self.again.push(again);
+        }
         if !last {
             return;
         }
@@ -319,7 +321,7 @@ impl Recovery {
             Head::Polar { range_count_pm, .. } => f64::from(range_count_pm) * 1e-9,
             Head::Cartesian { count_pm } => f64::from(count_pm) * 1e-9,
         };
-        match overlap::compare(&self.kept, &std::mem::take(&mut self.again), count_mm) {
+        match overlap::compare(self.kept.iter(), &std::mem::take(&mut self.again), count_mm) {
             Ok(()) => self.go_on(),
             Err(how) => {
                 let error = ScannerError::Moved {

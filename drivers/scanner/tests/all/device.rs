@@ -2,6 +2,7 @@
 //! frames out.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::time::Duration;
 
 use scanner_driver::protocol::commands::*;
@@ -29,6 +30,10 @@ pub(crate) struct Device {
     pub(crate) columns_per_poll: usize,
     /// Sends columns whose fragments disagree.
     pub(crate) contradictory: bool,
+    /// Columns in which nothing stands.
+    pub(crate) gap: Range<u32>,
+    /// How far the object has been moved, counts of range.
+    pub(crate) moved_counts: i32,
     /// How often each kind of request was carried out.
     pub(crate) homings: u32,
     pub(crate) scans: u32,
@@ -97,6 +102,8 @@ impl Device {
             announce: None,
             columns_per_poll: 2,
             contradictory: false,
+            gap: 0..0,
+            moved_counts: 0,
             homings: 0,
             scans: 0,
             aborts: 0,
@@ -414,8 +421,19 @@ impl Device {
         self.out.push_back(Frame::new(self.tag, message));
     }
 
+    fn measure(&self, column: u32) -> Vec<Sample> {
+        if self.gap.contains(&column) {
+            return Vec::new();
+        }
+        let mut samples = samples_of(column);
+        for sample in samples.iter_mut().filter(|s| !s.reading.no_return) {
+            sample.reading.range_counts += self.moved_counts;
+        }
+        samples
+    }
+
     fn send_column(&mut self, scan_id: u16, column: u32, wanted: &Missing) {
-        let samples = samples_of(column);
+        let samples = self.measure(column);
         let listed = column.is_multiple_of(4);
         let size = if listed {
             LISTED_SAMPLES

@@ -7,7 +7,7 @@ use scanner_driver::protocol::commands::Continue;
 use scanner_driver::protocol::{Activity, Decoder, Faults, Message};
 use scanner_driver::recovery::{Progress, Recovery};
 use scanner_driver::session::{Answer, Command, Event, Session, Ticket};
-use scanner_driver::{LinkSettings, Pause, ResumeSettings, ScannerError};
+use scanner_driver::{LinkSettings, Pause, RawColumn, ResumeSettings, ScannerError};
 
 use crate::bench::{STEP, expected, plan};
 use crate::device::Device;
@@ -86,6 +86,19 @@ impl Rig {
         rig
     }
 
+    fn expected(&self, index: u32) -> RawColumn {
+        let whole = expected(index);
+        if self.device.gap.contains(&index) {
+            RawColumn {
+                index,
+                table_counts: whole.table_counts,
+                ..RawColumn::default()
+            }
+        } else {
+            whole
+        }
+    }
+
     fn step(&mut self) {
         self.now += STEP;
         self.host();
@@ -128,7 +141,7 @@ impl Rig {
         while let Some(progress) = self.scan.next_progress() {
             match progress {
                 Progress::Column(column) => {
-                    assert_eq!(column, expected(self.columns));
+                    assert_eq!(column, self.expected(self.columns));
                     self.columns += 1;
                     self.scan.acknowledge(column.index);
                     if let Some(session) = &mut self.session {
@@ -399,6 +412,26 @@ fn another_scanner_does_not_end_the_wait_for_a_person() {
     rig.plugged = true;
     rig.stays_dark();
     // What was told first has been seen as well.
+    rig.resume();
+    rig.to_its_end();
+}
+
+#[test]
+fn an_object_moved_while_nothing_was_in_view_is_noticed() {
+    let mut rig = Rig::new();
+    rig.device.gap = 100..300;
+    rig.run_until("gap", |rig| rig.columns > 250);
+    rig.plugged = false;
+    // Half a millimetre.
+    rig.device.moved_counts = 50_000;
+    rig.run_for(MINUTE);
+    rig.plugged = true;
+    let cause = rig.until_a_person_is_asked();
+    assert!(matches!(cause, ScannerError::Moved { .. }), "{cause:?}");
+    assert!(rig.columns < 300);
+    rig.run_until("laser off", |rig| !rig.device.laser_on);
+    rig.stays_dark();
+    rig.device.moved_counts = 0;
     rig.resume();
     rig.to_its_end();
 }
