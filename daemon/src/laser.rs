@@ -53,6 +53,10 @@ struct Known {
     scan: Option<String>,
     /// Why the scanner is about to be stopped.
     reason: Option<String>,
+    /// Requests to stop that the scanner has not yet answered.
+    stopping: u32,
+    /// The scan ended while they were open.
+    ended_meanwhile: bool,
     /// Counts what the service did, so that an answer to an older question is told.
     acts: u64,
 }
@@ -82,6 +86,8 @@ impl Laser {
                 next_scan: None,
                 scan: None,
                 reason: None,
+                stopping: 0,
+                ended_meanwhile: false,
                 acts: 0,
             }),
         };
@@ -125,6 +131,15 @@ impl Laser {
         self.note(LaserState::Unknown, reason);
     }
 
+    /// The scan that stands still was told to go on: its last columns are measured again, and
+    /// whether it does go on is seen then.
+    fn told_to_go_on(&self) {
+        let mut known = lock(&self.known);
+        if !known.is_on() {
+            known.add(LaserState::Unknown, "told to go on");
+        }
+    }
+
     /// The scan measures again.
     pub(crate) fn scan_goes_on(&self) {
         self.note(LaserState::On, "the scan goes on");
@@ -133,19 +148,24 @@ impl Laser {
     /// The scan under way has ended. A device that ended it by itself has turned the laser
     /// off; one that was lost, or has a fault, must be asked first.
     pub(crate) fn scan_ended(&self, state: ScanState, reason: Option<&str>) {
-        if self.state() == Some(LaserState::On) {
+        let mut known = lock(&self.known);
+        known.next_scan = None;
+        known.reason = None;
+        if known.stopping > 0 {
+            // The answer to the abort, which is on its way, says more.
+            known.ended_meanwhile = true;
+            return;
+        }
+        if known.is_on() {
             match state {
-                ScanState::Complete => self.note(LaserState::Off, "the scan is complete"),
-                _ => self.note(
+                ScanState::Complete => known.note(LaserState::Off, "the scan is complete"),
+                _ => known.note(
                     LaserState::Unknown,
                     reason.unwrap_or("the scan ended early"),
                 ),
             }
         }
-        let mut known = lock(&self.known);
-        known.next_scan = None;
         known.scan = None;
-        known.reason = None;
     }
 
     fn note(&self, laser: LaserState, cause: &str) {
@@ -165,27 +185,52 @@ impl Laser {
     fn begin(&self) {
         let mut known = lock(&self.known);
         known.acts += 1;
+        known.ended_meanwhile = false;
         known.scan = known.next_scan.take();
         known.note(LaserState::On, "a scan begins");
     }
 
-    /// Why the scanner is to be stopped, if that is known.
-    fn reason(&self) -> Option<String> {
-        lock(&self.known).reason.clone()
+    /// The scanner is told to stop; why, if that is known.
+    fn stopping(&self) -> Option<String> {
+        let mut known = lock(&self.known);
+        known.stopping += 1;
+        known.reason.clone()
     }
 
-    /// The scanner was told to stop.
-    fn stopped(&self) {
-        lock(&self.known).acts += 1;
+    /// It has answered.
+    fn stopped(&self, reason: Option<&str>, answer: &Result<(), ScannerError>) {
+        let mut known = lock(&self.known);
+        known.acts += 1;
+        known.stopping -= 1;
+        match answer {
+            Ok(()) => known.note(
+                LaserState::Off,
+                reason.unwrap_or("the scanner was told to stop"),
+            ),
+            Err(error) if known.is_on() => known.note(LaserState::Unknown, &error.to_string()),
+            Err(_) => {}
+        }
+        if known.stopping == 0 && std::mem::take(&mut known.ended_meanwhile) {
+            known.scan = None;
+        }
     }
 }
 
 impl Known {
+    fn is_on(&self) -> bool {
+        self.entries
+            .back()
+            .is_some_and(|last| last.laser == LaserState::On)
+    }
+
     /// Notes a state; one that is known already is not noted again.
     fn note(&mut self, laser: LaserState, cause: &str) {
-        if self.entries.back().is_some_and(|last| last.laser == laser) {
-            return;
+        if self.entries.back().is_none_or(|last| last.laser != laser) {
+            self.add(laser, cause);
         }
+    }
+
+    fn add(&mut self, laser: LaserState, cause: &str) {
         let entry = LaserEntry {
             at: now(),
             laser,
@@ -291,30 +336,16 @@ impl Scanner for Watched {
     }
 
     fn resume_scan(&self) -> Result<(), ScannerError> {
-        // To see whether it has moved, the part is measured again.
-        self.laser.scan_goes_on();
-        let resumed = self.scanner.resume_scan();
-        if let Err(error) = &resumed {
-            self.laser.note(LaserState::Unknown, &error.to_string());
-        }
-        resumed
+        self.scanner
+            .resume_scan()
+            .inspect(|()| self.laser.told_to_go_on())
     }
 
     fn abort(&self) -> Result<(), ScannerError> {
         // Before: a scan that ends meanwhile takes its reason with it.
-        let reason = self.laser.reason();
+        let reason = self.laser.stopping();
         let stopped = self.scanner.abort();
-        self.laser.stopped();
-        match &stopped {
-            Ok(()) => {
-                let cause = reason.as_deref().unwrap_or("the scanner was told to stop");
-                self.laser.note(LaserState::Off, cause);
-            }
-            Err(error) if self.laser.state() == Some(LaserState::On) => {
-                self.laser.note(LaserState::Unknown, &error.to_string());
-            }
-            Err(_) => {}
-        }
+        self.laser.stopped(reason.as_deref(), &stopped);
         stopped
     }
 }
@@ -404,6 +435,84 @@ mod tests {
         let laser = Laser::open(&LocalDisk, folder.path(), THE_SCANNER).unwrap();
         assert_eq!(laser.entries()[0].scanner, "scanner");
         assert_eq!(laser.entries()[0].scan.as_deref(), Some("s"));
+    }
+
+    /// A scanner that says this to whoever resumes, and whose scan ends before it answers an
+    /// abort.
+    struct Said(Result<(), ScannerError>, Arc<Laser>);
+
+    impl Scanner for Said {
+        fn identify(&self) -> Result<Identity, ScannerError> {
+            Err(ScannerError::Closed)
+        }
+
+        fn home(&self) -> Result<(), ScannerError> {
+            Err(ScannerError::Closed)
+        }
+
+        fn status(&self) -> Result<DeviceStatus, ScannerError> {
+            Err(ScannerError::Closed)
+        }
+
+        fn start_scan(&self, _plan: &ScanPlan) -> Result<ScanStream, ScannerError> {
+            Err(ScannerError::Closed)
+        }
+
+        fn resume_scan(&self) -> Result<(), ScannerError> {
+            self.0.clone()
+        }
+
+        fn abort(&self) -> Result<(), ScannerError> {
+            self.1.scan_ended(ScanState::Aborted, Some("aborted"));
+            Ok(())
+        }
+    }
+
+    fn states(laser: &Laser) -> Vec<LaserState> {
+        laser.entries().iter().map(|entry| entry.laser).collect()
+    }
+
+    #[test]
+    fn a_scan_told_to_go_on_is_not_on_before_it_does() {
+        use LaserState::{On, Unknown};
+        let folder = tempfile::tempdir().unwrap();
+        let laser = Arc::new(Laser::open(&folder.path().join("laser.jsonl")).unwrap());
+        let watched =
+            |said| Watched::new(Arc::new(Said(said, Arc::clone(&laser))), Arc::clone(&laser));
+        laser.scan_begins("s");
+        laser.begin();
+        laser.scan_paused("the door is open");
+        watched(Err(ScannerError::NothingPaused))
+            .resume_scan()
+            .unwrap_err();
+        assert_eq!(states(&laser), [On, Unknown]);
+        watched(Ok(())).resume_scan().unwrap();
+        assert_eq!(states(&laser), [On, Unknown, Unknown]);
+        assert_eq!(laser.latest().unwrap().cause, "told to go on");
+        laser.scan_goes_on();
+        // It may have gone on before that is noted.
+        watched(Ok(())).resume_scan().unwrap();
+        assert_eq!(states(&laser), [On, Unknown, Unknown, On]);
+    }
+
+    #[test]
+    fn an_abort_is_noted_once_and_with_its_scan() {
+        let folder = tempfile::tempdir().unwrap();
+        let laser = Arc::new(Laser::open(&folder.path().join("laser.jsonl")).unwrap());
+        let said = Said(Ok(()), Arc::clone(&laser));
+        let watched = Watched::new(Arc::new(said), Arc::clone(&laser));
+        laser.scan_begins("s");
+        laser.begin();
+        laser.stop_asked("aborted on request");
+        watched.abort().unwrap();
+        assert_eq!(states(&laser), [LaserState::On, LaserState::Off]);
+        let off = laser.latest().unwrap();
+        assert_eq!(
+            (off.cause.as_str(), off.scan.as_deref()),
+            ("aborted on request", Some("s"))
+        );
+        laser.note(LaserState::On, "the scanner says that it is on");
+        assert_eq!(laser.latest().unwrap().scan, None);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use jiff::Timestamp;
 use relief_api::{Event, Job, JobState, Scan, ScanState, StorageStatus};
@@ -153,6 +153,8 @@ impl Service {
         // Nobody asks for a job of a scan that just goes.
         let _order = self.queue.changing();
         let limits = self.config().storage;
+        // One time for all: ages in whole seconds must not differ by when they were looked at.
+        let at = Timestamp::now();
         let (mut scans, jobs) = (self.scans()?, self.jobs()?);
         let mut scans_bytes = 0;
         let mut kept = Vec::new();
@@ -166,7 +168,7 @@ impl Service {
                 kept.push(Kept {
                     id: scan.id.clone(),
                     bytes,
-                    age_s: age_s(scan.put_back_at.as_ref().or(scan.ended_at.as_ref())),
+                    age_s: age_s(scan.put_back_at.as_deref().or(scan.ended_at.as_deref()), at),
                     needed: is_needed(scan, &jobs),
                 });
             }
@@ -179,7 +181,7 @@ impl Service {
         let results: Vec<Kept> = jobs
             .iter()
             .filter(|job| job.state == JobState::Done)
-            .filter_map(|job| kept_result(&self.spool.directory(&job.result), &job.result))
+            .filter_map(|job| kept_result(&self.spool.directory(&job.result), job, at))
             .collect();
         let mut results_bytes: u64 = results.iter().map(|kept| kept.bytes).sum();
         for gone in surplus(results, limits.results()) {
@@ -255,17 +257,15 @@ fn is_needed(scan: &Scan, jobs: &[Job]) -> bool {
             .any(|job| !job.state.is_over() || job.state == JobState::Failed)
 }
 
-fn kept_result(folder: &Path, result: &str) -> Option<Kept> {
+fn kept_result(folder: &Path, job: &Job, at: Timestamp) -> Option<Kept> {
     let mut bytes = 0;
     for entry in fs::read_dir(folder).ok()? {
         bytes += on_disk(&entry.ok()?.metadata().ok()?);
     }
-    let changed = fs::metadata(folder).ok()?.modified().ok()?;
-    let age = SystemTime::now().duration_since(changed);
     Some(Kept {
-        id: result.to_owned(),
+        id: job.result.clone(),
         bytes,
-        age_s: age.unwrap_or_default().as_secs(),
+        age_s: age_s(job.ended_at.as_deref(), at),
         needed: false,
     })
 }
@@ -278,10 +278,10 @@ fn on_disk(metadata: &fs::Metadata) -> u64 {
 }
 
 /// Seconds since a time; 0 where it is not known or lies ahead.
-fn age_s(since: Option<&String>) -> u64 {
+fn age_s(since: Option<&str>, at: Timestamp) -> u64 {
     let since: Option<Timestamp> = since.and_then(|since| since.parse().ok());
     since
-        .map(|since| Timestamp::now().as_second() - since.as_second())
+        .map(|since| at.as_second() - since.as_second())
         .and_then(|age| u64::try_from(age).ok())
         .unwrap_or_default()
 }

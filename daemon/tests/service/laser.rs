@@ -16,6 +16,12 @@ use sim_scanner::preset::Overrides;
 use crate::client::Client;
 use crate::rig::{Rig, ended};
 
+/// A dead-man time that does not pass by itself on a busy machine.
+const LONG_MS: u32 = 10_000;
+
+/// One that a test waits for.
+const SHORT_MS: u32 = 3_000;
+
 /// Nothing here takes as long, unless it hangs.
 const GUARD: Duration = Duration::from_secs(60);
 
@@ -135,7 +141,7 @@ struct Running {
     _scanner: sim_scanner::endpoint::pty::PtyServer,
 }
 
-async fn scanning() -> Running {
+async fn scanning(dead_man_ms: u32) -> Running {
     let scanner = SimConfig {
         overrides: Overrides {
             columns: Some(2_000),
@@ -144,8 +150,8 @@ async fn scanning() -> Running {
         },
         device: DeviceSettings {
             table_speed_mm_s: f64::INFINITY,
-            // Half a minute for the scan: longer than any of this takes.
-            line_rate_hz: Some(66.0),
+            // Minutes for the scan: longer than any of this takes.
+            line_rate_hz: Some(10.0),
             ..DeviceSettings::default()
         },
         ..SimConfig::default()
@@ -156,7 +162,7 @@ async fn scanning() -> Running {
     let at = folder.path();
     let config = format!(
         "[service]\nsocket = \"{at}/s\"\nstate_dir = \"{at}/state\"\nspool_dir = \"{at}/spool\"\n\
-         [scanner]\nport = \"{}\"\ndead_man_ms = 1000\n",
+         [scanner]\nport = \"{}\"\ndead_man_ms = {dead_man_ms}\n",
         scanner.port().display(),
         at = at.display()
     );
@@ -237,7 +243,7 @@ impl Running {
 #[tokio::test(flavor = "multi_thread")]
 async fn asked_to_end_the_service_turns_the_laser_off_itself() {
     for signal in [Signal::SIGTERM, Signal::SIGINT] {
-        let mut running = scanning().await;
+        let mut running = scanning(LONG_MS).await;
         running.signal(signal);
         let status = running.child.wait().unwrap();
         assert!(status.success(), "{signal}: {status}");
@@ -253,7 +259,7 @@ async fn asked_to_end_the_service_turns_the_laser_off_itself() {
 #[tokio::test(flavor = "multi_thread")]
 async fn killed_in_any_way_the_service_leaves_the_laser_to_the_dead_man() {
     for signal in [Signal::SIGABRT, Signal::SIGKILL, Signal::SIGQUIT] {
-        let mut running = scanning().await;
+        let mut running = scanning(SHORT_MS).await;
         running.signal(signal);
         let status = running.child.wait().unwrap();
         assert_eq!(status.signal(), Some(signal as i32));
@@ -280,7 +286,7 @@ async fn killed_in_any_way_the_service_leaves_the_laser_to_the_dead_man() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_service_that_hangs_leaves_the_laser_to_the_dead_man() {
-    let mut running = scanning().await;
+    let mut running = scanning(SHORT_MS).await;
     running.signal(Signal::SIGSTOP);
     running.laser_goes_off();
     assert!(running.dead_man_was_there());
@@ -292,7 +298,7 @@ async fn a_service_that_hangs_leaves_the_laser_to_the_dead_man() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn without_its_socket_the_service_still_ends_with_the_laser_off() {
-    let mut running = scanning().await;
+    let mut running = scanning(LONG_MS).await;
     std::fs::remove_file(running.folder.path().join("s")).unwrap();
     running.signal(Signal::SIGTERM);
     assert!(running.child.wait().unwrap().success());

@@ -13,11 +13,13 @@ pub const MAX_SCAN_COLUMNS: u32 = 800_000;
 /// bounds the window at 200 MB; with the usual 256 samples it is below one.
 pub const MAX_CREDITS: u16 = 256;
 
-/// Most columns measured again when a scan goes on.
+/// Most columns that are compared when a scan goes on, and as many again from before a gap in
+/// the object. What lies in between is measured on the way.
 pub const MAX_OVERLAP: u16 = 16;
 
 /// Samples below which columns measured again prove little: an object that is moved before so
-/// many of it have been measured may go on being measured where it stands then.
+/// many of it have been measured, in [`MAX_OVERLAP`] columns in a row, may go on being measured
+/// where it stands then.
 pub const PROOF_SAMPLES: usize = 16;
 
 /// Most bytes kept for sending. Heartbeats, grants and resend requests stop growing it

@@ -54,7 +54,8 @@ pub struct LinkSettings {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ResumeSettings {
     /// Fewest columns measured again, to prove that neither table nor object has moved; where
-    /// they hold little, more are taken, up to [`crate::limits::MAX_OVERLAP`]. At least 1.
+    /// they hold little, more are taken, up to [`crate::limits::MAX_OVERLAP`], and in a gap of
+    /// the object the last columns before it as well. At least 1.
     pub overlap_columns: u16,
     /// Attempts to go on without a new column, before a person is asked.
     pub attempts: u32,

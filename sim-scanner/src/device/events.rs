@@ -45,8 +45,6 @@ pub enum Event {
     DeadMan,
     /// The faults changed.
     Faults(Faults),
-    /// The cable was pulled by a mishap.
-    Unplugged,
     /// A request was refused.
     Rejected,
 }

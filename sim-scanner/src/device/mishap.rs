@@ -5,7 +5,6 @@ use core::time::Duration;
 use scanner_protocol::{Faults, ResetCause};
 
 use super::Device;
-use super::events::Event;
 use crate::Vec3;
 use crate::random::{Draws, Purpose};
 
@@ -187,7 +186,6 @@ impl Device {
     fn pull(&mut self, now: Duration) {
         self.mischief.unplugged = true;
         self.out.clear();
-        self.log.push(Event::Unplugged);
         // A device on USB notices; one on a serial line has its dead-man time.
         if self.settings.feels_the_plug {
             self.lose_line(now);

@@ -282,10 +282,15 @@ impl Worker {
         Some(Wait {
             readable: true,
             writable: !self.pending.is_empty(),
-            until: [wake, self.to_host.due(), self.to_device.due()]
-                .into_iter()
-                .flatten()
-                .min(),
+            // What is due for a host that does not read waits for room, not for a time.
+            until: [
+                wake,
+                self.to_host.due().filter(|_| self.pending.is_empty()),
+                self.to_device.due(),
+            ]
+            .into_iter()
+            .flatten()
+            .min(),
         })
     }
 

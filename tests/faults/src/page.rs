@@ -43,10 +43,11 @@ pub(crate) fn page(tallies: &[Tally], from: u64) -> String {
          Written by `cargo xtask study faults`. {scans} scans of 50 columns, seeds from {from}, in \
          simulated time: the driver's session and recovery against the simulated device, joined by \
          a line in memory. `--only CLASS --replay SEED` runs one of them again.\n\n\
-         Of every scan is asked: it ends, without a panic; the laser is off at the end; its journal \
-         is that of the same scan without faults, byte for byte. Of classes that need nobody, 99.9 % \
+         Of every scan is asked: it ends, without a panic; the laser is off at the end, and \
+         while a person is waited for; a complete scan is closed at the device; its journal is that of the same scan without faults, byte for byte. Of classes that need nobody, 99.9 % \
          of the scans must end without a person; the others must stop for their cause, and go on \
-         when a person, who comes after 30 s, tells them to. A mix draws each class with \
+         when a person, who comes after 30 s, tells them to. A tenth of the columns takes as long \
+         as 2 s to the disk, the others 4 ms. A mix draws each class with \
          probability 0.3 (0.1 if it needs a person) at a rate between a hundredth of the one below \
          and all of it.\n\n\
          Every other scan is on a line that tells nobody when the cable is pulled. A class that \

@@ -70,8 +70,12 @@ const PERSON: Duration = Duration::from_secs(30);
 /// How long the device is watched after the scan's end: longer than its dead-man time.
 const AFTERWARDS: Duration = Duration::from_secs(10);
 
-/// How long a column takes to the disk.
+/// How long a column takes to the disk, mostly.
 const DISK: Duration = Duration::from_millis(4);
+
+/// Share of columns on which the disk is slow, and how long it takes for these at most.
+const SLOW_DISK: f64 = 0.1;
+const SLOWEST_DISK: Duration = Duration::from_secs(2);
 
 /// Columns per second.
 const LINE_RATE_HZ: f64 = 50.0;
@@ -121,9 +125,12 @@ struct Simulation {
     scan: Option<Recovery>,
     journal: Option<Journal>,
     columns: u32,
-    /// Columns that will be on disk, and when.
+    /// Columns that will be on disk, and when: in order, as in a journal.
     disk: Vec<(Duration, u32)>,
+    disk_dice: Dice,
     person_at: Option<Duration>,
+    /// Since when the scan waits for a person.
+    asked_since: Option<Duration>,
     asleep_until: Duration,
     attended: Vec<Pause>,
     pauses: u32,
@@ -170,6 +177,8 @@ impl Simulation {
             journal: Some(Journal::new()?),
             columns: 0,
             disk: Vec::new(),
+            disk_dice: Dice::new(conditions.seed, 3),
+            asked_since: None,
             person_at: None,
             asleep_until: Duration::ZERO,
             attended: Vec::new(),
@@ -200,6 +209,7 @@ impl Simulation {
         if self.now >= self.asleep_until {
             self.host_turn()?;
         }
+        self.watch_the_pause()?;
         let next = self.next_time();
         self.now = next.max(self.now + Duration::from_micros(100));
         Ok(())
@@ -280,6 +290,16 @@ impl Simulation {
         }
     }
 
+    fn disk_takes(&mut self) -> Duration {
+        let slow = self.disk_dice.uniform() < SLOW_DISK;
+        let share = self.disk_dice.uniform();
+        if slow {
+            SLOWEST_DISK.mul_f64(share)
+        } else {
+            DISK
+        }
+    }
+
     /// A person comes, looks, puts right what is wrong, and lets the scan go on.
     fn person(&mut self) {
         if self.person_at.is_none_or(|at| self.now < at) {
@@ -352,6 +372,7 @@ impl Simulation {
                     identity,
                     plan,
                     info,
+                    self.now,
                 ));
             }
             (Stage::Home(Some(ours)) | Stage::Scan(Some(ours)), Err(error)) if ours == ticket => {
@@ -372,7 +393,10 @@ impl Simulation {
             match progress {
                 Progress::Column(column) => {
                     self.samples += column.samples.len();
-                    self.disk.push((self.now + DISK, column.index));
+                    let safe = self.now + self.disk_takes();
+                    let before = self.disk.iter().map(|(time, _)| *time).max();
+                    self.disk
+                        .push((before.max(Some(safe)).unwrap_or(safe), column.index));
                     if let Some(journal) = &mut self.journal {
                         journal.append(column)?;
                     }
@@ -388,6 +412,8 @@ impl Simulation {
                         self.part_offset_mm()
                     );
                     self.told.push((self.now, words));
+                    let asked = self.asked_since.unwrap_or(self.now);
+                    self.asked_since = pause.needs_person.then_some(asked);
                     if pause.needs_person {
                         self.person_at = Some(self.now + PERSON);
                         self.attended.push(pause);
@@ -447,9 +473,24 @@ impl Simulation {
             .min(furthest)
     }
 
-    /// The laser is off some time after the end, whatever else is.
+    /// While a person is waited for the laser is off, at the latest after the dead-man time.
+    fn watch_the_pause(&self) -> Result<()> {
+        let waits_long = self
+            .asked_since
+            .is_some_and(|since| self.now > since + self.settings.dead_man);
+        let seed = self.conditions.seed;
+        ensure!(
+            !waits_long || !self.device.snapshot(self.now).laser_on,
+            "seed {seed}: the laser is on while a person is waited for: {:?}",
+            self.told
+        );
+        Ok(())
+    }
+
+    /// The laser is off some time after the end, whatever else is, and a complete scan is
+    /// closed.
     fn watch_the_laser(&mut self) -> Result<()> {
-        let until = self.now + AFTERWARDS;
+        let until = self.now.max(self.asleep_until) + AFTERWARDS;
         while self.now < until {
             self.turn()?;
         }
@@ -461,6 +502,10 @@ impl Simulation {
         );
         let busy = matches!(snapshot.activity, Activity::Scanning | Activity::Waiting);
         ensure!(!busy, "seed {seed}: the device scans on: {snapshot:?}");
+        ensure!(
+            !self.complete || snapshot.columns_sent == 0,
+            "seed {seed}: the scan is never closed: {snapshot:?}"
+        );
         Ok(())
     }
 

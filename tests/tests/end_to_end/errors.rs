@@ -83,7 +83,8 @@ async fn wrong_device_on_the_port() -> Result<()> {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_silent_port() -> Result<()> {
     let rig = Rig::start_with(&small_house(), |config| {
-        config.scanner.request_timeout_ms = Some(20);
+        // The whole scan at the end goes by this, too.
+        config.scanner.request_timeout_ms = Some(200);
         config.scanner.request_attempts = Some(3);
     })
     .await?;

@@ -2,6 +2,7 @@
 
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
+use std::time::{Duration, SystemTime};
 
 use redb::ReadableTable;
 use relief_api::{
@@ -211,8 +212,11 @@ async fn the_oldest_results_go_when_all_take_more_than_they_may() {
     let (old, _) = rig.scan_to_result("a").await;
     let (new, _) = rig.scan_to_result("b").await;
     let folder = |rig: &Rig, scan: &Scan| rig.daemon.spool_dir().join(&scan.id);
-    // As if it had grown since.
+    // As if it had grown since: a folder that was written to last is not the younger result.
     std::fs::write(folder(&rig, &old).join("filler"), vec![0; 1_000_000]).unwrap();
+    let hour_ago = SystemTime::now() - Duration::from_secs(3_600);
+    let newer = std::fs::File::open(folder(&rig, &new)).unwrap();
+    newer.set_modified(hour_ago).unwrap();
     rig.daemon.shutdown().await;
     let rig = Rig::start(rig.folder, |config| config.storage.results_mb = Some(1)).await;
     assert!(!folder(&rig, &old).exists() && folder(&rig, &new).exists());

@@ -2,6 +2,7 @@
 
 mod attached;
 mod backoff;
+mod clock;
 mod stream;
 mod worker;
 

@@ -6,11 +6,12 @@
 use std::collections::BTreeMap;
 use std::io;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use scanner_protocol::{Identity, ScanPlan};
 
 use super::backoff::Backoff;
+use super::clock::Clock;
 use super::stream::Stream;
 use super::{Call, Outcome, ScanNumber};
 use crate::error::ScannerError;
@@ -44,7 +45,7 @@ pub(super) struct Worker {
     connector: Box<dyn Connector>,
     settings: LinkSettings,
     calls: Receiver<Call>,
-    start: Instant,
+    clock: Clock,
     line: Option<Line>,
     backoff: Backoff,
     retry_at: Duration,
@@ -83,7 +84,7 @@ impl Worker {
             backoff: Backoff::new(&settings),
             settings,
             calls,
-            start: Instant::now(),
+            clock: Clock::start(),
             line: None,
             retry_at: Duration::ZERO,
             last_attempt: None,
@@ -100,7 +101,7 @@ impl Worker {
     }
 
     fn now(&self) -> Duration {
-        self.start.elapsed()
+        self.clock.now()
     }
 
     pub(super) fn run(mut self) {
@@ -257,8 +258,7 @@ impl Worker {
         let scanning = self.stream.is_some();
         let Some(line) = &mut self.line else { return };
         line.session.poll(now);
-        let start = self.start;
-        if let Err(error) = line.exchange(scanning, || start.elapsed()) {
+        if let Err(error) = line.exchange(scanning, self.clock) {
             line.session.lose(ScannerError::LostConnection {
                 port: self.connector.name(),
                 why: hang_up(&error),
@@ -318,7 +318,8 @@ impl Worker {
         let begun = self.plans.remove(&ticket).zip(self.identity.clone());
         let reply = self.callers.remove(&ticket);
         if let (Some((plan, identity)), Some(reply)) = (begun, reply) {
-            let scan = Recovery::begun(self.settings.resume.clone(), identity, plan, info);
+            let resume = self.settings.resume.clone();
+            let scan = Recovery::begun(resume, identity, plan, info, self.now());
             let (stream, items) = Stream::new(number, scan, self.settings.credits);
             if reply.send(Ok(Outcome::Scan(info, number, items))).is_ok() {
                 self.stream = Some(stream);
@@ -379,10 +380,9 @@ impl Worker {
         let now = self.now();
         let Some(line) = &mut self.line else { return };
         line.session.command(ticket, Command::Abort, now);
-        let start = self.start;
-        while start.elapsed() < until {
-            line.session.poll(start.elapsed());
-            if line.exchange(true, || start.elapsed()).is_err() {
+        while self.clock.now() < until {
+            line.session.poll(self.clock.now());
+            if line.exchange(true, self.clock).is_err() {
                 return;
             }
             while let Some(event) = line.session.next_event() {
@@ -398,7 +398,7 @@ impl Worker {
 
 impl Line {
     /// Sends what is to be sent, then waits a little for bytes and takes them.
-    fn exchange(&mut self, scanning: bool, now: impl Fn() -> Duration) -> io::Result<()> {
+    fn exchange(&mut self, scanning: bool, clock: Clock) -> io::Result<()> {
         // A device that does not read must not make the unsent bytes grow without end; the
         // session stops by itself when its own are not taken.
         if self.unsent.len() < MAX_OUTBOX {
@@ -410,12 +410,12 @@ impl Line {
         }
         let slice = if scanning { SCAN_SLICE } else { IDLE_SLICE };
         let due = self.session.deadline().unwrap_or(Duration::ZERO);
-        let wait = due.saturating_sub(now()).min(slice);
+        let wait = due.saturating_sub(clock.now()).min(slice);
         let mut buffer = [0; 4096];
         let count = self.transport.read(&mut buffer, wait)?;
         if count > 0 {
             self.session
-                .receive(buffer.get(..count).unwrap_or(&buffer), now());
+                .receive(buffer.get(..count).unwrap_or(&buffer), clock.now());
         }
         Ok(())
     }

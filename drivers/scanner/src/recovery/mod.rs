@@ -21,10 +21,11 @@ mod pause;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use scanner_protocol::{Head, Identity, ScanPlan};
+use scanner_protocol::{Faults, Head, Identity, ScanPlan};
 
+use overlap::Kept;
 pub use pause::Pause;
-use pause::{Class, class};
+use pause::{Class, class, for_a_person};
 
 use crate::error::ScannerError;
 use crate::scanner::{RawColumn, ScanInfo};
@@ -57,11 +58,14 @@ pub struct Recovery {
     info: ScanInfo,
     state: State,
     progress: VecDeque<Progress>,
+    /// When the last column came, or else the scan was accepted: since then, at the latest,
+    /// nobody has seen the laser on.
+    measured: Duration,
     /// Every column below has been handed on.
     handed: u32,
     acknowledged: Acknowledged,
     /// The last columns handed on, to be compared.
-    kept: VecDeque<RawColumn>,
+    kept: Kept,
     /// Those of them that have come again.
     again: Vec<RawColumn>,
     pause: Option<Paused>,
@@ -76,9 +80,12 @@ pub struct Recovery {
 #[derive(Debug)]
 struct Paused {
     told: Pause,
+    /// Since then nothing has been measured, and nobody has said a word.
     since: Duration,
-    /// A person has looked: faults may be cleared.
-    attended: bool,
+    /// Faults that a person has been told of and has not yet said a word about.
+    shown: Faults,
+    /// Faults that a person has seen to: they may be cleared, once.
+    attended: Faults,
     /// Failures since it began.
     failures: u32,
 }
@@ -100,13 +107,14 @@ enum State {
 }
 
 impl Recovery {
-    /// A scan that the device has just accepted.
+    /// A scan that the device has accepted just now.
     #[must_use]
     pub fn begun(
         settings: Option<ResumeSettings>,
         identity: Box<Identity>,
         plan: ScanPlan,
         info: ScanInfo,
+        now: Duration,
     ) -> Self {
         Self {
             settings,
@@ -115,9 +123,10 @@ impl Recovery {
             info,
             state: State::Running,
             progress: VecDeque::new(),
+            measured: now,
             handed: 0,
             acknowledged: Acknowledged::default(),
-            kept: VecDeque::new(),
+            kept: Kept::default(),
             again: Vec::new(),
             pause: None,
             attempts: 0,
@@ -137,12 +146,6 @@ impl Recovery {
         self.pause.is_some() && self.state != State::Over
     }
 
-    /// Whether no column will come any more.
-    #[must_use]
-    pub fn is_over(&self) -> bool {
-        self.state == State::Over
-    }
-
     /// A column is safe with the host.
     pub fn acknowledge(&mut self, column: u32) {
         self.acknowledged.add(column, self.handed);
@@ -156,11 +159,11 @@ impl Recovery {
         let (Some(pause), false) = (&mut self.pause, self.state == State::Over) else {
             return Err(ScannerError::NothingPaused);
         };
-        pause.attended = true;
         pause.since = now;
         pause.failures = 0;
         // The same trouble once more is news again.
         if std::mem::take(&mut pause.told.needs_person) {
+            pause.attended = std::mem::replace(&mut pause.shown, Faults::NONE);
             self.progress
                 .push_back(Progress::Paused(pause.told.clone()));
         }
@@ -200,7 +203,7 @@ impl Recovery {
                 None
             }
             Event::Ready(identity) => {
-                self.meet(&identity, now);
+                self.meet(&identity);
                 Some(Event::Ready(identity))
             }
             other => Some(other),
@@ -213,10 +216,11 @@ impl Recovery {
             return;
         };
         let unattended = settings.unattended;
-        if let (State::Waiting(_), Some(pause)) = (self.state, &mut self.pause)
+        if let (State::Waiting(_) | State::Homed, Some(pause)) = (self.state, &mut self.pause)
             && now >= pause.since + unattended
         {
             pause.told.needs_person = true;
+            pause.attended = Faults::NONE;
             self.progress
                 .push_back(Progress::Paused(pause.told.clone()));
             self.state = State::Attended;
@@ -224,11 +228,10 @@ impl Recovery {
         let Some(session) = session else { return };
         if self.state == State::Refused {
             session.close_scan();
-            let attended = self.pause.as_ref().is_some_and(|pause| pause.attended);
-            self.state = if attended {
-                State::Waiting(now)
-            } else {
+            self.state = if self.needs_person() {
                 State::Attended
+            } else {
+                State::Waiting(now)
             };
         }
         if !session.is_ready() || !self.same_device {
@@ -238,14 +241,18 @@ impl Recovery {
             State::Waiting(from) if now >= from => {
                 let ticket = self.ticket();
                 self.state = State::Homing(ticket);
-                let attended = self.pause.as_ref().is_some_and(|pause| pause.attended);
+                // What happens from now on is another matter than what a person has seen to.
+                let attended = self
+                    .pause
+                    .as_mut()
+                    .map_or(Faults::NONE, |pause| std::mem::take(&mut pause.attended));
                 session.command(ticket, Command::HomeAgain { attended }, now);
             }
             State::Homed => {
                 let ticket = self.ticket();
                 self.state = State::Continuing(ticket);
                 self.attempts += 1;
-                let first_column = self.kept.front().map_or(self.handed, |column| column.index);
+                let first_column = self.kept.first_index().unwrap_or(self.handed);
                 session.go_on(
                     ticket,
                     self.plan,
@@ -267,8 +274,16 @@ impl Recovery {
         };
         match self.state {
             State::Waiting(from) => Some(from.min(pause.since + settings.unattended)),
+            State::Homed => Some(pause.since + settings.unattended),
             _ => None,
         }
+    }
+
+    /// Whether a person has been asked to let the scan go on, and has not done so.
+    fn needs_person(&self) -> bool {
+        self.pause
+            .as_ref()
+            .is_some_and(|pause| pause.told.needs_person)
     }
 
     fn ticket(&mut self) -> Ticket {
@@ -284,11 +299,11 @@ impl Recovery {
             return self.compare(column, now);
         }
         self.go_on();
+        self.measured = now;
         self.handed = column.index + 1;
         self.attempts = 0;
         if let Some(settings) = &self.settings {
-            self.kept.push_back(column.clone());
-            overlap::trim(&mut self.kept, settings.overlap_columns);
+            self.kept.push(column.clone(), settings.overlap_columns);
         }
         self.progress.push_back(Progress::Column(column));
     }
@@ -296,7 +311,9 @@ impl Recovery {
     /// A column that is there already, measured again; the last of them decides.
     fn compare(&mut self, again: RawColumn, now: Duration) {
         let last = again.index + 1 == self.handed;
-        self.again.push(again);
+        if self.kept.has(again.index) {
+            self.again.push(again);
+        }
         if !last {
             return;
         }
@@ -304,7 +321,7 @@ impl Recovery {
             Head::Polar { range_count_pm, .. } => f64::from(range_count_pm) * 1e-9,
             Head::Cartesian { count_pm } => f64::from(count_pm) * 1e-9,
         };
-        match overlap::compare(&self.kept, &std::mem::take(&mut self.again), count_mm) {
+        match overlap::compare(self.kept.iter(), &std::mem::take(&mut self.again), count_mm) {
             Ok(()) => self.go_on(),
             Err(how) => {
                 let error = ScannerError::Moved {
@@ -325,7 +342,7 @@ impl Recovery {
         }
     }
 
-    fn meet(&mut self, identity: &Identity, now: Duration) {
+    fn meet(&mut self, identity: &Identity) {
         let ours = &self.identity;
         let other = if (identity.model.as_str(), identity.serial.as_str())
             != (ours.model.as_str(), ours.serial.as_str())
@@ -343,7 +360,7 @@ impl Recovery {
         if let Some(error) = other
             && self.is_paused()
         {
-            self.tell(error, false, now);
+            self.tell(error, self.needs_person());
         }
     }
 
@@ -387,28 +404,34 @@ impl Recovery {
         } else {
             State::Waiting(now + wait)
         };
-        self.tell(error, needs_person, now);
+        let shown = for_a_person(&error);
+        self.tell(error, needs_person);
         if let Some(pause) = &mut self.pause {
             pause.failures += 1;
-            // Whoever has looked has seen what was then; not this.
-            pause.attended &= !needs_person;
+            pause.shown = pause.shown.union(shown);
+            if needs_person {
+                // Whoever has looked has seen what was then; not this.
+                pause.attended = Faults::NONE;
+            }
         }
     }
 
     /// Tells of a pause, unless that is known.
-    fn tell(&mut self, cause: ScannerError, needs_person: bool, now: Duration) {
+    fn tell(&mut self, cause: ScannerError, needs_person: bool) {
         let told = Pause {
             cause,
             needs_person,
             columns: self.handed,
         };
+        let since = self.measured;
         let pause = self.pause.get_or_insert_with(|| Paused {
             told: Pause {
                 columns: u32::MAX,
                 ..told.clone()
             },
-            since: now,
-            attended: false,
+            since,
+            shown: Faults::NONE,
+            attended: Faults::NONE,
             failures: 0,
         });
         if pause.told != told {

@@ -34,17 +34,59 @@ const HOMING_MM: f64 = 0.02;
 /// From a median absolute deviation to a standard deviation, for normal noise.
 const MAD_TO_SIGMA: f64 = 1.4826;
 
-/// Keeps as many of the last columns as are needed for a comparison: at least `fewest`.
-pub(super) fn trim(kept: &mut VecDeque<RawColumn>, fewest: u16) {
-    let fewest = usize::from(fewest);
-    while kept.len() > usize::from(MAX_OVERLAP) {
-        kept.pop_front();
+/// The columns handed on that are measured again for a comparison.
+#[derive(Debug, Default)]
+pub(super) struct Kept {
+    columns: VecDeque<RawColumn>,
+    /// The first so many are from before a gap in the object: the last that could prove
+    /// anything. The others are the last of all.
+    before_gap: usize,
+}
+
+impl Kept {
+    /// Adds the next column, and drops what is not needed any more. Of the last ones at least
+    /// `fewest` stay.
+    pub(super) fn push(&mut self, column: RawColumn, fewest: u16) {
+        self.columns.push_back(column);
+        if self.samples_from(self.before_gap) >= PROOF_SAMPLES {
+            self.columns.drain(..self.before_gap);
+            self.before_gap = 0;
+        }
+        loop {
+            let first = self.before_gap;
+            let last_ones = self.columns.len() - first;
+            let rest = self.samples_from(first + 1);
+            if last_ones <= usize::from(MAX_OVERLAP)
+                && (last_ones <= usize::from(fewest) || rest < ENOUGH)
+            {
+                break;
+            }
+            if first == 0 && rest < PROOF_SAMPLES && self.samples_from(0) >= PROOF_SAMPLES {
+                self.before_gap = self.columns.len();
+                break;
+            }
+            self.columns.remove(first);
+        }
     }
-    let samples = |kept: &VecDeque<RawColumn>| -> usize {
-        kept.iter().skip(1).map(|column| column.samples.len()).sum()
-    };
-    while kept.len() > fewest && samples(kept) >= ENOUGH {
-        kept.pop_front();
+
+    /// Where the measuring has to begin again, unless nothing has been handed on.
+    pub(super) fn first_index(&self) -> Option<u32> {
+        self.columns.front().map(|column| column.index)
+    }
+
+    /// Whether it is one of them.
+    pub(super) fn has(&self, index: u32) -> bool {
+        self.columns.iter().any(|column| column.index == index)
+    }
+
+    /// All, in order.
+    pub(super) fn iter(&self) -> impl Iterator<Item = &RawColumn> {
+        self.columns.iter()
+    }
+
+    fn samples_from(&self, first: usize) -> usize {
+        let columns = self.columns.iter().skip(first);
+        columns.map(|column| column.samples.len()).sum()
     }
 }
 
@@ -303,21 +345,50 @@ mod tests {
 
     #[test]
     fn as_many_columns_are_kept_as_say_something() {
-        let mut kept = VecDeque::new();
+        let mut kept = Kept::default();
         for index in 0..40 {
             let mut next = column(1, 0, 0);
             next.index = index;
-            next.samples.truncate(if index < 10 { 200 } else { 0 });
-            kept.push_back(next);
-            trim(&mut kept, 2);
-            assert!(kept.len() <= 16, "{index}");
-            if index < 10 {
-                assert_eq!(kept.len(), 2.min(index as usize + 1), "{index}");
-            }
-            // The last full column stays within reach.
-            let full = kept.iter().any(|column| !column.samples.is_empty());
-            assert_eq!(full, index <= 24, "{index}");
+            next.samples.truncate(if index < 10 { 200 } else { 30 });
+            kept.push(next, 2);
+            let last_ones = if index < 11 { 2 } else { 3 };
+            assert_eq!(kept.iter().count(), last_ones.min(index as usize + 1));
+            assert!(kept.has(index));
         }
+    }
+
+    #[test]
+    fn a_gap_in_the_object_is_bridged_by_what_was_before_it() {
+        let mut kept = Kept::default();
+        let mut push = |index, samples| {
+            let mut next = column(1, 0, 0);
+            next.index = index;
+            next.samples.truncate(samples);
+            kept.push(next, 2);
+            let indices: Vec<u32> = kept.iter().map(|column| column.index).collect();
+            assert_eq!(kept.first_index(), indices.first().copied());
+            assert!(indices.is_sorted(), "{indices:?}");
+            assert!(indices.len() <= 2 * usize::from(MAX_OVERLAP) + 1);
+            indices
+        };
+        // Nothing stands in view: nothing proves anything.
+        for index in 0..100 {
+            assert_eq!(push(index, 0).len(), 16.min(index as usize + 1));
+        }
+        for index in 100..110 {
+            push(index, 200);
+        }
+        for index in 110..1_000 {
+            // A stray return in the gap proves nothing either.
+            let indices = push(index, usize::from(index % 50 == 0));
+            assert!(indices.contains(&109), "{indices:?}");
+            assert_eq!(indices.last(), Some(&index));
+            assert!(!indices.contains(&500) || index < 516, "{indices:?}");
+        }
+        // The next part begins.
+        assert!(push(1_000, 10).contains(&109));
+        let indices = push(1_001, 200);
+        assert!(indices[0] > 980, "{indices:?}");
     }
 
     #[test]

@@ -39,11 +39,29 @@ pub(super) enum Class {
     Final,
 }
 
+/// The faults that trouble tells of.
+fn faults(error: &ScannerError) -> Faults {
+    match error {
+        ScannerError::Fault(faults) => *faults,
+        ScannerError::Refused {
+            reason: RejectReason::Faulted,
+            detail,
+            ..
+        } => Faults(*detail),
+        _ => Faults::NONE,
+    }
+}
+
+/// Those of them that a person must have seen to.
+pub(super) fn for_a_person(error: &ScannerError) -> Faults {
+    faults(error).intersection(Faults::ATTENDED)
+}
+
 pub(super) fn class(error: &ScannerError) -> Class {
     match error {
-        ScannerError::Fault(faults) if faults.intersects(Faults::ATTENDED) => Class::NeedsPerson,
+        error if !for_a_person(error).is_empty() => Class::NeedsPerson,
         // The columns before and after would not be of one scale.
-        ScannerError::Fault(faults) if faults.contains(Faults::CALIBRATION) => Class::Final,
+        error if faults(error).contains(Faults::CALIBRATION) => Class::Final,
         ScannerError::StoppedAtDevice | ScannerError::Moved { .. } => Class::NeedsPerson,
         ScannerError::Refused {
             reason: RejectReason::UnknownCommand | RejectReason::NotSupported,
@@ -61,6 +79,14 @@ pub(super) fn class(error: &ScannerError) -> Class {
 mod tests {
     use super::*;
 
+    fn refused(faults: Faults) -> ScannerError {
+        ScannerError::Refused {
+            command: "scan",
+            reason: RejectReason::Faulted,
+            detail: faults.0,
+        }
+    }
+
     #[test]
     fn what_endangers_people_or_the_frame_needs_a_person() {
         for faults in [
@@ -70,6 +96,7 @@ mod tests {
             Faults::EMERGENCY_STOP,
         ] {
             assert_eq!(class(&ScannerError::Fault(faults)), Class::NeedsPerson);
+            assert_eq!(class(&refused(faults)), Class::NeedsPerson);
         }
         for faults in [
             Faults::OVER_TEMPERATURE,
@@ -77,6 +104,7 @@ mod tests {
             Faults::SUPPLY,
         ] {
             assert_eq!(class(&ScannerError::Fault(faults)), Class::ByItself);
+            assert_eq!(class(&refused(faults)), Class::ByItself);
         }
         assert_eq!(class(&ScannerError::DeadMan), Class::ByItself);
         assert_eq!(class(&ScannerError::Aborted), Class::Final);

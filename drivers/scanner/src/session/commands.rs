@@ -76,7 +76,7 @@ impl Session {
             handed,
             acknowledged,
         };
-        let send_below = taken.granted(self.flow(&plan).credits, plan.columns);
+        let send_below = taken.granted(first_column, self.flow(&plan).credits, plan.columns);
         self.requests.push(
             &Continue {
                 scan_id,
@@ -96,8 +96,9 @@ impl Session {
 
     /// A column is safe with the host.
     pub fn acknowledge(&mut self, column: u32, now: Duration) {
-        if let Some(scan) = &mut self.scan {
-            scan.acknowledge(column, now);
+        match &mut self.scan {
+            Some(scan) => scan.acknowledge(column, now),
+            None => self.requests.acknowledge(column),
         }
     }
 

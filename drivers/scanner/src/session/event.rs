@@ -1,6 +1,6 @@
 //! What goes into a session and what comes out, besides bytes.
 
-use scanner_protocol::{Identity, ScanPlan};
+use scanner_protocol::{Faults, Identity, ScanPlan};
 
 use crate::error::ScannerError;
 use crate::scanner::{DeviceStatus, RawColumn, ScanInfo};
@@ -16,11 +16,11 @@ pub enum Command {
     Status,
     /// Home the table and wait for it.
     Home,
-    /// Home the table for a scan that is to go on. Faults that need a person are cleared only
-    /// if one has `attended` to them.
+    /// Home the table for a scan that is to go on. Of the faults that need a person only those
+    /// are cleared that one has `attended` to.
     HomeAgain {
-        /// A person has looked.
-        attended: bool,
+        /// What a person has seen to.
+        attended: Faults,
     },
     /// Move the table to a position in counts and wait for it.
     Move(i32),

@@ -208,8 +208,10 @@ impl Session {
         // A fault may be over and only its bit still set; whoever starts something new has
         // seen to it. Tried once, so that a device that contradicts itself ends it.
         let faults = Faults(reply.detail);
-        let for_a_person = faults.intersects(Faults::ATTENDED) && !purpose.attended();
-        if reply.reason == RejectReason::Faulted && for_a_person {
+        let unseen = faults
+            .intersection(Faults::ATTENDED)
+            .without(purpose.attended());
+        if reply.reason == RejectReason::Faulted && !unseen.is_empty() {
             return self.fail(&purpose, ScannerError::Fault(faults));
         }
         if reply.reason == RejectReason::Faulted

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use scanner_protocol::{Frame, Request, ScanPlan};
+use scanner_protocol::{Faults, Frame, Request, ScanPlan};
 
 use super::event::Ticket;
 use super::scan::Taken;
@@ -18,8 +18,8 @@ pub(super) enum Purpose {
     Heartbeat,
     Status(Ticket),
     Home(Ticket),
-    /// Homing for a scan that is to go on; whether a person has looked.
-    HomeAgain(Ticket, bool),
+    /// Homing for a scan that is to go on; what a person has seen to.
+    HomeAgain(Ticket, Faults),
     Move(Ticket, i32),
     Laser(Ticket),
     ClearFaults(Ticket),
@@ -100,9 +100,14 @@ impl Purpose {
         )
     }
 
-    /// Whether faults that need a person may be cleared for its sake.
-    pub(super) fn attended(&self) -> bool {
-        !matches!(self, Self::HomeAgain(_, false))
+    /// The faults that a person has seen to, of those that need one: whoever starts something
+    /// new has seen all.
+    pub(super) fn attended(&self) -> Faults {
+        match self {
+            Self::HomeAgain(_, attended) => *attended,
+            Self::Continue(_) => Faults::NONE,
+            _ => Faults::ATTENDED,
+        }
     }
 
     /// Whether it belongs to opening the session.
@@ -186,6 +191,16 @@ impl Requests {
                 Purpose::Recover(refused) => matches!(**refused, Purpose::Scan(..)),
                 purpose => matches!(purpose, Purpose::Scan(..) | Purpose::Continue(_)),
             })
+    }
+
+    /// A column is safe: a scan that the device is being asked to take up counts from there.
+    pub(super) fn acknowledge(&mut self, column: u32) {
+        for open in self.open.iter_mut().chain(&mut self.queue) {
+            if let Purpose::Continue(go_on) = &mut open.purpose {
+                let taken = &mut go_on.taken;
+                taken.acknowledged.add(column, taken.handed);
+            }
+        }
     }
 
     pub(super) fn retries(&self) -> u64 {

@@ -65,13 +65,19 @@ pub(super) struct Taken {
 }
 
 impl Taken {
-    /// The device may send columns below this index. Those that are here already need no
-    /// room.
-    pub(super) fn granted(&self, credits: u16, columns: u32) -> u32 {
-        self.acknowledged
-            .below()
-            .saturating_add(u32::from(credits))
-            .max(self.handed)
+    /// Every column below is safe and, once those below `next` have come, need not come again.
+    fn safe_below(&self, next: u32) -> u32 {
+        self.acknowledged.below().min(next)
+    }
+
+    /// The device may send columns below this index. Those that were here before need no room,
+    /// but for what is under way.
+    pub(super) fn granted(&self, next: u32, credits: u16, columns: u32) -> u32 {
+        let credits = u32::from(credits);
+        let again = self.handed.min(next.saturating_add(credits));
+        self.safe_below(next)
+            .saturating_add(credits)
+            .max(again)
             .min(columns)
     }
 }
@@ -138,7 +144,8 @@ impl ScanTracker {
 
     /// The device may send columns below this index.
     fn granted(&self) -> u32 {
-        self.taken.granted(self.flow.credits, self.info.columns)
+        self.taken
+            .granted(self.next, self.flow.credits, self.info.columns)
     }
 
     /// The slot of a column in flight; `None` for one handed on already, or never granted.
@@ -236,6 +243,9 @@ impl ScanTracker {
         let column = self.window.front_mut()?.column.take()?;
         self.window.pop_front();
         self.next += 1;
+        // Of columns measured again those that have come are safe: the device need not keep
+        // them, and may have no room for more.
+        self.grant_due |= self.next <= self.taken.handed;
         Some(column)
     }
 
@@ -291,7 +301,7 @@ impl ScanTracker {
         self.grant_due = false;
         Some(Grant {
             scan_id: self.scan_id,
-            acknowledged_below: self.taken.acknowledged.below(),
+            acknowledged_below: self.taken.safe_below(self.next),
             send_below: self.granted(),
         })
     }

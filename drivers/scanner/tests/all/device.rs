@@ -2,6 +2,7 @@
 //! frames out.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::time::Duration;
 
 use scanner_driver::protocol::commands::*;
@@ -11,6 +12,9 @@ use scanner_driver::protocol::*;
 pub(crate) struct Device {
     pub(crate) boot_id: u32,
     pub(crate) version: u8,
+    pub(crate) serial: &'static str,
+    /// Depth of a count, picometres.
+    pub(crate) count_pm: u32,
     pub(crate) homed: bool,
     pub(crate) faults: Faults,
     /// Faults whose cause is there still.
@@ -26,6 +30,10 @@ pub(crate) struct Device {
     pub(crate) columns_per_poll: usize,
     /// Sends columns whose fragments disagree.
     pub(crate) contradictory: bool,
+    /// Columns in which nothing stands.
+    pub(crate) gap: Range<u32>,
+    /// How far the object has been moved, counts of range.
+    pub(crate) moved_counts: i32,
     /// How often each kind of request was carried out.
     pub(crate) homings: u32,
     pub(crate) scans: u32,
@@ -81,6 +89,8 @@ impl Device {
         Self {
             boot_id: 77,
             version: MAX_VERSION,
+            serial: "0001",
+            count_pm: 10_000,
             homed: false,
             faults: Faults::NONE,
             lasting: Faults::NONE,
@@ -92,6 +102,8 @@ impl Device {
             announce: None,
             columns_per_poll: 2,
             contradictory: false,
+            gap: 0..0,
+            moved_counts: 0,
             homings: 0,
             scans: 0,
             aborts: 0,
@@ -235,7 +247,7 @@ impl Device {
                 tag,
                 &Nameplate {
                     model: text("Bench"),
-                    serial: text("0001"),
+                    serial: text(self.serial),
                     firmware: text("1.2.3"),
                 },
             ),
@@ -244,7 +256,9 @@ impl Device {
                 &Calibration {
                     table_count_pm: 10_000_000,
                     table_origin_nm: 0,
-                    head: Head::Cartesian { count_pm: 10_000 },
+                    head: Head::Cartesian {
+                        count_pm: self.count_pm,
+                    },
                 },
             ),
             HostMessage::GetLimits(_) => Frame::new(tag, &self.limits()),
@@ -407,8 +421,19 @@ impl Device {
         self.out.push_back(Frame::new(self.tag, message));
     }
 
+    fn measure(&self, column: u32) -> Vec<Sample> {
+        if self.gap.contains(&column) {
+            return Vec::new();
+        }
+        let mut samples = samples_of(column);
+        for sample in samples.iter_mut().filter(|s| !s.reading.no_return) {
+            sample.reading.range_counts += self.moved_counts;
+        }
+        samples
+    }
+
     fn send_column(&mut self, scan_id: u16, column: u32, wanted: &Missing) {
-        let samples = samples_of(column);
+        let samples = self.measure(column);
         let listed = column.is_multiple_of(4);
         let size = if listed {
             LISTED_SAMPLES

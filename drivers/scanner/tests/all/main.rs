@@ -2,15 +2,17 @@
 //! the thread over memory and over a pseudo-terminal.
 
 // A helper that unwraps fails its test, as it should.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 mod bench;
 mod device;
 mod faults;
+mod going_on;
 mod hostile;
 mod link;
 mod opening;
 mod pty;
+mod recovery;
 mod resume;
 mod scans;
 mod usb;

