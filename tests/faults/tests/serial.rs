@@ -41,6 +41,8 @@ fn settings(port: &std::path::Path) -> SerialSettings {
     let mut settings = SerialSettings::new(port.display().to_string());
     settings.link = LinkSettings {
         resume: Some(ResumeSettings::default()),
+        // A pause is for a pulled cable, not for a busy machine.
+        dead_man: Duration::from_secs(10),
         ..LinkSettings::default()
     };
     settings
@@ -86,7 +88,9 @@ fn scan(faults: &str, mut at: impl FnMut(&Control, u32)) -> Scanned {
     };
     drop(stream);
     drop(scanner);
-    assert!(!control.snapshot().laser_on);
+    control
+        .wait_until(Duration::from_secs(60), |device| !device.laser_on)
+        .expect("laser off");
     scanned
 }
 

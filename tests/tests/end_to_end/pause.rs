@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use relief_api::{Event, Scan, ScanState, ScannerLink, Status, path};
-use relief_tests::rig::{Events, Refused, Rig, journal_columns, small_house};
+use relief_tests::rig::{Events, GUARD, Refused, Rig, journal_columns, small_house};
 use scanner_protocol::{Faults, ResetCause};
 
 /// Waits until the scan is paused for a reason with these words in it.
@@ -100,7 +100,8 @@ async fn a_moved_object_is_refused_with_its_figure_until_it_is_put_back() -> Res
     let reason = refused.reason.unwrap_or_default();
     assert!(reason.contains("mm off"), "{reason}");
     assert_eq!(refused.columns, 30);
-    assert!(!control.snapshot().laser_on);
+    // It is told before the scanner is.
+    control.wait_until(GUARD, |device| !device.laser_on)?;
     control.move_part(-moved);
     let _: Scan = rig.client().ask(path::RESUME).await?;
     events.scan_complete(&scan.id).await?;

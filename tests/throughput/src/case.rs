@@ -30,7 +30,10 @@ pub struct Case {
 
 impl Case {
     /// A bent sheet as a recording, which takes no time to measure.
-    pub(crate) fn source(&self) -> Result<Source> {
+    ///
+    /// # Errors
+    /// When it cannot be sent in this encoding.
+    pub fn source(&self) -> Result<Source> {
         let points = (0..self.columns).flat_map(|column| {
             (0..self.samples).map(move |sample| {
                 let (x, y) = (f64::from(column) * 0.5, f64::from(sample) * 0.05);

@@ -1,4 +1,4 @@
-//! How long the driver waits for bytes.
+//! How many bytes reach the driver, and how long it waits for them.
 
 use std::io;
 use std::sync::Arc;
@@ -8,13 +8,24 @@ use std::time::{Duration, Instant};
 use scanner_driver::ScannerError;
 use scanner_driver::transport::{Connector, Transport};
 
-/// The account of the driver's waiting.
+/// The account of the driver's reading.
 #[derive(Debug, Default)]
 pub(crate) struct HostUse {
+    read_bytes: AtomicU64,
     waited_ns: AtomicU64,
 }
 
 impl HostUse {
+    /// Bytes that have been read.
+    pub(crate) fn read_bytes(&self) -> u64 {
+        self.read_bytes.load(Ordering::Relaxed)
+    }
+
+    fn has_read(&self, count: usize) -> usize {
+        self.read_bytes.fetch_add(count as u64, Ordering::Relaxed);
+        count
+    }
+
     /// Time spent in reads while nothing was there.
     pub(crate) fn waited(&self) -> Duration {
         Duration::from_nanos(self.waited_ns.load(Ordering::Relaxed))
@@ -60,13 +71,13 @@ impl Transport for WatchedTransport {
         // What is there is taken without being counted as waited for.
         let count = self.transport.read(buffer, Duration::ZERO)?;
         if count > 0 || timeout.is_zero() {
-            return Ok(count);
+            return Ok(self.account.has_read(count));
         }
         let start = Instant::now();
         let result = self.transport.read(buffer, timeout);
         let waited = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
         self.account.waited_ns.fetch_add(waited, Ordering::Relaxed);
-        result
+        result.map(|count| self.account.has_read(count))
     }
 
     fn write(&mut self, bytes: &[u8], timeout: Duration) -> io::Result<usize> {

@@ -72,8 +72,8 @@ pub fn pseudo_terminal(source: Source, device: DeviceSettings) -> Result<Attache
     Ok(Attached::new(connector, server.control(), server))
 }
 
-/// The fastest of so many scans over the way to the device that `attach` gives; `way` is its
-/// name. What else a machine has to do only makes them slower.
+/// The fastest of so many scans of a case, whose source is given, over the way to the device that
+/// `attach` gives; `way` is its name. What else a machine has to do only makes them slower.
 ///
 /// # Errors
 /// When a scan fails, or brings other samples than those that were sent, or has a frame sent
@@ -81,13 +81,15 @@ pub fn pseudo_terminal(source: Source, device: DeviceSettings) -> Result<Attache
 pub fn fastest_of(
     scans: u32,
     way: &str,
-    case: &Case,
+    (case, source): (&Case, &Source),
     link: &LinkSettings,
     attach: fn(Source, DeviceSettings) -> Result<Attached>,
 ) -> Result<Row> {
     let mut fastest: Option<Row> = None;
     for _ in 0..scans {
-        let row = measure(way, case, link.clone(), attach)?;
+        let row = measure(way, case, link.clone(), || {
+            attach(source.clone(), case.device())
+        })?;
         ensure!(row.frames_resent == 0, "{way}: a sound line loses frames");
         if fastest.as_ref().is_none_or(|best| row.took < best.took) {
             fastest = Some(row);
@@ -100,9 +102,9 @@ fn measure(
     way: &str,
     case: &Case,
     link: LinkSettings,
-    attach: fn(Source, DeviceSettings) -> Result<Attached>,
+    attach: impl FnOnce() -> Result<Attached>,
 ) -> Result<Row> {
-    let attached = attach(case.source()?, case.device())?;
+    let attached = attach()?;
     let host = Arc::new(HostUse::default());
     let connector = Watched::new(attached.connector, Arc::clone(&host));
     let scanner = LinkScanner::start(connector, link).context("cannot start the driver")?;
@@ -138,14 +140,14 @@ fn scan(
     while let Some(column) = stream.next()? {
         acknowledger.acknowledge(column.index);
         match start {
-            None => start = Some((Instant::now(), account(), host.waited())),
+            None => start = Some((Instant::now(), account(), host.read_bytes(), host.waited())),
             Some(_) => {
                 samples += column.samples.len();
                 columns += 1;
             }
         }
     }
-    let (start, (before, resent_before), host_before) = start.context("no column")?;
+    let (start, (before, resent_before), bytes_before, host_before) = start.context("no column")?;
     let took = start.elapsed();
     let (after, resent) = account();
     let host_waited = host.waited() - host_before;
@@ -162,7 +164,7 @@ fn scan(
         took,
         columns,
         samples,
-        bytes: after.to_host_bytes - before.to_host_bytes,
+        bytes: host.read_bytes() - bytes_before,
         device_waited: after.waited_for_host - before.waited_for_host,
         without_credit: after.waited_for_credit - before.waited_for_credit,
         host_waited,

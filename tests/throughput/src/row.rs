@@ -23,7 +23,7 @@ pub struct Row {
     pub columns: usize,
     /// Samples after the first column.
     pub samples: usize,
-    /// Bytes that the device sent meanwhile.
+    /// Bytes that reached the driver meanwhile.
     pub bytes: u64,
     /// How long the device waited for the host.
     pub device_waited: Duration,

@@ -67,7 +67,10 @@ pub(crate) fn run(vm: &Vm) -> Result<()> {
 
 /// Measures how fast each way to the scanner is, those over USB among them; gives the table.
 pub(crate) fn throughput() -> Result<String> {
-    usb::throughput(&Options::default())
+    usb::throughput(&Options {
+        patience_s: 3 * PATIENCE_S,
+        ..Options::default()
+    })
 }
 
 /// What the guest's last line says of its checks.

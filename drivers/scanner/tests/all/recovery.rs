@@ -223,7 +223,7 @@ impl Rig {
         assert!(self.asks(), "{:?}", self.told);
     }
 
-    fn to_its_end(&mut self) {
+    fn run_to_its_end(&mut self) {
         self.run_until("end", |rig| rig.over.is_some());
         assert_eq!(self.over, Some(Ok(())));
         assert_eq!(self.columns, COLUMNS);
@@ -266,7 +266,7 @@ fn a_short_pause_ends_by_itself_and_a_long_one_waits_for_a_person() {
     rig.plugged = true;
     rig.stays_dark();
     rig.resume();
-    rig.to_its_end();
+    rig.run_to_its_end();
 }
 
 #[test]
@@ -275,7 +275,7 @@ fn a_computer_that_was_suspended_for_long_asks_a_person_first() {
     rig.sleep(60 * MINUTE);
     rig.stays_dark();
     rig.resume();
-    rig.to_its_end();
+    rig.run_to_its_end();
     // Nor may the time pass while the table is homed.
     let mut rig = Rig::new();
     rig.plugged = false;
@@ -296,7 +296,7 @@ fn after_ten_attempts_a_person_is_asked() {
     rig.mishap = Mishap::None;
     rig.stays_dark();
     rig.resume();
-    rig.to_its_end();
+    rig.run_to_its_end();
 }
 
 #[test]
@@ -318,7 +318,7 @@ fn a_scanner_calibrated_anew_is_waited_for_and_not_used() {
     rig.run_for(MINUTE);
     rig.device.count_pm -= 1;
     rig.plugged = true;
-    rig.to_its_end();
+    rig.run_to_its_end();
 }
 
 #[test]
@@ -335,7 +335,7 @@ fn a_word_said_before_the_door_was_opened_does_not_count() {
     rig.until_asked_about(Faults::INTERLOCK);
     rig.stays_dark();
     rig.resume();
-    rig.to_its_end();
+    rig.run_to_its_end();
 }
 
 #[test]
@@ -354,7 +354,7 @@ fn a_word_about_another_fault_does_not_count() {
     rig.until_asked_about(both);
     rig.stays_dark();
     rig.resume();
-    rig.to_its_end();
+    rig.run_to_its_end();
 }
 
 #[test]
@@ -374,7 +374,7 @@ fn a_word_is_used_up_by_the_homing_that_follows_it() {
     rig.until_asked_about(Faults::INTERLOCK);
     rig.stays_dark();
     rig.resume();
-    rig.to_its_end();
+    rig.run_to_its_end();
 }
 
 #[test]
@@ -389,7 +389,7 @@ fn a_door_opened_between_homing_and_going_on_asks_a_person() {
     rig.until_asked_about(Faults::INTERLOCK);
     rig.stays_dark();
     rig.resume();
-    rig.to_its_end();
+    rig.run_to_its_end();
 }
 
 #[test]
@@ -413,7 +413,7 @@ fn another_scanner_does_not_end_the_wait_for_a_person() {
     rig.stays_dark();
     // What was told first has been seen as well.
     rig.resume();
-    rig.to_its_end();
+    rig.run_to_its_end();
 }
 
 #[test]
@@ -433,5 +433,5 @@ fn an_object_moved_while_nothing_was_in_view_is_noticed() {
     rig.stays_dark();
     rig.device.moved_counts = 0;
     rig.resume();
-    rig.to_its_end();
+    rig.run_to_its_end();
 }

@@ -87,6 +87,7 @@ fn ways(short: bool) -> Result<Vec<Row>> {
                     encoding,
                     line_rate_hz,
                 };
+                let source = case.source()?;
                 for (way, attach) in WAYS {
                     // As many columns in flight as the simulator keeps.
                     let link = LinkSettings {
@@ -95,7 +96,7 @@ fn ways(short: bool) -> Result<Vec<Row>> {
                     };
                     // A line rate leaves nothing to choose from.
                     let scans = if line_rate_hz.is_some() { 1 } else { SCANS };
-                    let row = fastest_of(scans, way, &case, &link, attach)?;
+                    let row = fastest_of(scans, way, (&case, &source), &link, attach)?;
                     println!("{row}");
                     rows.push(row);
                 }

@@ -21,7 +21,7 @@ pub(crate) fn page(usb: &str, ways: &[throughput::Row], disks: &[disk::Row]) -> 
          - **Way**: `memory` is a pair of pipes between two threads, 12 KiB each. On a pseudo-terminal, \
          and on USB, the device is a thread of the same program with the kernel in between; USB is \
          `vhci_hcd` with the vendor's interface (bulk) or a serial port (CDC-ACM).\n\
-         - **On the wire**: all bytes that the device sends, delimiters, stuffing, checksums and \
+         - **On the wire**: all bytes that reach the driver, delimiters, stuffing, checksums and \
          heads of fragments included. A fragment has 15 samples (uniform) or 10 (listed).\n\
          - **Device waits for host**: it holds bytes that the way does not take (pipe or terminal \
          full; on USB, bytes that no transfer has fetched), or has no credit for the next column. \

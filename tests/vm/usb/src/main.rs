@@ -19,9 +19,6 @@ use std::time::Instant;
 
 use checks::Check;
 
-/// A word of the kernel's command line: leave out all but the table.
-const ONLY_THROUGHPUT: &str = "relief.throughput";
-
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().collect();
     if let Some(role) = arguments.get(1).filter(|_| std::process::id() != 1) {
@@ -47,7 +44,7 @@ fn main() -> ExitCode {
 fn run_all() -> usize {
     let mut failed = 0;
     let mut checks: Vec<Check> = Vec::new();
-    if !boot::is_asked_for(ONLY_THROUGHPUT) {
+    if !boot::is_asked_for(throughput::ASKED_FOR) {
         checks.extend(checks::bulk::CHECKS);
         checks.extend(checks::serial::CHECKS);
         checks.extend(checks::network::CHECKS);

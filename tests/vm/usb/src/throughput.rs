@@ -11,6 +11,7 @@ use sim_scanner::endpoint::usb::{Attachment, Personality, UsbServer};
 use sim_scanner::source::Source;
 use throughput::{Attached, Case, Encoding, TABLE_HEAD, fastest_of, memory, pseudo_terminal};
 
+use crate::boot;
 use crate::checks::{serial, wait_for_path};
 use crate::scan::link;
 
@@ -32,10 +33,19 @@ const WAYS: [Way; 4] = [
     ("USB, CDC-ACM", cdc_acm),
 ];
 
+/// A word of the kernel's command line: the whole table, and nothing else.
+pub(crate) const ASKED_FOR: &str = "relief.throughput";
+
+/// The whole table, or only its first rows beside the other checks.
 pub(crate) fn table() -> Result<()> {
+    let (rates, sizes, scans_at_most) = if boot::is_asked_for(ASKED_FOR) {
+        (&LINE_RATES_HZ[..], &SIZES[..], SCANS)
+    } else {
+        (&LINE_RATES_HZ[..1], &SIZES[..1], 1)
+    };
     println!("{TABLE_HEAD}");
-    for line_rate_hz in LINE_RATES_HZ {
-        for (samples, columns) in SIZES {
+    for &line_rate_hz in rates {
+        for &(samples, columns) in sizes {
             for encoding in [Encoding::Uniform, Encoding::Listed] {
                 let case = Case {
                     columns,
@@ -43,14 +53,18 @@ pub(crate) fn table() -> Result<()> {
                     encoding,
                     line_rate_hz,
                 };
+                let source = case.source()?;
                 for (way, attach) in WAYS {
                     // As many columns in flight as the simulator keeps.
                     let link = LinkSettings {
                         credits: 64,
                         ..link()
                     };
-                    let scans = if line_rate_hz.is_some() { 1 } else { SCANS };
-                    println!("{}", fastest_of(scans, way, &case, &link, attach)?);
+                    let scans = line_rate_hz.map_or(scans_at_most, |_| 1);
+                    println!(
+                        "{}",
+                        fastest_of(scans, way, (&case, &source), &link, attach)?
+                    );
                 }
             }
         }
