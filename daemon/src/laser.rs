@@ -476,7 +476,7 @@ mod tests {
     fn a_scan_told_to_go_on_is_not_on_before_it_does() {
         use LaserState::{On, Unknown};
         let folder = tempfile::tempdir().unwrap();
-        let laser = Arc::new(Laser::open(&folder.path().join("laser.jsonl")).unwrap());
+        let laser = Arc::new(Laser::open(&LocalDisk, folder.path(), THE_SCANNER).unwrap());
         let watched =
             |said| Watched::new(Arc::new(Said(said, Arc::clone(&laser))), Arc::clone(&laser));
         laser.scan_begins("s");
@@ -498,7 +498,7 @@ mod tests {
     #[test]
     fn an_abort_is_noted_once_and_with_its_scan() {
         let folder = tempfile::tempdir().unwrap();
-        let laser = Arc::new(Laser::open(&folder.path().join("laser.jsonl")).unwrap());
+        let laser = Arc::new(Laser::open(&LocalDisk, folder.path(), THE_SCANNER).unwrap());
         let said = Said(Ok(()), Arc::clone(&laser));
         let watched = Watched::new(Arc::new(said), Arc::clone(&laser));
         laser.scan_begins("s");

@@ -19,7 +19,7 @@ static ALLOCATOR: PeakAlloc = PeakAlloc;
 
 type Test = (&'static str, fn() -> Result<()>);
 
-const TESTS: [Test; 4] = [
+const TESTS: [Test; 5] = [
     (
         "crash::what_was_acknowledged_survives_the_death_of_the_service",
         crash::what_was_acknowledged_survives_the_death_of_the_service,
