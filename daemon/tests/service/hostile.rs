@@ -395,14 +395,19 @@ async fn who_does_not_read_loses_the_connection() {
         .set_len(bytes)
         .unwrap();
     let request = format!("GET /v1/spool/r/large HTTP/1.0\r\n{}\r\n", doors.fields());
-    let mut unix = doors.connect(Way::Socket).await;
-    let mut tcp = doors.connect(Way::Loopback).await;
-    for stream in [&mut unix, &mut tcp] {
+    let begun = async |way| loop {
+        let mut stream = doors.connect(way).await;
         stream.write_all(request.as_bytes()).await.unwrap();
         let mut first = [0; 12];
         stream.read_exact(&mut first).await.unwrap();
-        assert_eq!(&first, b"HTTP/1.0 200");
-    }
+        if &first == b"HTTP/1.0 200" {
+            break stream;
+        }
+        // The only place may still be that of the one before, who asked for a token.
+        assert_eq!(&first, b"HTTP/1.1 503");
+    };
+    let unix = begun(Way::Socket).await;
+    let tcp = begun(Way::Loopback).await;
     let free = async {
         loop {
             let mut answered = 0;

@@ -93,3 +93,31 @@ fn encode(canvas: &Canvas, sink: impl Write) -> std::io::Result<()> {
         other => std::io::Error::other(other),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io::{self, ErrorKind};
+
+    use super::*;
+
+    struct Full;
+
+    impl Write for Full {
+        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+            Err(ErrorKind::StorageFull.into())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn an_error_of_the_sink_keeps_its_kind() {
+        let canvas = Canvas::new(8, 8, [0; 3]);
+        assert_eq!(
+            encode(&canvas, Full).unwrap_err().kind(),
+            ErrorKind::StorageFull
+        );
+    }
+}
