@@ -13,6 +13,10 @@ const HEAD_BYTES: u64 = 512;
 /// Files that were packed twice by mistake are read; what is packed more often is no
 /// accident, and each layer multiplies by a thousand what a small file can unfold to.
 const MOST_LAYERS: u32 = 2;
+/// Most that a layer of compression is unpacked to: 64 bytes for each of the points that are
+/// read, half as much again as a line of text with an intensity takes. A few kB can unfold to
+/// this, and to any number without a bound.
+pub const MOST_UNPACKED_BYTES: u64 = 1 << 30;
 /// How much is still unpacked to find out whether damage explains what could not be read.
 const SEARCHED_BYTES: u64 = 1 << 28;
 
@@ -73,10 +77,7 @@ impl<'a> Unpacked<'a> {
             layers += 1;
             reader = Box::new(BufReader::with_capacity(
                 BUFFER_BYTES,
-                Gunzip {
-                    decoder: MultiGzDecoder::new(whole),
-                    unpacked: 0,
-                },
+                Gunzip::new(whole, MOST_UNPACKED_BYTES),
             ));
         }
     }
@@ -138,10 +139,31 @@ impl BufRead for Unpacked<'_> {
 struct Gunzip<R> {
     decoder: MultiGzDecoder<R>,
     unpacked: u64,
+    most: u64,
+}
+
+impl<R: BufRead> Gunzip<R> {
+    fn new(packed: R, most: u64) -> Self {
+        Self {
+            decoder: MultiGzDecoder::new(packed),
+            unpacked: 0,
+            most,
+        }
+    }
 }
 
 impl<R: BufRead> Read for Gunzip<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.unpacked > self.most {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidData,
+                format!(
+                    "the compressed data (gzip) unfold to more than {} bytes, the most that is \
+                     read: unpack the file and see what is in it",
+                    self.most
+                ),
+            ));
+        }
         let read = self
             .decoder
             .read(buffer)
@@ -185,5 +207,33 @@ impl<R> Gunzip<R> {
             return io::Error::new(error.kind(), cause);
         };
         io::Error::new(io::ErrorKind::InvalidData, text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use flate2::Compression;
+    use flate2::write::GzEncoder;
+
+    use super::*;
+
+    #[test]
+    fn what_unfolds_without_end_is_not_read_to_its_end() {
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+        encoder.write_all(&[b'\n'; 100_000]).unwrap();
+        let packed = encoder.finish().unwrap();
+        let read = |most| {
+            let mut bytes = Vec::new();
+            let read = Gunzip::new(&*packed, most).read_to_end(&mut bytes);
+            read.map_err(|error| error.to_string())
+        };
+        assert_eq!(read(100_000), Ok(100_000));
+        let told = read(50_000).unwrap_err();
+        assert!(
+            told.contains("(gzip) unfold to more than 50000 bytes"),
+            "{told}"
+        );
     }
 }
