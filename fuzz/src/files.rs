@@ -45,8 +45,18 @@ pub fn ply(data: &[u8]) {
     scan_file(&file);
 }
 
-/// IGES, as measured points and as a model.
+/// IGES, as measured points and as a model. After a bar come the bare contents: the Global
+/// section on the first line, an entity on each that follows, its directory entry's fields
+/// before another bar. They are laid out in columns, which a fuzzer's insertions would else
+/// break, long before they come to mean something.
 pub fn iges(data: &[u8]) {
+    match data.split_first() {
+        Some((b'|', contents)) => read_iges(&laid_out(contents)),
+        _ => read_iges(data),
+    }
+}
+
+fn read_iges(data: &[u8]) {
     match cad_exchange::iges::read_points(data) {
         Ok(points) => assert!(points.iter().flatten().all(|c| c.is_finite())),
         Err(error) => told(&error.to_string()),
@@ -54,6 +64,71 @@ pub fn iges(data: &[u8]) {
     if let Err(error) = cad_exchange::iges::read_model(data) {
         told(&error.to_string());
     }
+}
+
+/// Fields of a directory entry that are given, and where they stand: level, matrix and status
+/// in the first line; colour and form in the second.
+const ENTRY_FIELDS: [(usize, usize); 5] = [(0, 4), (0, 6), (0, 8), (1, 2), (1, 4)];
+
+/// The 80-column form of the bare contents of an IGES file, without their first bar.
+#[must_use]
+pub fn laid_out(contents: &[u8]) -> Vec<u8> {
+    let mut records = contents.split(|&b| b == b'\n');
+    let global = records.next().unwrap_or_default();
+    let mut file = Vec::new();
+    line(&mut file, b"fuzz", b'S', 1);
+    for (index, part) in global.chunks(72).enumerate() {
+        line(&mut file, part, b'G', index + 1);
+    }
+    let (mut directory, mut parameters) = (Vec::new(), Vec::new());
+    let (mut entries, mut lines) = (0, 0);
+    for record in records {
+        let bar = record.iter().position(|&b| b == b'|');
+        let (fields, values) = match bar {
+            Some(bar) => (&record[..bar], &record[bar + 1..]),
+            None => (&b""[..], record),
+        };
+        let kind: String = values
+            .iter()
+            .take_while(|b| b.is_ascii_digit())
+            .map(|&b| char::from(b))
+            .collect();
+        let parts: Vec<&[u8]> = values.chunks(64).collect();
+        let mut entry = [[b' '; 72]; 2];
+        let mut put = |row: usize, field: usize, text: &[u8]| {
+            for (place, &byte) in entry[row][8 * field..].iter_mut().take(8).zip(text) {
+                *place = byte;
+            }
+        };
+        put(0, 0, kind.as_bytes());
+        put(1, 0, kind.as_bytes());
+        put(0, 1, (lines + 1).to_string().as_bytes());
+        put(1, 3, parts.len().to_string().as_bytes());
+        for ((row, field), text) in ENTRY_FIELDS.iter().zip(fields.split(|&b| b == b'/')) {
+            put(*row, *field, text);
+        }
+        for row in &entry {
+            entries += 1;
+            line(&mut directory, row, b'D', entries);
+        }
+        for part in parts {
+            lines += 1;
+            line(&mut parameters, part, b'P', lines);
+        }
+    }
+    file.extend(directory);
+    file.extend(parameters);
+    line(&mut file, b"", b'T', 1);
+    file
+}
+
+/// A line of 80 columns.
+fn line(file: &mut Vec<u8>, content: &[u8], section: u8, number: usize) {
+    let start = file.len();
+    file.extend(content.iter().map(|&b| if b == b'\r' { b' ' } else { b }));
+    file.resize(start + 72, b' ');
+    file.push(section);
+    file.extend(format!("{number:7}\n").into_bytes());
 }
 
 /// A journal, as it is and with every checksum made right, which else would keep the fuzzer

@@ -8,8 +8,8 @@ mod files;
 mod http;
 mod line;
 
-pub use files::{config, iges, journal, ply, scan_file};
-pub use http::http;
+pub use files::{config, iges, journal, laid_out, ply, scan_file};
+pub use http::{http, reply};
 pub use line::{protocol, session};
 
 /// A target.

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 use scanner_driver::LinkSettings;
-use scanner_driver::session::{Command, Event, Session, Ticket};
+use scanner_driver::session::{Answer, Command, Event, Session, Ticket};
 use scanner_protocol::{Decoder, DeviceMessage, Frame, HostMessage, Packet};
 use sim_scanner::config::SimConfig;
 use sim_scanner::device::DeviceSettings;
@@ -119,7 +119,13 @@ impl Line {
                     self.columns += 1;
                     self.session.acknowledge(column.index, self.now);
                 }
-                Event::Finished(ticket, _) => assert!(ticket.0 < self.tickets),
+                Event::Finished(ticket, answer) => {
+                    assert!(ticket.0 < self.tickets);
+                    // Only now: while a scan runs, another is refused, and the first goes on.
+                    if let Ok(Answer::Scan(_)) = answer {
+                        self.columns = 0;
+                    }
+                }
                 Event::Lost(_) => {
                     self.session = Session::new("fuzz", LinkSettings::default(), self.now);
                 }
@@ -136,9 +142,6 @@ impl Line {
     }
 
     fn command(&mut self, command: Command) {
-        if matches!(command, Command::Scan(_)) {
-            self.columns = 0;
-        }
         self.session
             .command(Ticket(self.tickets), command, self.now);
         self.tickets += 1;

@@ -57,6 +57,32 @@ fn seeds_lead_somewhere() {
         assert!(points.len() >= 8, "{name}: {}", points.len());
     }
     cad_exchange::iges::read_model(&*read("iges", "model-128")).unwrap();
+    // Bare contents come to the same file.
+    let bare = |name: &str| relief_fuzz::laid_out(&read("iges", name)[1..]);
+    for kind in ["points-106", "points-116"] {
+        let points = |file: &[u8]| cad_exchange::iges::read_points(file).unwrap();
+        assert_eq!(
+            points(&bare(&format!("bare-{kind}"))),
+            points(&read("iges", kind))
+        );
+    }
+    for kind in ["model-114", "model-128"] {
+        let model = |file: &[u8]| cad_exchange::iges::read_model(file).unwrap();
+        assert_eq!(
+            model(&bare(&format!("bare-{kind}"))),
+            model(&read("iges", kind))
+        );
+    }
+    for (name, status) in [
+        ("status", "200"),
+        ("status-loopback", "200"),
+        ("rerun", "202"),
+        ("journal", "200"),
+        ("one-scan", "200"),
+    ] {
+        let reply = relief_fuzz::reply(&read("http", name));
+        assert_eq!(reply.split(' ').nth(1), Some(status), "{name}: {reply}");
+    }
     let options = scan_files::ReadOptions::default();
     for name in ["blanks.xyz", "semicolons.csv", "packed.xyz.gz"] {
         let scan = scan_files::read_from(&*read("scan_file", name), name, &options).unwrap();

@@ -6,6 +6,11 @@ use relief_tests::mutations::{self, MOST_BYTES, MOST_SMALL_BYTES, MOST_TIME, Met
 #[global_allocator]
 static ALLOCATOR: PeakAlloc = PeakAlloc;
 
+/// Large enough for what grows with the square of a file's size to show.
+const WORST_BYTES: usize = 200_000;
+/// Memory that a reader may take, in lengths of the file: a point of three bytes takes 60.
+const MOST_TIMES: usize = 30;
+
 struct Memory;
 
 impl Meter for Memory {
@@ -60,5 +65,15 @@ fn damaged_files_end_no_reader_and_take_no_memory() {
         };
         assert!(small.peak_bytes < most, "{small:?}");
         assert!(small.took < MOST_TIME, "{small:?}");
+    }
+
+    for one in mutations::worst(WORST_BYTES, &Memory, |_| {}).unwrap() {
+        let most = if one.packed {
+            MOST_BYTES
+        } else {
+            MOST_SMALL_BYTES + MOST_TIMES * one.bytes
+        };
+        assert!(one.peak_bytes < most, "{one:?}");
+        assert!(one.took < MOST_TIME, "{one:?}");
     }
 }

@@ -1,12 +1,15 @@
 //! Fuzzers for everything that comes from outside.
 
-use std::path::PathBuf;
-use std::process::{Command, Stdio};
+use std::collections::VecDeque;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Mutex;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 
-use crate::shell;
+use crate::{apt, shell};
 
 /// All of them, in the order of `fuzz/src/lib.rs`.
 const TARGETS: [&str; 8] = [
@@ -19,12 +22,32 @@ const TARGETS: [&str; 8] = [
     "scan_file",
     "session",
 ];
-/// The longest input: enough for every format to show all it has.
-const LONGEST_BYTES: u32 = 16_384;
+/// The longest input: enough for every format to show all it has, and for the limits of its
+/// parts.
+const LONGEST_BYTES: u32 = 65_536;
 /// What the guide promises of files this small, and more than the fuzzer itself needs.
 const MEMORY_MB: u32 = 1_024;
 /// An input that takes longer is a finding.
 const LONGEST_S: u32 = 20;
+/// Has the compiler count branches and tell comparisons, as libFuzzer wants it: the flags of
+/// cargo-fuzz. They are those of every release of Rust, so that no other tool is needed.
+const WATCHED: [&str; 8] = [
+    "-Cpasses=sancov-module",
+    "-Cllvm-args=-sanitizer-coverage-level=4",
+    "-Cllvm-args=-sanitizer-coverage-inline-8bit-counters",
+    "-Cllvm-args=-sanitizer-coverage-pc-table",
+    "-Cllvm-args=-sanitizer-coverage-trace-compares",
+    "-Cllvm-args=-sanitizer-coverage-stack-depth",
+    "-Cllvm-args=-simplifycfg-branch-fold-threshold=0",
+    "--cfg=fuzzing",
+];
+/// What libFuzzer says at the end of a run, and what it is.
+const STATISTICS: [(&str, &str); 4] = [
+    ("stat::number_of_executed_units:", "inputs"),
+    ("stat::new_units_added:", "new"),
+    ("stat::slowest_unit_time_sec:", "s the slowest"),
+    ("stat::peak_rss_mb:", "MB"),
+];
 
 /// What is wanted of the fuzzers.
 #[derive(Debug, Args)]
@@ -32,49 +55,43 @@ pub(crate) struct Options {
     /// Seconds for each target
     #[arg(long, value_name = "N", default_value_t = 30)]
     pub(crate) seconds: u32,
+    /// Targets at work at the same time
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) jobs: usize,
     /// Targets; all unless named
     #[arg(value_name = "TARGET", value_parser = TARGETS)]
     pub(crate) targets: Vec<String>,
 }
 
-/// Builds the fuzzers and runs one after the other; fails with the first finding of each.
+/// Builds the fuzzers and runs one after the other, or some at a time; fails with the first
+/// finding of each.
 pub(crate) fn run(options: &Options) -> Result<()> {
-    let path = search_path()?;
-    let environment = [("PATH", path)];
-    let fuzz = ["fuzz"];
-    let common = ["--sanitizer", "none", "--fuzz-dir", "fuzz"];
-    shell::run_with(
-        "cargo",
-        &[&fuzz[..], &["build"], &common].concat(),
-        &environment,
-    )?;
-    let wanted: Vec<&str> = match options.targets.as_slice() {
-        [] => TARGETS.to_vec(),
+    ensure!(options.jobs > 0, "no fuzzer runs with --jobs 0");
+    if std::env::var_os("CXX").is_none() {
+        // libFuzzer itself is C++.
+        apt::need(&[("c++", "g++")])?;
+    }
+    let programs = build()?;
+    let wanted: VecDeque<&str> = match options.targets.as_slice() {
+        [] => TARGETS.into(),
         named => named.iter().map(String::as_str).collect(),
     };
-    let mut failed = Vec::new();
-    for target in wanted {
-        let folders = ["corpus", "seeds", "finds"].map(|kind| format!("fuzz/{kind}/{target}"));
-        for folder in &folders {
-            std::fs::create_dir_all(shell::root().join(folder))
-                .with_context(|| format!("cannot make {folder}"))?;
+    let (queue, failed) = (Mutex::new(wanted), Mutex::new(Vec::new()));
+    std::thread::scope(|scope| {
+        for _ in 0..options.jobs {
+            scope.spawn(|| {
+                while let Some(target) = take(&queue) {
+                    if let Err(error) = fuzz(&programs, target, options.seconds) {
+                        eprintln!("{target}: {error:#}");
+                        if let Ok(mut failed) = failed.lock() {
+                            failed.push(target);
+                        }
+                    }
+                }
+            });
         }
-        let limits = [
-            format!("-max_total_time={}", options.seconds),
-            format!("-max_len={LONGEST_BYTES}"),
-            format!("-rss_limit_mb={MEMORY_MB}"),
-            format!("-timeout={LONGEST_S}"),
-            "-print_final_stats=1".to_owned(),
-        ];
-        let mut arguments = [&fuzz[..], &["run"], &common, &[target]].concat();
-        arguments.extend(folders.iter().map(String::as_str));
-        arguments.push("--");
-        arguments.extend(limits.iter().map(String::as_str));
-        if let Err(error) = shell::run_with("cargo", &arguments, &environment) {
-            eprintln!("{error:#}");
-            failed.push(target);
-        }
-    }
+    });
+    let failed = failed.into_inner().unwrap_or_default();
     if failed.is_empty() {
         return Ok(());
     }
@@ -85,26 +102,108 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     );
 }
 
-/// Where `cargo fuzz` is found; it is installed if it is not there yet.
-fn search_path() -> Result<String> {
-    let tools = shell::root().join("target/tools");
-    let own = std::env::var_os("PATH").unwrap_or_default();
-    let folders = std::iter::once(tools.join("bin")).chain(std::env::split_paths(&own));
-    let path = std::env::join_paths(folders.collect::<Vec<PathBuf>>())?;
-    let path = path.into_string().ok().context("PATH is not UTF-8")?;
-    let found = Command::new("cargo")
-        .args(["fuzz", "--version"])
-        .env("PATH", &path)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status()
-        .is_ok_and(|status| status.success());
-    if !found {
-        let root = tools.display().to_string();
-        shell::run(
-            "cargo",
-            &["install", "--locked", "--root", &root, "cargo-fuzz@0.13.2"],
-        )?;
+fn take<'a>(queue: &Mutex<VecDeque<&'a str>>) -> Option<&'a str> {
+    queue.lock().ok()?.pop_front()
+}
+
+/// Builds all fuzzers; the folder where they are.
+fn build() -> Result<PathBuf> {
+    let version = shell::output("rustc", &["--version", "--verbose"])?;
+    let host = version.lines().find_map(|line| line.strip_prefix("host: "));
+    let host = host.context("rustc does not say what it compiles for")?;
+    let folder = shell::target().join("fuzz");
+    // With a target named, cargo leaves what runs in the build itself alone.
+    let arguments = [
+        "build",
+        "--release",
+        "--locked",
+        "--manifest-path",
+        "fuzz/Cargo.toml",
+        "--target",
+        host,
+        "--target-dir",
+        folder.to_str().context("the target folder is not UTF-8")?,
+    ];
+    shell::run_with("cargo", &arguments, &[("RUSTFLAGS", WATCHED.join(" "))])?;
+    Ok(folder.join(host).join("release"))
+}
+
+/// Runs a target for so long; what it says goes to a file beside what it finds.
+fn fuzz(programs: &Path, target: &str, seconds: u32) -> Result<()> {
+    let root = shell::root();
+    let place = |kind: &str| root.join("fuzz").join(kind).join(target);
+    let folders = ["corpus", "seeds", "finds", "artifacts"].map(place);
+    for folder in &folders {
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("cannot make {}", folder.display()))?;
     }
-    Ok(path)
+    let [corpus, seeds, finds, artifacts] = folders;
+    let log = artifacts.with_extension("log");
+    let words = File::create(&log).with_context(|| format!("cannot write {}", log.display()))?;
+    eprintln!(
+        "$ fuzz {target} for {seconds} s, its words in {}",
+        log.display()
+    );
+    let status = Command::new(programs.join(target))
+        .args([corpus, seeds, finds])
+        .arg(format!("-artifact_prefix={}/", artifacts.display()))
+        .arg(format!("-max_total_time={seconds}"))
+        .arg(format!("-max_len={LONGEST_BYTES}"))
+        .arg(format!("-rss_limit_mb={MEMORY_MB}"))
+        .arg(format!("-timeout={LONGEST_S}"))
+        .arg("-print_final_stats=1")
+        .current_dir(&root)
+        .stdout(words.try_clone()?)
+        .stderr(words)
+        .status()
+        .with_context(|| format!("cannot start the fuzzer of {target}"))?;
+    let said = String::from_utf8_lossy(&std::fs::read(&log)?).into_owned();
+    if !status.success() {
+        bail!("{status}\n{}", last_lines(&said, 40));
+    }
+    println!("{target}: {}", told(&said)?);
+    Ok(())
+}
+
+/// A line of figures from what a fuzzer said.
+fn told(said: &str) -> Result<String> {
+    let mut parts = Vec::new();
+    for (name, unit) in STATISTICS {
+        let value = said.lines().rev().find_map(|line| line.strip_prefix(name));
+        let value = value.with_context(|| format!("it does not say {name}"))?;
+        parts.push(format!("{} {unit}", value.trim()));
+    }
+    let done = said.lines().rev().find(|line| line.contains(" cov: "));
+    let words: Vec<&str> = done.unwrap_or_default().split_whitespace().collect();
+    for name in ["cov:", "ft:"] {
+        let at = words.iter().position(|word| *word == name);
+        let value = at.and_then(|at| words.get(at + 1));
+        parts.push(format!("{name} {}", value.context("it reached nothing")?));
+    }
+    Ok(parts.join(", "))
+}
+
+fn last_lines(text: &str, count: usize) -> String {
+    let lines: Vec<&str> = text.lines().collect();
+    lines[lines.len().saturating_sub(count)..].join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_are_found_in_what_a_fuzzer_says() {
+        let said = "#4096\tpulse  cov: 7 ft: 9 corp: 2/3b lim: 4 exec/s: 12 rss: 40Mb\n\
+                    #9120\tDONE   cov: 1170 ft: 4012 corp: 210/9Kb lim: 99 exec/s: 304 rss: 51Mb\n\
+                    Done 9120 runs in 30 second(s)\nstat::number_of_executed_units: 9120\n\
+                    stat::average_exec_per_sec:     304\nstat::new_units_added:          210\n\
+                    stat::slowest_unit_time_sec:    0\nstat::peak_rss_mb:              51\n";
+        assert_eq!(
+            told(said).unwrap(),
+            "9120 inputs, 210 new, 0 s the slowest, 51 MB, cov: 1170, ft: 4012"
+        );
+        assert!(told("Done 9120 runs").is_err());
+        assert_eq!(last_lines("a\nb\nc", 2), "b\nc");
+    }
 }

@@ -40,7 +40,7 @@ enum Chore {
     Reproduce(reproduce::Options),
     /// Run the fuzzers of everything that comes from outside.
     ///
-    /// Installs cargo-fuzz into `target/tools` unless it is there; needs a C++ compiler.
+    /// Needs a C++ compiler, for libFuzzer.
     Fuzz(fuzz::Options),
     /// Measure one part of the product at length.
     #[command(subcommand)]
@@ -110,6 +110,7 @@ fn full() -> anyhow::Result<()> {
     vm::run(&vm::Vm::Usb(vm::Options::default()))?;
     fuzz::run(&fuzz::Options {
         seconds: 600,
+        jobs: 2,
         targets: Vec::new(),
     })?;
     vm::run(&vm::Vm::Systemd(vm::SystemdOptions::default()))?;

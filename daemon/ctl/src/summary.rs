@@ -120,7 +120,7 @@ fn shape(region: &RegionReport) -> String {
         [
             ("R", numbers.radius_mm, ""),
             ("r", numbers.tube_radius_mm, ""),
-            ("half angle", numbers.half_angle_deg, "°"),
+            ("half angle", numbers.half_angle_deg, " deg"),
         ]
         .into_iter()
         .filter_map(|(name, size, unit)| Some(format!(" {name} {}{unit}", quantity(size?))))
@@ -134,7 +134,7 @@ fn quantity(quantity: Quantity) -> String {
     let leading = quantity.uncertainty.log10().floor();
     let decimals = (1.0 - leading).clamp(0.0, 6.0) as usize;
     let Quantity { value, uncertainty } = quantity;
-    format!("{value:.decimals$} ± {uncertainty:.decimals$}")
+    format!("{value:.decimals$} +- {uncertainty:.decimals$}")
 }
 
 /// What belongs to no region.

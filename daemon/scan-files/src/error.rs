@@ -94,6 +94,17 @@ pub enum ScanFileError {
         /// The format, with its article.
         format: &'static str,
     },
+    /// More lines than any file of points that is read.
+    #[error(
+        "{file}: has more than {limit} lines, far more than points that are read; leave out blank \
+         lines and comments"
+    )]
+    TooManyLines {
+        /// The file.
+        file: String,
+        /// The limit.
+        limit: u64,
+    },
     /// A line longer than any line of numbers.
     #[error("{file}, line {line}: longer than {limit} bytes; a line holds one point")]
     LongLine {

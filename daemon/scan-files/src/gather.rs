@@ -62,7 +62,8 @@ impl<'a> Gather<'a> {
         units: Units,
         place: Place,
     ) -> Result<(), ScanFileError> {
-        if self.points.len() >= self.options.max_points {
+        // Those without a measurement take no memory, but time.
+        if self.points.len() + self.unmeasured >= self.options.max_points {
             return Err(ScanFileError::TooManyPoints {
                 file: self.file.to_owned(),
                 limit: self.options.max_points,

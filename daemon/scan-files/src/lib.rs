@@ -36,7 +36,7 @@ pub use error::{Place, ScanFileError};
 pub use lattice::{LATTICE_MM, lattice_counts, lattice_mm};
 pub use pitch::recommended_pitch_mm;
 pub use units::Units;
-pub use unpack::Unpacked;
+pub use unpack::{MOST_UNPACKED_BYTES, Unpacked};
 
 use gather::Gather;
 

@@ -2,7 +2,7 @@
 
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 
-use flate2::bufread::MultiGzDecoder;
+use flate2::bufread::GzDecoder;
 
 use crate::error::ScanFileError;
 
@@ -13,6 +13,14 @@ const HEAD_BYTES: u64 = 512;
 /// Files that were packed twice by mistake are read; what is packed more often is no
 /// accident, and each layer multiplies by a thousand what a small file can unfold to.
 const MOST_LAYERS: u32 = 2;
+/// Most that a layer of compression is unpacked to: 64 bytes for each of the points that are
+/// read, half as much again as a line of text with an intensity takes. A few kB can unfold to
+/// this, and to any number without a bound.
+pub const MOST_UNPACKED_BYTES: u64 = 1 << 30;
+/// Parts, each with a head of its own, that compressed data may be made of, beside one for each
+/// kilobyte that is in them: what packs in blocks makes them of 64 kB. A part takes time, even
+/// if nothing is in it.
+const MOST_PARTS: u64 = 1 << 16;
 /// How much is still unpacked to find out whether damage explains what could not be read.
 const SEARCHED_BYTES: u64 = 1 << 28;
 
@@ -73,10 +81,7 @@ impl<'a> Unpacked<'a> {
             layers += 1;
             reader = Box::new(BufReader::with_capacity(
                 BUFFER_BYTES,
-                Gunzip {
-                    decoder: MultiGzDecoder::new(whole),
-                    unpacked: 0,
-                },
+                Gunzip::new(whole, MOST_UNPACKED_BYTES),
             ));
         }
     }
@@ -134,20 +139,68 @@ impl BufRead for Unpacked<'_> {
     }
 }
 
-/// A decoder whose errors are told in the user's words.
+/// A decoder of all parts of a layer, whose errors are told in the user's words.
 struct Gunzip<R> {
-    decoder: MultiGzDecoder<R>,
+    /// None after the last part.
+    part: Option<GzDecoder<R>>,
+    parts: u64,
     unpacked: u64,
+    most: u64,
+}
+
+impl<R: BufRead> Gunzip<R> {
+    fn new(packed: R, most: u64) -> Self {
+        Self {
+            part: Some(GzDecoder::new(packed)),
+            parts: 1,
+            unpacked: 0,
+            most,
+        }
+    }
+
+    /// Refuses what would go on without end.
+    fn check(&self) -> io::Result<()> {
+        let what = if self.unpacked > self.most {
+            format!(
+                "unfold to more than {} bytes, the most that is read",
+                self.most
+            )
+        } else if self.parts > MOST_PARTS + self.unpacked / 1024 {
+            format!(
+                "are made of more than {} parts with next to nothing in them",
+                self.parts - 1
+            )
+        } else {
+            return Ok(());
+        };
+        let text = format!("the compressed data (gzip) {what}: unpack the file and look into it");
+        Err(io::Error::new(io::ErrorKind::InvalidData, text))
+    }
 }
 
 impl<R: BufRead> Read for Gunzip<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let read = self
-            .decoder
-            .read(buffer)
-            .map_err(|error| self.told(&error))?;
-        self.unpacked += read as u64;
-        Ok(read)
+        if buffer.is_empty() {
+            return Ok(0);
+        }
+        loop {
+            self.check()?;
+            let Some(part) = &mut self.part else {
+                return Ok(0);
+            };
+            let read = part.read(buffer).map_err(|error| self.told(&error))?;
+            self.unpacked += read as u64;
+            if read > 0 {
+                return Ok(read);
+            }
+            let rest = self.part.take().map(GzDecoder::into_inner);
+            if let Some(mut rest) = rest
+                && !rest.fill_buf()?.is_empty()
+            {
+                self.parts += 1;
+                self.part = Some(GzDecoder::new(rest));
+            }
+        }
     }
 }
 
@@ -185,5 +238,52 @@ impl<R> Gunzip<R> {
             return io::Error::new(error.kind(), cause);
         };
         io::Error::new(io::ErrorKind::InvalidData, text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use flate2::Compression;
+    use flate2::write::GzEncoder;
+
+    use super::*;
+
+    #[test]
+    fn what_unfolds_without_end_is_not_read_to_its_end() {
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+        encoder.write_all(&[b'\n'; 100_000]).unwrap();
+        let packed = encoder.finish().unwrap();
+        let read = |most| {
+            let mut bytes = Vec::new();
+            let read = Gunzip::new(&*packed, most).read_to_end(&mut bytes);
+            read.map_err(|error| error.to_string())
+        };
+        assert_eq!(read(100_000), Ok(100_000));
+        let told = read(50_000).unwrap_err();
+        assert!(
+            told.contains("(gzip) unfold to more than 50000 bytes"),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn parts_are_read_one_after_the_other_but_not_nothing_without_end() {
+        let packed = |bytes: &[u8]| {
+            let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+            encoder.write_all(bytes).unwrap();
+            encoder.finish().unwrap()
+        };
+        let (nothing, one) = (packed(b""), packed(b"1"));
+        let read = |packed: &[u8]| {
+            let mut text = String::new();
+            let read = Gunzip::new(packed, MOST_UNPACKED_BYTES).read_to_string(&mut text);
+            read.map(|_| text).map_err(|error| error.to_string())
+        };
+        let some = [&one[..], &nothing, &one, &nothing].concat();
+        assert_eq!(read(&some), Ok("11".into()));
+        let told = read(&nothing.repeat(70_000)).unwrap_err();
+        assert!(told.contains("more than 65536 parts"), "{told}");
     }
 }

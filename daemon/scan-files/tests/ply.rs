@@ -237,6 +237,8 @@ fn faults_are_named_with_their_place() {
             format!("ply\n{}", "comment long\n".repeat(30_000)),
             &["256 KiB"],
         ),
+        // Lines that become longer while the header is cleaned.
+        (format!("ply\n{}", "\n".repeat(40_000)), &["256 KiB"]),
     ] {
         let message = read(text.as_bytes()).unwrap_err().to_string();
         assert!(message.starts_with("test.ply"), "{message}");

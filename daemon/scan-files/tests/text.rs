@@ -331,3 +331,17 @@ fn files_of_other_formats_are_called_by_their_name() {
     // A header line may begin with anything else.
     assert!(read(b"P5 y z\n0 0 1\n0 1 1\n1 0 1\n1 1 1\n").is_ok());
 }
+
+#[test]
+fn points_without_a_measurement_count_against_the_limit() {
+    let options = ReadOptions {
+        max_points: 3,
+        ..ReadOptions::default()
+    };
+    let text = "0 0 0\n1 1 1\nnan 0 0\nnan 0 0\n";
+    let told = read_from(text.as_bytes(), "test.xyz", &options).unwrap_err();
+    assert!(
+        matches!(told, ScanFileError::TooManyPoints { limit: 3, .. }),
+        "{told}"
+    );
+}

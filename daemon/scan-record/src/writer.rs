@@ -41,6 +41,13 @@ impl Storage for Appender {
     }
 }
 
+/// A journal in memory, for whoever passes its bytes on.
+impl Storage for Vec<u8> {
+    fn sync_data(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
 /// Why a scan ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum EndCause {

@@ -199,6 +199,61 @@ fn values_replaced() {
     assert!(refused > 1000, "{refused}");
 }
 
+/// Points that all point to the same parameters, or are all moved by the same matrix, behind
+/// so many lines of blanks.
+fn shared(entities: usize, blank_lines: usize, matrix: bool) -> Vec<u8> {
+    let mut text = format!("{:<72}S{:7}\n", "points", 1);
+    text += &format!(
+        "{:<72}G{:7}\n",
+        ",,1Hp,1Hf,1Hs,1H1,32,38,6,308,15,1Hp,1.,2,2HMM;", 1
+    );
+    let mut entity = |number: usize, line: usize, matrix: usize, own: usize| {
+        text += &format!(
+            "{number:8}{line:8}{:8}{:8}{:8}{:8}{matrix:8}{:8}{:8}D{own:7}\n",
+            0, 0, 0, 0, 0, "00000000"
+        );
+        text += &format!("{number:8}{:32}{:32}D{:7}\n", "", "", own + 1);
+    };
+    entity(124, 1, 0, 1);
+    for index in 1..=entities {
+        let (line, moved) = if matrix {
+            (blank_lines + 3, 1)
+        } else {
+            (blank_lines + 2, 0)
+        };
+        entity(116, line, moved, 2 * index + 1);
+    }
+    let mut data = vec!["124,".to_owned()];
+    data.extend(vec![String::new(); blank_lines]);
+    if matrix {
+        data.push("1.,0.,0.,5.,0.,1.,0.,0.,0.,0.,1.,0.;".into());
+    } else {
+        data.push("116,".into());
+        data.extend(vec![String::new(); blank_lines]);
+    }
+    data.push(if matrix { "116,1.,2.,3.;" } else { "1.,2.,3.;" }.into());
+    for (index, line) in data.iter().enumerate() {
+        text += &format!("{line:<64} {:7}P{:7}\n", 1, index + 1);
+    }
+    let counts = format!("S      1G      1D{:7}P{:7}", 2 * entities + 2, data.len());
+    text += &format!("{counts:<72}T{:7}\n", 1);
+    text.into_bytes()
+}
+
+/// What entities share is read once, or not without end.
+#[test]
+fn shared_parameters_are_not_read_without_end() {
+    // A matrix that moves everything is read once.
+    let moved = iges::read_points(&*shared(1000, 300, true)).unwrap();
+    assert_eq!(moved, vec![[6.0, 2.0, 3.0]; 1000]);
+    // A few entities may share what they like.
+    let few = iges::read_points(&*shared(10, 300, false)).unwrap();
+    assert_eq!(few, vec![[1.0, 2.0, 3.0]; 10]);
+    let error = iges::read_points(&*shared(1000, 300, false)).unwrap_err();
+    assert!(matches!(error, ReadError::Entity { .. }), "{error}");
+    assert!(error.to_string().contains("8 times over"), "{error}");
+}
+
 /// Counts that promise more than the file has must not be believed.
 #[test]
 fn huge_counts_cost_nothing() {

@@ -1,35 +1,12 @@
 //! A scan's journal in memory, byte for byte as on disk.
 
-use std::io::{self, Write};
-
 use anyhow::Result;
 use range_image::{Calibration, calibration::Head};
-use scan_record::{EndCause, Header, JournalWriter, RawColumn, RawSample, Storage};
-
-/// What would be the file.
-#[derive(Debug, Default)]
-struct Memory(Vec<u8>);
-
-impl Write for Memory {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-impl Storage for Memory {
-    fn sync_data(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
+use scan_record::{EndCause, Header, JournalWriter, RawColumn, RawSample};
 
 /// Keeps columns as the service does.
 #[derive(Debug)]
-pub struct Journal(JournalWriter<Memory>);
+pub struct Journal(JournalWriter<Vec<u8>>);
 
 impl Journal {
     /// An empty journal.
@@ -50,7 +27,7 @@ impl Journal {
             settings: Vec::new(),
             metadata: Vec::new(),
         };
-        Ok(Self(JournalWriter::new(Memory::default(), &header)?))
+        Ok(Self(JournalWriter::new(Vec::new(), &header)?))
     }
 
     /// Adds a column.
@@ -84,6 +61,6 @@ impl Journal {
     /// # Errors
     /// What the writer refuses.
     pub fn finish(self) -> Result<Vec<u8>> {
-        Ok(self.0.finish(&EndCause::Complete)?.0)
+        Ok(self.0.finish(&EndCause::Complete)?)
     }
 }

@@ -6,6 +6,7 @@ mod dice;
 mod mutate;
 mod seeds;
 mod small;
+mod worst;
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -21,6 +22,7 @@ pub use dice::Dice;
 pub use mutate::{Mutant, mutant};
 pub use seeds::{Seed, seeds};
 pub use small::{MOST_SMALL_BYTES, Small, small};
+pub use worst::{Worst, worst};
 
 /// Longest time that all readers together may take for one file. They need milliseconds;
 /// the rest is for machines with other work.
@@ -29,6 +31,7 @@ pub const MOST_TIME: Duration = Duration::from_secs(60);
 pub const MOST_BYTES: usize = 1 << 30;
 /// A grid for what has been read has so many nodes at most.
 const MOST_NODES: f64 = 40_000.0;
+const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 /// What is wanted.
 #[derive(Debug, Clone, Copy)]

@@ -7,7 +7,7 @@ use anyhow::Result;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use range_image::{Calibration, calibration::Head};
-use scan_record::{EndCause, Header, JournalWriter, RawColumn, RawSample, Storage};
+use scan_record::{EndCause, Header, JournalWriter, RawColumn, RawSample};
 
 use super::Dice;
 
@@ -180,7 +180,8 @@ fn split(text: &str, width: usize) -> Vec<&str> {
     parts
 }
 
-fn at_commas(text: &str, width: usize) -> Vec<String> {
+/// A record in lines no wider than this.
+pub(super) fn at_commas(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for value in text.split_inclusive(',') {
         match lines.last_mut() {
@@ -189,27 +190,6 @@ fn at_commas(text: &str, width: usize) -> Vec<String> {
         }
     }
     lines
-}
-
-/// Storage in memory.
-#[derive(Debug, Default)]
-struct Memory(Vec<u8>);
-
-impl Write for Memory {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-impl Storage for Memory {
-    fn sync_data(&mut self) -> io::Result<()> {
-        Ok(())
-    }
 }
 
 /// A journal whose checksums are right; of a roof, or `wild`, of numbers that no scanner
@@ -244,7 +224,7 @@ pub(super) fn journal(dice: &mut Dice, wild: bool) -> Result<Vec<u8>> {
         true => dice.pick(&[i32::MIN, i32::MAX, 0, -1]).unwrap_or(usual),
         false => usual,
     };
-    let mut writer = JournalWriter::new(Memory::default(), &header)?;
+    let mut writer = JournalWriter::new(Vec::new(), &header)?;
     for i in 0..=2 * SIDE {
         let samples = (-SIDE..=SIDE).map(|j| RawSample {
             lateral_counts: count(j * 50),
@@ -260,5 +240,5 @@ pub(super) fn journal(dice: &mut Dice, wild: bool) -> Result<Vec<u8>> {
             samples,
         })?;
     }
-    Ok(writer.finish(&EndCause::Complete)?.0)
+    Ok(writer.finish(&EndCause::Complete)?)
 }

@@ -7,13 +7,11 @@ use anyhow::Result;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
-use super::{Meter, read_all};
+use super::{GZIP_MAGIC, Meter, read_all};
 
 /// Most memory that reading such a file may take, unless it is packed: what the readers'
 /// buffers have, and the longest record that a journal may hold.
 pub const MOST_SMALL_BYTES: usize = 16 << 20;
-
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 /// What one of them came to.
 #[derive(Debug, Clone)]

@@ -6,6 +6,7 @@ mod events;
 mod files;
 mod foreign;
 mod object;
+mod program;
 mod wait;
 
 use std::collections::BTreeMap;
@@ -29,6 +30,7 @@ pub use events::Events;
 pub use files::{Published, journal_columns};
 pub use foreign::Foreign;
 pub use object::{leisurely_house, recording, small_house};
+pub use program::Program;
 pub use wait::{Ended, GUARD};
 
 /// The simulated scanner, the service, and a client of it.

@@ -39,7 +39,8 @@ pub(super) fn read_cleaned(
     let mut strays = Vec::new();
     for number in 1_u64.. {
         let start = header.len();
-        let room = (HEADER_LIMIT - start) as u64;
+        // What replaces a line may be longer than the line was.
+        let room = HEADER_LIMIT.saturating_sub(start) as u64;
         reader
             .by_ref()
             .take(room)
@@ -50,11 +51,11 @@ pub(super) fn read_cleaned(
                 source,
             })?;
         let line = &header[start..];
-        if line.is_empty() {
-            return Err(refuse(number, "the file ends before `end_header`"));
-        }
         if !line.ends_with(b"\n") && header.len() >= HEADER_LIMIT {
             return Err(refuse(number, "no `end_header` within the first 256 KiB"));
+        }
+        if line.is_empty() {
+            return Err(refuse(number, "the file ends before `end_header`"));
         }
         let Ok(text) = std::str::from_utf8(line) else {
             // Free text in an 8-bit encoding; what matters in a header is ASCII.

@@ -2,10 +2,14 @@
 
 use std::io::BufRead;
 
+use crate::MOST_POINTS;
 use crate::error::ScanFileError;
 
 /// Longest accepted line, bytes: a point with dozens of further columns fits.
 const LINE_LIMIT: usize = 16 * 1024;
+/// Most lines that are read: four for each of the points that are. A few kB of gzip can unfold
+/// to a thousand million that are blank.
+const MOST_LINES: u64 = 4 * MOST_POINTS as u64;
 const BYTE_ORDER_MARK: &str = "\u{feff}";
 /// Ctrl-Z, the end-of-file mark that some DOS programs leave behind.
 const END_MARK: char = '\u{1a}';
@@ -30,6 +34,7 @@ pub(super) struct Lines<'a, R> {
     /// Bytes taken from the reader.
     consumed: u64,
     skip_line_feed: bool,
+    most_lines: u64,
 }
 
 impl<'a, R: BufRead> Lines<'a, R> {
@@ -42,6 +47,7 @@ impl<'a, R: BufRead> Lines<'a, R> {
             start: 0,
             consumed: 0,
             skip_line_feed: false,
+            most_lines: MOST_LINES,
         }
     }
 
@@ -90,6 +96,12 @@ impl<'a, R: BufRead> Lines<'a, R> {
                 break;
             }
         }
+        if self.number == self.most_lines {
+            return Err(ScanFileError::TooManyLines {
+                file: self.file.to_owned(),
+                limit: self.most_lines,
+            });
+        }
         self.number += 1;
         let number = self.number;
         self.decoded().map(|text| {
@@ -117,5 +129,25 @@ impl<'a, R: BufRead> Lines<'a, R> {
         let text = std::str::from_utf8(content).map_err(|e| not_text(e.valid_up_to()))?;
         let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
         Ok(text.trim_end_matches(END_MARK))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_without_points_are_not_read_without_end() {
+        let mut lines = Lines::new(&b"1 2 3\n\n#\n\n"[..], "test");
+        lines.most_lines = 3;
+        for _ in 0..3 {
+            assert!(lines.next().unwrap().is_some());
+        }
+        let told = lines.next().map(|_| ()).unwrap_err().to_string();
+        assert_eq!(
+            told,
+            "test: has more than 3 lines, far more than points that are read; leave out blank \
+             lines and comments"
+        );
     }
 }

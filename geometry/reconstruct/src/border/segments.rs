@@ -36,6 +36,11 @@ const WRONG_SHARE: usize = 40;
 /// cheaper. Costs grow with length, so the search ends there.
 const HOPELESS: f64 = 6.0;
 
+/// No piece has more steps: as many as the longest side of the largest usual grid has nodes.
+/// A straight border costs next to nothing however long it is, and is not hopeless ever; the
+/// search would take the square of its length.
+const MOST_STEPS: usize = 4096;
+
 /// Newton steps to the point of a curve nearest to a place.
 const NEAREST_STEPS: usize = 3;
 
@@ -112,7 +117,7 @@ impl Samples {
         for first in 0..count - 1 {
             let base = best[first].0;
             let mut sums = Sums::start(self, first);
-            for (last, reached) in best.iter_mut().enumerate().skip(first + 1) {
+            for (last, reached) in best.iter_mut().enumerate().skip(first + 1).take(MOST_STEPS) {
                 sums.push(self, last);
                 let line = sums.line_error();
                 let mut cost = (line + price.line, false);
@@ -411,6 +416,23 @@ mod tests {
             let (_, along) = samples.at(&segments[0], 0);
             let error = libm::atan2(along[1], along[0]) - libm::atan(slope);
             assert!(error.abs() < 0.005, "slope {slope}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_line_longer_than_any_piece_is_cut_and_stays_straight() {
+        let count = 2 * MOST_STEPS + 10;
+        let points = (0..count).map(|k| [k as f64, 0.5]).collect();
+        let samples = Samples::new(points);
+        let segments = samples.divide(PRICE);
+        // Two pieces cannot span it.
+        assert_eq!(segments.len(), 3);
+        for pair in segments.windows(2) {
+            assert_eq!(pair[0].last, pair[1].first);
+        }
+        for segment in &segments {
+            assert!(segment.last - segment.first <= MOST_STEPS);
+            assert_eq!(samples.at(segment, segment.first).1, [1.0, 0.0]);
         }
     }
 

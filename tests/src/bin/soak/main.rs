@@ -13,11 +13,20 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Parser;
-use relief_api::{Event, Job, JobState, Rerun, Scan, ScanState, StartScan, Status, path};
-use relief_tests::rig::{Client, Events, GUARD, small_house};
+use relief_api::{Event, Job, JobState, Rerun, Scan, ScanState, StartScan, path};
+use relief_tests::rig::{Client, Events, Program, small_house};
 
-use process::Program;
+use process::sample;
 use trend::{Sample, Trend};
+
+/// Old scans go, as they would where the service is left alone.
+const SETTINGS: &str = "\
+[storage]
+reserve_mb = 1
+scans_mb = 100
+[log]
+level = \"error\"
+format = \"text\"";
 
 /// Keep the service at work, and watch its memory, descriptors and threads
 #[derive(Debug, Parser)]
@@ -71,8 +80,9 @@ async fn run(options: &Options) -> Result<()> {
     };
     let folder = tempfile::Builder::new().prefix("soak-").tempdir()?;
     let scanner = small_house().serve_pty(None)?;
-    let mut service = Program::start(&program, folder.path(), scanner.port())?;
-    let client = service.ready().await?;
+    let mut service = Program::start(&program, folder.path(), scanner.port(), SETTINGS)?;
+    service.ready().await?;
+    let client = service.client().clone();
     let longest = Duration::from_secs_f64(options.minutes * 60.0);
     let begun = Instant::now();
     let (mut trend, mut done) = (Trend::default(), Done::default());
@@ -81,9 +91,9 @@ async fn run(options: &Options) -> Result<()> {
         round(&client, &mut done)
             .await
             .context("the service does not do its work")?;
-        idle(&client).await?;
+        service.idle().await?;
         clear(&folder.path().join("spool"))?;
-        let sample = service.sample(begun.elapsed())?;
+        let sample = sample(service.id(), begun.elapsed())?;
         trend.add(sample);
         let minute = (begun.elapsed().as_secs_f64() / 60.0) as u32;
         if minute > told {
@@ -153,19 +163,6 @@ async fn result(client: &Client, events: &mut Events, id: u64) -> Result<()> {
     }
     ensure!(job.state == JobState::Done, "{job:?}");
     Ok(())
-}
-
-/// Waits until nothing is under way, so that samples can be compared.
-async fn idle(client: &Client) -> Result<()> {
-    let begun = Instant::now();
-    loop {
-        let status: Status = client.get(path::STATUS).await?;
-        if status.scan.is_none() && status.jobs_queued + status.jobs_running == 0 {
-            return Ok(());
-        }
-        ensure!(begun.elapsed() < GUARD, "the service does not come to rest");
-        tokio::time::sleep(Duration::from_millis(5)).await;
-    }
 }
 
 /// Results that are left before they are removed, as whoever fetches them does; else hours

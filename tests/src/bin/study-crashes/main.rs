@@ -20,14 +20,22 @@ use anyhow::{Context, Result, ensure};
 use clap::Parser;
 use relief_api::{Scan, ScanState, StartScan, path};
 use relief_tests::mutations::Dice;
-use relief_tests::rig::small_house;
+use relief_tests::rig::{Program, small_house};
 use sim_scanner::config::SimConfig;
 use sim_scanner::control::Control;
 use sim_scanner::device::{DeviceSettings, Event as Happened};
 
 use figures::{Figures, Phase};
 use promises::Promises;
-use service::{Heard, Program};
+use service::Heard;
+
+/// The scanner is soon ready for the next after its host was killed.
+const SETTINGS: &str = "\
+request_timeout_ms = 200
+dead_man_ms = 600
+[log]
+level = \"warn\"
+format = \"text\"";
 
 /// Kill the service at random moments of scan and job
 #[derive(Debug, Parser)]
@@ -101,7 +109,7 @@ async fn run(options: &Options) -> Result<()> {
             .of(point)
             .mul_f64(1.2 * dice.below(1_000) as f64 / 1_000.0);
         let wait_for_jobs = dice.once_in(2);
-        let mut service = Program::start(&program, folder.path(), scanner.port())?;
+        let mut service = Program::start(&program, folder.path(), scanner.port(), SETTINGS)?;
         let mut round = Round::default();
         live(
             &mut service,
@@ -130,10 +138,10 @@ async fn run(options: &Options) -> Result<()> {
             .with_context(|| format!("after kill {kill}"))?;
 
         if kill % 10 == 0 || kill == options.kills {
-            let mut service = Program::start(&program, folder.path(), scanner.port())?;
+            let mut service = Program::start(&program, folder.path(), scanner.port(), SETTINGS)?;
             service.ready().await?;
             promises
-                .check(&service.client)
+                .check(service.client())
                 .await
                 .with_context(|| format!("after kill {kill}"))?;
             service.end()?;
@@ -190,7 +198,7 @@ impl Pace {
         promises: &mut Promises,
     ) -> Result<Self> {
         let begun = Instant::now();
-        let mut service = Program::start(program, folder, port)?;
+        let mut service = Program::start(program, folder, port, SETTINGS)?;
         let mut round = Round::default();
         live(&mut service, promises, &mut round, Point::Started, true).await?;
         service.ready().await?;
@@ -261,7 +269,7 @@ async fn live(
     if wait_for_jobs {
         service.idle().await?;
     }
-    let mut heard = Heard::listen(&service.client).await?;
+    let mut heard = Heard::listen(service.client()).await?;
     let scan = start_scan(service).await?;
     promises.accepted(&scan);
     let id = scan.id.clone();
@@ -287,7 +295,7 @@ async fn start_scan(service: &Program) -> Result<Scan> {
     };
     let mut tries = 0;
     loop {
-        match service.client.post(path::SCANS, &request).await {
+        match service.client().post(path::SCANS, &request).await {
             Err(error) if tries < 200 => {
                 tries += 1;
                 tokio::time::sleep(Duration::from_millis(20)).await;

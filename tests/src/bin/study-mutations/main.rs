@@ -2,6 +2,7 @@
 //!
 //! ```sh
 //! cargo xtask study mutations --files 10000
+//! cargo xtask study mutations --worst 16
 //! ```
 
 use std::process::ExitCode;
@@ -43,6 +44,10 @@ struct Options {
     /// Write the file of this number to standard output, and end
     #[arg(long, value_name = "N")]
     show: Option<u64>,
+    /// Instead: read files of so many megabytes that are made to take as long, and as much
+    /// memory, as they can
+    #[arg(long, value_name = "MB")]
+    worst: Option<f64>,
 }
 
 fn main() -> ExitCode {
@@ -62,6 +67,9 @@ fn run(options: &Options) -> Result<()> {
             &mut std::io::stdout(),
             &mutant.bytes,
         )?);
+    }
+    if let Some(size_mb) = options.worst {
+        return worst((size_mb * 1e6) as usize);
     }
     let wanted = Wanted {
         first: options.first,
@@ -84,6 +92,34 @@ fn run(options: &Options) -> Result<()> {
         bytes <= MOST_BYTES,
         "file {number} took {bytes} bytes of memory"
     );
+    Ok(())
+}
+
+/// Reads the worst files of a size, and tells what each took.
+fn worst(size: usize) -> Result<()> {
+    println!(
+        "{:<44} {:>7} {:>7} {:>8} READER THAT TOOK LONGEST, AND WHAT CAME OF IT",
+        "FILE", "MB", "CPU S", "MB TAKEN"
+    );
+    let all = mutations::worst(size, &Memory, |one| {
+        println!(
+            "{:<44} {:>7.3} {:>7.2} {:>8.1} {}: {:.90}",
+            one.name,
+            one.bytes as f64 / 1e6,
+            one.took.as_secs_f64(),
+            one.peak_bytes as f64 / 1e6,
+            one.reader,
+            one.said
+        );
+    })?;
+    for one in all {
+        ensure!(
+            one.peak_bytes <= MOST_BYTES,
+            "{} took {} bytes of memory",
+            one.name,
+            one.peak_bytes
+        );
+    }
     Ok(())
 }
 

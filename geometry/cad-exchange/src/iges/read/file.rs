@@ -1,5 +1,6 @@
 //! The middle layer: directory entries and the parameter records they point to.
 
+use std::cell::Cell;
 use std::io::Read;
 use std::ops::Range;
 
@@ -12,6 +13,12 @@ use super::values::{Value, next_value, parse_real};
 const PARAMETER_COLUMNS: usize = 64;
 /// Columns of a field of a directory entry.
 const FIELD_COLUMNS: usize = 8;
+/// How often the Parameter section may be read, on average over its lines. Once is what most
+/// files need; edges, colours and names that entities share are read again for each.
+/// Pointers could else make a short file take any time and memory.
+const MOST_READINGS: usize = 8;
+/// Lines that may be read beyond that, so that files of a few lines are free to share them.
+const SPARE_LINES: usize = 1000;
 /// Types of entities that a message lists one by one.
 const LISTED_TYPES: usize = 5;
 
@@ -44,6 +51,8 @@ pub(super) struct File {
     lines: Lines,
     pub(super) global: Global,
     pub(super) entities: Vec<Entity>,
+    /// Lines of the Parameter section that may still be read.
+    lines_left: Cell<usize>,
 }
 
 impl File {
@@ -63,10 +72,14 @@ impl File {
         let entities = (0..count / 2)
             .map(|index| entity(&lines, index))
             .collect::<Result<Vec<_>, _>>()?;
+        let most_lines = lines
+            .count(Section::Parameter)
+            .saturating_mul(MOST_READINGS);
         Ok(Self {
             lines,
             global,
             entities,
+            lines_left: Cell::new(most_lines.saturating_add(SPARE_LINES)),
         })
     }
 
@@ -94,6 +107,7 @@ impl File {
         }
         let announced = usize::try_from(entity.parameter_lines).unwrap_or(0);
         record.line = first - 1;
+        record.pay(1)?;
         // Writers that leave the count out still end their records.
         record.end = if announced == 0 {
             count
@@ -224,6 +238,21 @@ impl<'a> Record<'a> {
         }
     }
 
+    /// Takes lines off what may still be read of the file.
+    fn pay(&self, lines: usize) -> Result<(), ReadError> {
+        let left = &self.file.lines_left;
+        match left.get().checked_sub(lines) {
+            Some(rest) => {
+                left.set(rest);
+                Ok(())
+            }
+            None => Err(self.defect(format!(
+                "so many entities share their parameters that reading them all would take the \
+                 file's Parameter section more than {MOST_READINGS} times over"
+            ))),
+        }
+    }
+
     /// The next value; empty ones for ever after the last.
     fn value(&mut self) -> Result<Value, ReadError> {
         if self.ended {
@@ -245,8 +274,10 @@ impl<'a> Record<'a> {
             None
         };
         let result = next_value(next, self.file.global.delimiters);
+        let passed = line - self.line;
         (self.line, self.column) = (line, column);
         let (value, last) = result.map_err(|reason| self.defect(reason))?;
+        self.pay(passed)?;
         self.ended = last;
         Ok(value)
     }

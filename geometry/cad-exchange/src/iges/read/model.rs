@@ -168,6 +168,9 @@ fn name(file: &File, record: &mut Record<'_>) -> Result<Option<String>, ReadErro
     }
     for _ in 0..record.count("the number of its associativities")? {
         record.integer("an associativity")?;
+        if record.ended() {
+            return Ok(None);
+        }
     }
     for _ in 0..record.count("the number of its properties")? {
         let pointer = record.integer("a property")?;

@@ -22,7 +22,7 @@ const MOST_POINTS: usize = 1 << 24;
 /// measured points.
 pub fn read_points(source: impl Read) -> Result<Vec<[f64; 3]>, ReadError> {
     let file = File::read(source)?;
-    let mut points = Vec::new();
+    let (mut points, mut matrices) = (Vec::new(), transform::Known::default());
     for entity in &file.entities {
         if !is_measured(entity) {
             continue;
@@ -33,7 +33,7 @@ pub fn read_points(source: impl Read) -> Result<Vec<[f64; 3]>, ReadError> {
             116 => points.push(file.record(entity)?.reals("a coordinate")?),
             _ => continue,
         }
-        let matrix = transform::of(&file, entity)?;
+        let matrix = matrices.of(&file, entity)?;
         for point in points.iter_mut().skip(from) {
             if let Some(matrix) = &matrix {
                 *point = transform::apply(matrix, *point);

@@ -1,5 +1,7 @@
 //! Transformation matrices, entity 124.
 
+use std::collections::HashMap;
+
 use super::error::ReadError;
 use super::file::{Entity, File};
 
@@ -9,14 +11,31 @@ const MAX_CHAIN: usize = 32;
 /// Three rows of a rotation and a shift: `p' = R p + T`.
 pub(super) type Matrix = [[f64; 4]; 3];
 
-/// The matrix that takes an entity to model space; `None` where it is there already.
-pub(super) fn of(file: &File, entity: &Entity) -> Result<Option<Matrix>, ReadError> {
+/// Matrices to model space, by the pointers to them: each is read once, however many
+/// entities it moves.
+#[derive(Debug, Default)]
+pub(super) struct Known(HashMap<i64, Matrix>);
+
+impl Known {
+    /// The matrix that takes an entity to model space; `None` where it is there already.
+    pub(super) fn of(&mut self, file: &File, entity: &Entity) -> Result<Option<Matrix>, ReadError> {
+        if entity.transformation == 0 {
+            return Ok(None);
+        }
+        if let Some(known) = self.0.get(&entity.transformation) {
+            return Ok(Some(*known));
+        }
+        let total = chain(file, entity)?;
+        self.0.insert(entity.transformation, total);
+        Ok(Some(total))
+    }
+}
+
+/// The product of an entity's matrix and those that this one refers to.
+fn chain(file: &File, entity: &Entity) -> Result<Matrix, ReadError> {
     let mut total: Option<Matrix> = None;
     let mut current = entity;
     for _ in 0..MAX_CHAIN {
-        if current.transformation == 0 {
-            return Ok(total);
-        }
         let matrix = file
             .entity(current.transformation)
             .filter(|matrix| matrix.entity == 124)
@@ -32,7 +51,11 @@ pub(super) fn of(file: &File, entity: &Entity) -> Result<Option<Matrix>, ReadErr
         for (row, values) in next.iter_mut().zip(values.chunks(4)) {
             row.copy_from_slice(values);
         }
-        total = Some(total.map_or(next, |inner| after(&next, &inner)));
+        let product = total.map_or(next, |inner| after(&next, &inner));
+        if matrix.transformation == 0 {
+            return Ok(product);
+        }
+        total = Some(product);
         current = matrix;
     }
     Err(file.defect(
