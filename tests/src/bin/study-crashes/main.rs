@@ -52,6 +52,9 @@ struct Options {
     reliefd: Option<PathBuf>,
 }
 
+/// Of so many kills some fall everywhere.
+const MANY: u32 = 100;
+
 fn main() -> ExitCode {
     let options = Options::parse();
     let study = || -> Result<()> {
@@ -100,7 +103,7 @@ async fn run(options: &Options) -> Result<()> {
     let mut promises = Promises::new(folder.path());
     let mut figures = Figures::default();
 
-    let pace = Pace::measure(&program, folder.path(), scanner.port(), &mut promises).await?;
+    let mut pace = Pace::measure(&program, folder.path(), scanner.port(), &mut promises).await?;
     for kill in 1..=options.kills {
         control.skip_events();
         let point = Point::draw(&mut dice);
@@ -145,10 +148,15 @@ async fn run(options: &Options) -> Result<()> {
                 .await
                 .with_context(|| format!("after kill {kill}"))?;
             service.end()?;
+            // Other work on the machine comes and goes.
+            pace = Pace::measure(&program, folder.path(), scanner.port(), &mut promises).await?;
             eprintln!("kill {kill}: {} scans, all is well", promises.scans());
         }
     }
     figures.tell();
+    if options.kills >= MANY {
+        figures.check()?;
+    }
     let (scans, columns, results) = (promises.scans(), promises.columns(), promises.results());
     println!(
         "{scans} scans, {columns} acknowledged columns, {results} results: nothing lost, \
