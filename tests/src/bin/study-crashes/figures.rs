@@ -13,7 +13,7 @@ pub(crate) enum Phase {
     Scan,
     /// The scan had ended before its last column, without a kill.
     Failed,
-    /// All columns were acknowledged and no result was told.
+    /// All columns were kept and no result was told.
     Job,
     /// The result had been told.
     Published,

@@ -238,6 +238,8 @@ impl Pace {
 struct Round {
     scan: Option<Scan>,
     heard: Option<Heard>,
+    /// The scan ended with its last column.
+    complete: bool,
     /// The scan ended, and not with its last column.
     failed: bool,
 }
@@ -256,6 +258,9 @@ impl Round {
             None => Phase::Starting,
             Some(_) if self.failed => Phase::Failed,
             Some(scan) if promises.is_published(&scan.id) => Phase::Published,
+            // The service need not tell the scanner that the last column is safe: it ends the
+            // scan instead.
+            Some(_) if self.complete => Phase::Job,
             Some(scan) if acknowledged >= scan.columns_planned => Phase::Job,
             Some(_) => Phase::Scan,
         }
@@ -286,7 +291,8 @@ async fn live(
         let over = heard.over(&id).await?;
         // On a machine that is busy with other things the scanner may give its host up. Its
         // columns are promised all the same.
-        round.failed = over.state != ScanState::Complete;
+        round.complete = over.state == ScanState::Complete;
+        round.failed = !round.complete;
     }
     round.heard = Some(heard);
     if point == Point::Published && !round.failed {
