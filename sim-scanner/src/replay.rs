@@ -312,4 +312,18 @@ mod tests {
             .collect();
         assert_eq!(places, [100_000, 75_000, 50_000, 25_000, 0]);
     }
+
+    #[test]
+    fn only_what_is_evenly_spaced_is_sent_as_such() {
+        let (_, replay) = recording();
+        assert!(!replay.is_uniform());
+        let mut uneven = replay.clone();
+        assert!(
+            replay
+                .into_uniform()
+                .is_some_and(|replay| replay.is_uniform())
+        );
+        uneven.columns[3].samples[7].lateral_counts += 1;
+        assert!(uneven.into_uniform().is_none());
+    }
 }

@@ -45,6 +45,12 @@ impl Row {
         100.0 * part.as_secs_f64() / self.took.as_secs_f64()
     }
 
+    /// Columns in a second.
+    #[must_use]
+    pub fn columns_per_s(&self) -> f64 {
+        self.rate(self.columns as f64)
+    }
+
     /// Bytes on the wire in a second.
     #[must_use]
     pub fn bytes_per_s(&self) -> f64 {
@@ -67,7 +73,7 @@ impl fmt::Display for Row {
             "| {} | {} | {encoding} | {rate} | {:.0} | {:.0} | {:.0} | {:.0} % | {:.0} % | {:.0} % | {} |",
             self.way,
             self.case.samples,
-            self.rate(self.columns as f64),
+            self.columns_per_s(),
             self.rate(self.samples as f64),
             self.bytes_per_s() / 1e3,
             self.share(self.device_waited),

@@ -10,6 +10,26 @@ fn rows<T: Display>(rows: &[T]) -> String {
     rows.iter().map(|row| format!("{row}\n")).collect()
 }
 
+/// How the pseudo-terminal compares with memory where nothing else sets the pace.
+fn compared(ways: &[throughput::Row]) -> String {
+    let fast = |way: &str| -> Vec<&throughput::Row> {
+        let wanted = |row: &&throughput::Row| row.way == way && row.case.line_rate_hz.is_none();
+        ways.iter().filter(wanted).collect()
+    };
+    let (memory, terminal) = (fast("memory"), fast("pseudo-terminal"));
+    let ratios = terminal
+        .iter()
+        .zip(&memory)
+        .map(|(terminal, memory)| 100.0 * terminal.columns_per_s() / memory.columns_per_s());
+    let (low, high) = ratios.fold((f64::INFINITY, 0.0_f64), |(low, high), ratio| {
+        (low.min(ratio), high.max(ratio))
+    });
+    format!(
+        "As fast as it goes, the pseudo-terminal carries {low:.0} to {high:.0} % of the columns that \
+         memory does."
+    )
+}
+
 pub(crate) fn page(usb: &str, ways: &[throughput::Row], disks: &[disk::Row]) -> String {
     format!(
         "# Throughput and backpressure\n\n\
@@ -38,6 +58,7 @@ pub(crate) fn page(usb: &str, ways: &[throughput::Row], disks: &[disk::Row]) -> 
          {usb}\n\
          ## Without USB, on the machine itself\n\n\
          {TABLE_HEAD}\n{}\n\
+         {}\n\n\
          ## A slow disk\n\n\
          A scan through the service, over a pseudo-terminal, on a disk that takes so much longer for \
          each sync of the journal. One sync serves 8 columns (`journal.sync_columns`) or what came in \
@@ -46,6 +67,7 @@ pub(crate) fn page(usb: &str, ways: &[throughput::Row], disks: &[disk::Row]) -> 
          header, which holds name and time, differs from that on the quick disk in a byte.\n\n\
          {}\n{}",
         rows(ways),
+        compared(ways),
         disk::TABLE_HEAD,
         rows(disks)
     )
