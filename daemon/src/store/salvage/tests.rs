@@ -186,6 +186,6 @@ fn what_was_read_of_damaged_records_survives_a_start_that_is_cut_short() {
     let store = open(&path).unwrap();
     assert_eq!(kept_scans(&store).len(), SCANS_KEPT - 1);
     assert_eq!(store.jobs().unwrap(), all_jobs());
-    let beside = fs::read_dir(folder.path()).unwrap().count();
-    assert_eq!(beside, 2, "the records, and the damaged ones");
+    let files = fs::read_dir(folder.path()).unwrap().count();
+    assert_eq!(files, 3, "the records, their lock, and the damaged ones");
 }

@@ -144,14 +144,12 @@ async fn story() -> Story {
     }
 }
 
-/// Starts the service once more, to whom the first result is too old.
+/// Starts the service once more, to whom the results are too large: the oldest has to go.
 async fn retire(folder: &Path, result: &str, recorder: &Recorder) {
     let mut config = config(folder);
-    config.storage.results_days = Some(1);
+    config.storage.results_mb = Some(1);
     let place = config.service.spool_dir.join(result);
-    let long_ago = std::time::SystemTime::now() - std::time::Duration::from_secs(100 * 86_400);
-    let times = fs::FileTimes::new().set_modified(long_ago);
-    fs::File::open(&place).unwrap().set_times(times).unwrap();
+    fs::write(place.join("padding"), vec![1; 2_000_000]).unwrap();
     recorder.tell(Told::Retired(result.to_owned()));
     let disk = Arc::new(recorder.clone());
     let daemon = Daemon::start_on(config, FakeScanner::new(), disk);
