@@ -4,8 +4,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use pipeline::{
-    Method, NodeRole, Observer, PipelineError, Settings, Stage, View, divide, process,
-    process_columns,
+    Basis, Method, NodeRole, Observer, Outcome, PipelineError, Settings, Stage, View, divide,
+    process, process_columns,
 };
 use range_image::{Column, Lattice, Monitor, RangeImage, Sample, Unmonitored};
 
@@ -87,6 +87,15 @@ fn a_range_image_alone_is_not_regridded() {
     assert_eq!(from_image.stages, [Stage::Segment, Stage::Reconstruct]);
     assert_eq!(from_image.regions, with_columns.regions);
     assert_eq!(from_image.reconstruction, with_columns.reconstruction);
+    let basis = |outcome: &Outcome| {
+        outcome
+            .kinds
+            .iter()
+            .map(|kind| kind.basis)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(basis(&from_image), [Basis::Nodes; 2]);
+    assert_eq!(basis(&with_columns), [Basis::Samples; 2]);
 }
 
 #[test]

@@ -24,5 +24,5 @@ mod uncertainty;
 pub use evidence::{Candidate, Evidence, Verdict, decide};
 pub use fit::{Fit, Sample, fit};
 pub use shape::{Cone, Cylinder, Family, Plane, Shape, Sphere, Torus};
-pub use spread::spread;
+pub use spread::{is_in_share, spread};
 pub use uncertainty::{Measured, Numbers, Spread};

@@ -1,17 +1,25 @@
 //! A few of many.
 
+/// The golden section of the unit, whose multiples fall as evenly as can be.
+const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
+
 /// Indices of at most `most` among `count` things, ascending and evenly spread, one from each
 /// of as many equal stretches. They are in step with nothing: samples come row by row, and
 /// each so-manieth of them would be of one row.
 pub fn spread(count: usize, most: usize) -> impl Iterator<Item = usize> {
-    /// The golden section of the unit, whose multiples fall as evenly as can be.
-    const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
     let few = most.min(count);
     (0..few).map(move |k| {
         let [first, next] = [k, k + 1].map(|k| (k as u128 * count as u128 / few as u128) as usize);
         let turn = u128::from((k as u64).wrapping_mul(GOLDEN));
         first + ((turn * (next - first) as u128) >> 64) as usize
     })
+}
+
+/// Whether this index is of the share of all that so many halvings leave: for when it is not
+/// known beforehand how many there are. Each share holds the next, and is as evenly spread.
+#[must_use]
+pub fn is_in_share(index: u64, halvings: u32) -> bool {
+    index.wrapping_mul(GOLDEN).leading_zeros() >= halvings
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use range_image::{Column, Monitor, RangeImage, RegionMap};
-use shapes::Sample;
+use shapes::{Sample, is_in_share};
 
 use super::Bearing;
 use super::neighbourhood::{DEEPEST, depth, rise};
@@ -76,28 +76,16 @@ struct Thinned {
 
 impl Thinned {
     fn push(&mut self, sample: Sample) {
-        if self.keeps(self.seen) {
+        if is_in_share(self.seen, self.halvings) {
             self.kept.push((self.seen, sample));
         }
         self.seen += 1;
         if self.kept.len() == 2 * MOST {
             self.halvings += 1;
             let halvings = self.halvings;
-            self.kept.retain(|(index, _)| is_kept(*index, halvings));
+            self.kept.retain(|(index, _)| is_in_share(*index, halvings));
         }
     }
-
-    fn keeps(&self, index: u64) -> bool {
-        is_kept(index, self.halvings)
-    }
-}
-
-/// Whether the share that so many halvings leave has the sample of this number. In step with
-/// nothing: samples come row by row.
-fn is_kept(index: u64, halvings: u32) -> bool {
-    /// The golden section of the unit, whose multiples fall as evenly as can be.
-    const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
-    index.wrapping_mul(GOLDEN).leading_zeros() >= halvings
 }
 
 /// What the range image says of places between nodes.
@@ -231,4 +219,43 @@ fn deviation_mm(image: &RangeImage, regions: &RegionMap, column: usize, row: usi
         }
     }
     sum / count.max(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_of_many_samples_is_evenly_spread() {
+        let mut thinned = Thinned::default();
+        let count = 9 * MOST as u64;
+        for x in 0..count {
+            thinned.push(Sample {
+                point_mm: Vector3::new(x as f64, 0.0, 0.0),
+                ray: Vector3::z(),
+                sigma_mm: 1.0,
+            });
+        }
+        assert_eq!(thinned.seen, count);
+        assert!((MOST..2 * MOST).contains(&thinned.kept.len()));
+        assert!(
+            thinned
+                .kept
+                .iter()
+                .all(|(x, sample)| sample.point_mm.x == *x as f64)
+        );
+        // From the first to the last, and of every row of 256.
+        let gaps = thinned.kept.windows(2).map(|pair| pair[1].0 - pair[0].0);
+        assert!(gaps.max() < Some(40));
+        let mut of_row = [0; 256];
+        for (index, _) in &thinned.kept {
+            of_row[(index % 256) as usize] += 1;
+        }
+        let even = thinned.kept.len() / 256;
+        assert!(
+            of_row
+                .iter()
+                .all(|count| (even / 2..2 * even).contains(count))
+        );
+    }
 }
