@@ -67,43 +67,40 @@ impl Service {
     ) -> Result<Promise, ServiceError> {
         let reserve_bytes = self.config().storage.reserve_bytes();
         let journal_bytes = scan_record::most_bytes(columns, samples.into());
-        let journal = self.journal_path(scan);
-        let promise = self
-            .promises
-            .make(journal, journal_bytes, |promised_bytes| {
-                let look = || {
-                    let folders = [
-                        (self.scans_dir(), journal_bytes, promised_bytes),
-                        (self.spool.root(), 0, 0),
-                    ];
-                    let mut folders = folders.into_iter();
-                    folders.try_for_each(|(folder, scan_bytes, promised_bytes)| {
-                        let needed = scan_bytes
-                            .saturating_add(promised_bytes)
-                            .saturating_add(reserve_bytes);
-                        match self.disk.free_bytes(folder) {
-                            Ok(Some(free_bytes)) if free_bytes < needed => {
-                                Err(ServiceError::NoRoom {
-                                    folder: folder.display().to_string(),
-                                    scan_bytes,
-                                    reserve_bytes,
-                                    free_bytes,
-                                    promised_bytes,
-                                })
-                            }
-                            Ok(_) => Ok(()),
-                            Err(source) => Err(ServiceError::Io {
-                                what: format!("the free space of {}", folder.display()),
-                                source,
-                            }),
-                        }
-                    })
-                };
-                look().or_else(|_| {
-                    self.sweep();
-                    look()
-                })
-            });
+        let look = |promised_bytes| {
+            let folders = [
+                (self.scans_dir(), journal_bytes, promised_bytes),
+                (self.spool.root(), 0, 0),
+            ];
+            let mut folders = folders.into_iter();
+            folders.try_for_each(|(folder, scan_bytes, promised_bytes)| {
+                let needed = scan_bytes
+                    .saturating_add(promised_bytes)
+                    .saturating_add(reserve_bytes);
+                match self.disk.free_bytes(folder) {
+                    Ok(Some(free_bytes)) if free_bytes < needed => Err(ServiceError::NoRoom {
+                        folder: folder.display().to_string(),
+                        scan_bytes,
+                        reserve_bytes,
+                        free_bytes,
+                        promised_bytes,
+                    }),
+                    Ok(_) => Ok(()),
+                    Err(source) => Err(ServiceError::Io {
+                        what: format!("the free space of {}", folder.display()),
+                        source,
+                    }),
+                }
+            })
+        };
+        let make = || {
+            let journal = self.journal_path(scan);
+            self.promises.make(journal, journal_bytes, look)
+        };
+        let promise = make().or_else(|_| {
+            self.sweep();
+            make()
+        });
         self.measure_free();
         promise
     }

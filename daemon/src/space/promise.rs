@@ -33,7 +33,8 @@ impl Drop for Promise {
 
 impl Promises {
     /// Makes a promise, unless `check` refuses it; it is given the bytes that earlier ones may
-    /// still take. One at a time, so that no two are given the same room.
+    /// still take. One at a time, so that no two are given the same room; so `check` must not
+    /// wait for anything whose holder may just let go of a promise, as a scan's slot.
     pub(crate) fn make(
         self: &Arc<Self>,
         journal: PathBuf,
