@@ -7,19 +7,22 @@ use relief_api::{LaserLog, ScannerList, ScannerSummary};
 use super::problem::Refusal;
 use super::{Context, blocking};
 
-pub(super) async fn list(State(context): State<Context>) -> Json<ScannerList> {
-    Json(context.service.scanners())
+// All wait for whoever just writes a record, or a line to the log of a laser.
+
+pub(super) async fn list(State(context): State<Context>) -> Result<Json<ScannerList>, Refusal> {
+    let scanners = blocking(context, |service| Ok(service.scanners()));
+    scanners.await.map(Json)
 }
 
 pub(super) async fn get(
     State(context): State<Context>,
     Path(scanner): Path<String>,
 ) -> Result<Json<ScannerSummary>, Refusal> {
-    let station = context.service.station(&scanner)?;
-    Ok(Json(station.summary()))
+    let summary = blocking(context, move |service| {
+        Ok(service.station(&scanner)?.summary())
+    });
+    summary.await.map(Json)
 }
-
-// Both wait for whoever just writes a line to the log of a laser.
 
 /// The lasers of all scanners.
 pub(super) async fn lasers(State(context): State<Context>) -> Result<Json<LaserLog>, Refusal> {
