@@ -136,7 +136,9 @@ impl Service {
         tracing::error!(job = job.id, scan = %job.scan, %error, "a job is given up");
         job.error = Some(error);
         job.hint = Some(format!(
-            "look in the service's log for why it ended: if it ran out of memory, rerun the scan              with a larger regrid.pitch_mm; if the power failed or it was killed, try again with              `relief retry {}`",
+            "look in the service's log for why it ended: if it ran out of memory, rerun the scan \
+             with a larger regrid.pitch_mm; if the power failed or it was killed, try again with \
+             `relief retry {}`",
             job.id
         ));
         Ok(self.store.put_job(job)?)
