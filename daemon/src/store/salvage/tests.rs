@@ -2,7 +2,7 @@ use std::io;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
-use storage::{DiskFile, LocalDisk};
+use storage::{Deed, HinderedDisk, Hindrance, LocalDisk};
 
 use super::*;
 use crate::store::Store;
@@ -132,43 +132,15 @@ fn a_page_that_cannot_be_read_costs_what_is_on_it() {
 }
 
 /// Refuses to give a file this name, as if the power failed before.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Refusing(PathBuf);
 
-impl Disk for Refusing {
-    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
-        LocalDisk.create(path)
-    }
-
-    fn open(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
-        LocalDisk.open(path)
-    }
-
-    fn create_dir(&self, path: &Path) -> io::Result<()> {
-        LocalDisk.create_dir(path)
-    }
-
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        if to == self.0 {
+impl Hindrance for Refusing {
+    fn before(&self, deed: Deed, path: &Path) -> io::Result<()> {
+        if deed == Deed::Rename && path == self.0 {
             return Err(io::ErrorKind::Interrupted.into());
         }
-        LocalDisk.rename(from, to)
-    }
-
-    fn remove_file(&self, path: &Path) -> io::Result<()> {
-        LocalDisk.remove_file(path)
-    }
-
-    fn remove_dir_all(&self, path: &Path) -> io::Result<()> {
-        LocalDisk.remove_dir_all(path)
-    }
-
-    fn sync_dir(&self, path: &Path) -> io::Result<()> {
-        LocalDisk.sync_dir(path)
-    }
-
-    fn free_bytes(&self, path: &Path) -> io::Result<Option<u64>> {
-        LocalDisk.free_bytes(path)
+        Ok(())
     }
 }
 
@@ -181,7 +153,7 @@ fn what_was_read_of_damaged_records_survives_a_start_that_is_cut_short() {
         bytes[at] = b'x';
     }
     fs::write(&path, bytes).unwrap();
-    Store::open(Arc::new(Refusing(path.clone())), &path).unwrap_err();
+    Store::open(Arc::new(HinderedDisk(Refusing(path.clone()))), &path).unwrap_err();
     assert!(!path.exists(), "it was cut short elsewhere");
     let store = open(&path).unwrap();
     assert_eq!(kept_scans(&store).len(), SCANS_KEPT - 1);

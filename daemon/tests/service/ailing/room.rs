@@ -140,20 +140,29 @@ async fn the_oldest_scans_go_when_all_take_more_than_they_may() {
     rig.daemon.shutdown().await;
 }
 
-/// Changes a scan's record behind the back of a service that has ended.
-fn change_record(folder: &Path, scan: &str, change: impl FnOnce(&mut serde_json::Value)) {
-    let table = redb::TableDefinition::<&str, &[u8]>::new("scans");
+/// Changes a record behind the back of a service that has ended.
+fn change_record<'k, K: redb::Key + 'static>(
+    folder: &Path,
+    table: &str,
+    key: K::SelfType<'k>,
+    change: impl FnOnce(&mut serde_json::Value),
+) {
+    let table = redb::TableDefinition::<K, &[u8]>::new(table);
     let records = redb::Database::open(folder.join("state/reliefd.redb")).unwrap();
     let transaction = records.begin_write().unwrap();
     {
-        let mut scans = transaction.open_table(table).unwrap();
-        let kept = scans.get(scan).unwrap().unwrap().value().to_vec();
+        let mut rows = transaction.open_table(table).unwrap();
+        let kept = rows.get(&key).unwrap().unwrap().value().to_vec();
         let mut kept: serde_json::Value = serde_json::from_slice(&kept).unwrap();
         change(&mut kept["record"]);
         let kept = serde_json::to_vec(&kept).unwrap();
-        scans.insert(scan, kept.as_slice()).unwrap();
+        rows.insert(&key, kept.as_slice()).unwrap();
     }
     transaction.commit().unwrap();
+}
+
+fn year_ago() -> String {
+    (jiff::Timestamp::now() - jiff::SignedDuration::from_hours(24 * 365)).to_string()
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -165,9 +174,8 @@ async fn a_journal_that_is_put_back_can_be_run_again_and_is_as_young_as_that() {
     std::fs::copy(&journal, &aside).unwrap();
     rig.daemon.shutdown().await;
     // As if it had been taken a year ago.
-    let year_ago =
-        (jiff::Timestamp::now() - jiff::SignedDuration::from_hours(24 * 365)).to_string();
-    change_record(rig.folder.path(), &scan.id, |record| {
+    let year_ago = year_ago();
+    change_record::<&str>(rig.folder.path(), "scans", &scan.id, |record| {
         record["ended_at"] = year_ago.clone().into();
     });
     let month = |config: &mut reliefd::Config| config.storage.scans_days = Some(30);
@@ -227,5 +235,21 @@ async fn the_oldest_results_go_when_all_take_more_than_they_may() {
     assert!(kept.removed_at.is_none() && rig.journal(&old.id).exists());
     let status: Status = rig.client.get(path::STATUS).await;
     assert_eq!(status.jobs_queued + status.jobs_running, 0);
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn results_go_when_their_days_are_over() {
+    let rig = Rig::new().await;
+    let (old, job) = rig.scan_to_result("a").await;
+    let (new, _) = rig.scan_to_result("b").await;
+    rig.daemon.shutdown().await;
+    change_record::<u64>(rig.folder.path(), "jobs", job.id, |record| {
+        record["ended_at"] = year_ago().into();
+    });
+    let rig = Rig::start(rig.folder, |config| config.storage.results_days = Some(30)).await;
+    let folder = |scan: &Scan| rig.daemon.spool_dir().join(&scan.id);
+    assert!(!folder(&old).exists() && folder(&new).exists());
+    assert!(rig.journal(&old.id).exists());
     rig.daemon.shutdown().await;
 }
