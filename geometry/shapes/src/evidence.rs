@@ -8,7 +8,7 @@
 
 use nalgebra::SVector;
 
-use crate::fit::{ACROSS, Fit, Sample, fit};
+use crate::fit::{ACROSS, Fit, Sample, finished, found};
 use crate::robust;
 use crate::shape::Family;
 use crate::start::Frame;
@@ -51,6 +51,9 @@ const PER_NUMBER: f64 = 3.0;
 const MOST: f64 = 4.0;
 /// How much better a polynomial must be than a shape not to be one by chance.
 const DOUBT: f64 = 5.0;
+/// A shape that leaves so many times as much as another surface where some of the samples have
+/// led it is not fitted to all: they would not make up for it.
+const HOPELESS: f64 = 3.0;
 /// What each number costs above its price, so that of a hundred planes not one gets a radius
 /// from its noise.
 const CAUTION: f64 = 4.0;
@@ -69,10 +72,12 @@ pub fn decide(samples: &[Sample], area: f64) -> Evidence {
     for family in Family::ALL {
         if enough(family.freedom())
             && scale.leaves_room(family.freedom())
-            && let Some(fit) = fit(family, samples, area)
+            && let Some(found) = found(family, samples)
+            && scale.leaves_hope(found.offs(samples).collect())
+            && let Some(fit) = finished(found, samples, area)
         {
             scale.surfaces.push(Surface {
-                off: samples.iter().map(|sample| fit.off(sample)).collect(),
+                off: fit.offs(samples).collect(),
                 freedom: family.freedom(),
                 fit: Some(fit),
             });
@@ -85,7 +90,8 @@ pub fn decide(samples: &[Sample], area: f64) -> Evidence {
         found.map(|(candidate, _)| candidate.score)
     };
     let verdict = match (best(true), best(false)) {
-        (None, _) => Verdict::Unknown,
+        (None, None) => Verdict::Unknown,
+        (None, Some(_)) => Verdict::FreeForm,
         (Some(shape), Some(other)) if other + DOUBT < shape => Verdict::FreeForm,
         _ => scored
             .iter()
@@ -125,17 +131,25 @@ impl Scale {
     /// for all their freedom.
     fn leaves_room(&self, freedom: usize) -> bool {
         let most = self.most();
-        let mut best = f64::INFINITY;
-        let mut floor = f64::INFINITY;
-        for surface in &self.surfaces {
-            let left = surface.left(most);
-            if surface.fit.is_some() {
-                best = best.min(self.score(left, surface.freedom));
-            }
-            let spared = 1.0 - surface.freedom as f64 / self.independent;
-            floor = floor.min(left / spared);
-        }
-        best > self.score(floor, freedom)
+        let shapes = self.surfaces.iter().filter(|surface| surface.fit.is_some());
+        let scores = shapes.map(|shape| self.score(shape.left(most), shape.freedom));
+        scores.fold(f64::INFINITY, f64::min) > self.score(self.floor(most), freedom)
+    }
+
+    /// The least that any of the surfaces leaves, were it not for its freedom.
+    fn floor(&self, most: f64) -> f64 {
+        let spared = |freedom| 1.0 - freedom as f64 / self.independent;
+        let surfaces = self.surfaces.iter();
+        let left = surfaces.map(|surface| surface.left(most) / spared(surface.freedom));
+        left.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether a shape that lies so far off the samples could be the best once it is fitted to all
+    /// of them.
+    fn leaves_hope(&self, off: Vec<f64>) -> bool {
+        let most = self.most();
+        let floor = self.floor(most).max(robust::LEAST_SCATTER.powi(2));
+        left(&off, most) <= HOPELESS * floor
     }
 
     fn scored(&self) -> Vec<(Candidate, Option<&Fit>)> {
@@ -165,11 +179,15 @@ impl Surface {
         robust::deviation(self.off.iter().copied())
     }
 
-    /// Mean of the squares, each up to a most.
     fn left(&self, most: f64) -> f64 {
-        let squares = self.off.iter().map(|off| off.abs().min(most).powi(2));
-        squares.sum::<f64>() / self.off.len() as f64
+        left(&self.off, most)
     }
+}
+
+/// Mean of the squares, each up to a most.
+fn left(off: &[f64], most: f64) -> f64 {
+    let squares = off.iter().map(|off| off.abs().min(most).powi(2));
+    squares.sum::<f64>() / off.len() as f64
 }
 
 /// Polynomials over the samples' plane, of degrees 2, 3, 4 and 6.

@@ -2,9 +2,9 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::Vector3;
 
-use crate::jet::{Jet, MOST_FREE};
+use crate::descent::{Distance, Off, descend, normal_equations};
 use crate::local::Local;
 use crate::robust;
 use crate::shape::{Family, Shape};
@@ -44,65 +44,80 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// How far a sample lies off the shape along its ray, in its standard deviations.
-    #[must_use]
-    pub fn off(&self, sample: &Sample) -> f64 {
-        off(&self.local, sample)
+    /// How far samples lie off the shape along their rays, in their standard deviations.
+    pub fn offs(&self, samples: &[Sample]) -> impl Iterator<Item = f64> {
+        self.local.offs(samples)
     }
 }
 
-/// Samples that starts are tried on, at most.
-const TRIED: usize = 300;
-/// Rounds of weighing samples in such a trial and steps in each, and steps in the fit itself.
-const TRIALS: usize = 10;
-const TRIAL_STEPS: usize = 6;
+/// Starts are tried first in few rounds on few samples, and the best of them, so many, in more
+/// rounds on more.
+const FIRST_TRIAL: Trial = Trial {
+    samples: 100,
+    rounds: 3,
+    steps: 6,
+};
+const PROMISING: usize = 5;
+const SECOND_TRIAL: Trial = Trial {
+    samples: 300,
+    rounds: 10,
+    steps: 6,
+};
+/// Steps of a fit in each round.
 const STEPS: usize = 40;
 /// Robust scales at which a sample weighs half in a trial.
 const WIDE: f64 = 2.0;
+/// Change of that scale, relative, at which a trial has ended.
+const STEADY: f64 = 1e-3;
 /// Starts that are followed to their end, and the samples they are followed on, at most; all
 /// samples decide only where the best of them ends.
 const FOLLOWED: usize = 2;
-const FOLLOWED_ON: usize = 2000;
+const FOLLOWED_ON: usize = 600;
 /// Rounds of deciding which samples are held.
 const ROUNDS: usize = 3;
 /// A radius beyond so many times the samples' extent is no radius.
 const FLATTEST: f64 = 1e3;
-/// Relative change of the cost at which a fit has ended.
+/// Relative change of the cost at which a fit has ended, and at which a round of a trial has.
 const ENDED: f64 = 1e-7;
+const TRIAL_ENDED: f64 = 1e-3;
 
 /// Fits a shape of this family. `area` tells how many samples together say as much as one
 /// whose noise is its own: 1 for raw samples, more for the nodes of a regridded image.
 /// `None` where there are too few samples, or the surface is too flat to be of this family.
 #[must_use]
 pub fn fit(family: Family, samples: &[Sample], area: f64) -> Option<Fit> {
+    finished(found(family, samples)?, samples, area)
+}
+
+/// Where the descent from the best of the starts ends on some of the samples.
+pub(crate) fn found(family: Family, samples: &[Sample]) -> Option<Local> {
     if samples.len() <= family.freedom() {
         return None;
     }
-    let few = some_of(samples, TRIED);
-    let mut tried: Vec<(f64, Local)> = starts(family, samples)?
-        .into_iter()
-        .filter_map(|start| {
-            let local = tried_on(start, &few)?;
-            Some((scale(&local, &few), local))
-        })
-        .collect();
-    // Stable, so that of equals the first stays first.
-    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let some = some_of(samples, FOLLOWED_ON);
-    let local = tried
-        .into_iter()
-        .take(FOLLOWED)
-        .filter_map(|(_, local)| {
-            let local = settled(local, &some)?;
-            Some((scale(&local, &some), local))
-        })
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, local)| local)?;
-    if some.len() < samples.len() {
-        told(settled(local, samples)?, samples, area)
-    } else {
-        told(local, samples, area)
+    let mut shapes = starts(family, samples)?;
+    if shapes.len() > PROMISING {
+        let first = FIRST_TRIAL.of(shapes, samples).into_iter();
+        shapes = first.take(PROMISING).map(|(_, local)| local).collect();
     }
+    let tried = SECOND_TRIAL.of(shapes, samples).into_iter();
+    let some = some_of(samples, FOLLOWED_ON);
+    let followed = tried.take(FOLLOWED).filter_map(|(_, local)| {
+        let local = settled(local, &some)?;
+        Some((scale(&local, &some), local))
+    });
+    followed
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, local)| local)
+}
+
+/// Fits what was found to all samples.
+pub(crate) fn finished(found: Local, samples: &[Sample], area: f64) -> Option<Fit> {
+    let local = if samples.len() > FOLLOWED_ON {
+        settled(found, samples)?
+    } else {
+        found
+    };
+    told(local, samples, area)
 }
 
 /// At most so many of the samples, from everywhere.
@@ -114,31 +129,65 @@ fn some_of(samples: &[Sample], most: usize) -> Cow<'_, [Sample]> {
     taken.map(|index| samples[index]).collect()
 }
 
-/// Follows a start for a while, the less drawn by a sample the farther off it lies.
-fn tried_on(mut local: Local, samples: &[Sample]) -> Option<Local> {
-    let mut weights = vec![1.0; samples.len()];
-    for _ in 0..TRIALS {
-        let wide = WIDE * scale(&local, samples).max(f64::MIN_POSITIVE);
-        for (weight, sample) in weights.iter_mut().zip(samples) {
-            *weight = (1.0 + (off(&local, sample) / wide).powi(2)).recip();
-        }
-        local = descend(local, samples, &weights, TRIAL_STEPS)?;
+/// What starts are tried with.
+struct Trial {
+    /// Samples, at most.
+    samples: usize,
+    /// Rounds of weighing them.
+    rounds: usize,
+    /// Steps in each round, at most.
+    steps: usize,
+}
+
+impl Trial {
+    /// Where the starts lead, with their scales, the best first.
+    fn of(&self, starts: impl IntoIterator<Item = Local>, samples: &[Sample]) -> Vec<(f64, Local)> {
+        let few = some_of(samples, self.samples);
+        let led = starts
+            .into_iter()
+            .filter_map(|start| self.lead(start, &few));
+        let mut led: Vec<_> = led.collect();
+        // Stable, so that of equals the first stays first.
+        led.sort_by(|a, b| a.0.total_cmp(&b.0));
+        led
     }
-    Some(local)
+
+    /// Follows a start for a while, the less drawn by a sample the farther off it lies.
+    fn lead(&self, mut local: Local, samples: &[Sample]) -> Option<(f64, Local)> {
+        let mut weights = vec![1.0; samples.len()];
+        let mut before = scale(&local, samples);
+        for _ in 0..self.rounds {
+            let wide = WIDE * before.max(f64::MIN_POSITIVE);
+            let distances = local.distances::<f64>();
+            for (weight, sample) in weights.iter_mut().zip(samples) {
+                let deviation_mm = distances.deviation_mm(sample);
+                let off = distances.distance(&sample.point_mm) / deviation_mm;
+                *weight = (1.0 + (off / wide).powi(2)).recip() / deviation_mm.powi(2);
+            }
+            local = descend::<Distance>(local, samples, &weights, self.steps, TRIAL_ENDED)?;
+            let now = scale(&local, samples);
+            let is_steady = (now - before).abs() <= STEADY * before;
+            before = now;
+            if is_steady {
+                break;
+            }
+        }
+        Some((before, local))
+    }
 }
 
 /// Follows a start to its end.
 fn settled(mut local: Local, samples: &[Sample]) -> Option<Local> {
     for _ in 0..ROUNDS {
         let held = held(&local, samples);
-        local = descend(local, samples, &held, STEPS)?;
+        local = descend::<Off>(local, samples, &held, STEPS, ENDED)?;
     }
     Some(local)
 }
 
 /// The samples that are not too far off, as weights.
 fn held(local: &Local, samples: &[Sample]) -> Vec<f64> {
-    robust::held(samples.iter().map(|sample| off(local, sample)))
+    robust::held(local.offs(samples))
 }
 
 /// A fit that has ended, with all there is to say of it.
@@ -147,15 +196,15 @@ fn told(local: Local, samples: &[Sample], area: f64) -> Option<Fit> {
     let shape = local.shape().filter(|shape| is_sound(shape, extent_mm))?;
     let held = held(&local, samples);
     let (mut squares, mut squares_mm2, mut count) = (0.0, 0.0, 0_usize);
+    let distances = local.distances::<f64>();
     for (sample, _) in samples.iter().zip(&held).filter(|(_, held)| **held > 0.0) {
-        let off = off(&local, sample);
-        squares += off * off;
-        squares_mm2 += local.distance::<f64>(&sample.point_mm).powi(2);
+        squares += distances.off(sample).powi(2);
+        squares_mm2 += distances.distance(&sample.point_mm).powi(2);
         count += 1;
     }
     let free = local.free();
     let left = count.checked_sub(free.len()).filter(|left| *left > 0)? as f64;
-    let (normal, _) = normal_equations(&local, samples, &held);
+    let (normal, _) = normal_equations::<Off>(&local, samples, &held);
     let covariance = normal.cholesky()?.inverse() * (squares / left * area.max(1.0));
     Some(Fit {
         shape,
@@ -193,88 +242,7 @@ fn extent_mm(samples: &[Sample]) -> f64 {
     (high - low).norm()
 }
 
-fn off(local: &Local, sample: &Sample) -> f64 {
-    local.off(sample)
-}
-
 /// The standard deviation of the distances, in those of the samples, by their median.
 fn scale(local: &Local, samples: &[Sample]) -> f64 {
-    robust::deviation(samples.iter().map(|sample| off(local, sample)))
-}
-
-type Matrix = SMatrix<f64, MOST_FREE, MOST_FREE>;
-type Step = SVector<f64, MOST_FREE>;
-
-/// Squared distances of the samples in their variances, each with its weight.
-fn cost(local: &Local, samples: &[Sample], weights: &[f64]) -> f64 {
-    let weighed = samples.iter().zip(weights);
-    weighed
-        .map(|(sample, weight)| weight * off(local, sample).powi(2))
-        .sum()
-}
-
-/// The normal equations of the least squares at a shape; numbers that are not free stay.
-fn normal_equations(local: &Local, samples: &[Sample], weights: &[f64]) -> (Matrix, Step) {
-    let (mut matrix, mut right) = (Matrix::zeros(), Step::zeros());
-    let free = local.free();
-    for (sample, weight) in samples
-        .iter()
-        .zip(weights)
-        .filter(|(_, weight)| **weight > 0.0)
-    {
-        let off: Jet = local.off(sample);
-        for &i in free {
-            right[i] -= weight * off.by[i] * off.value;
-            for &j in free.iter().take_while(|j| **j <= i) {
-                matrix[(i, j)] += weight * off.by[i] * off.by[j];
-            }
-        }
-    }
-    for i in 0..MOST_FREE {
-        if !free.contains(&i) {
-            matrix[(i, i)] = 1.0;
-        }
-        for j in 0..i {
-            matrix[(j, i)] = matrix[(i, j)];
-        }
-    }
-    (matrix, right)
-}
-
-/// Levenberg and Marquardt's descent. `None` where the numbers leave what is finite.
-fn descend(mut local: Local, samples: &[Sample], weights: &[f64], steps: usize) -> Option<Local> {
-    let mut damping = 1e-3;
-    let mut least = cost(&local, samples, weights);
-    if !least.is_finite() {
-        return None;
-    }
-    for _ in 0..steps {
-        let (matrix, right) = normal_equations(&local, samples, weights);
-        let mut next = None;
-        while next.is_none() && damping < 1e9 {
-            let mut damped = matrix;
-            for k in 0..MOST_FREE {
-                damped[(k, k)] *= 1.0 + damping;
-            }
-            let moved = damped
-                .cholesky()
-                .map(|factors| local.moved(&factors.solve(&right).into()))
-                .map(|moved| (cost(&moved, samples, weights), moved))
-                .filter(|(cost, _)| *cost <= least);
-            match moved {
-                Some(found) => {
-                    damping = (damping * 0.1).max(1e-12);
-                    next = Some(found);
-                }
-                None => damping *= 10.0,
-            }
-        }
-        let Some((cost, moved)) = next else { break };
-        let ended = least - cost <= ENDED * least;
-        (local, least) = (moved, cost);
-        if ended {
-            break;
-        }
-    }
-    Some(local)
+    robust::deviation(local.offs(samples))
 }

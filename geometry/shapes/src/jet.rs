@@ -22,6 +22,10 @@ pub(crate) trait Scalar:
     + Mul<f64, Output = Self>
     + Add<f64, Output = Self>
 {
+    /// A value that does not vary.
+    fn constant(value: f64) -> Self {
+        Self::varying(value, [])
+    }
     /// A value with its derivatives by some free numbers.
     fn varying<const N: usize>(value: f64, by: [(usize, f64); N]) -> Self;
     /// The plain number.
@@ -61,10 +65,20 @@ impl Scalar for f64 {
 impl Jet {
     /// A function of this, from its value and its derivative here.
     fn chained(self, value: f64, slope: f64) -> Self {
-        Self {
-            value,
-            by: self.by.map(|d| slope * d),
+        let mut by = self.by;
+        for by in &mut by {
+            *by *= slope;
         }
+        Self { value, by }
+    }
+
+    /// With the derivatives of another, times a factor, added to its own.
+    fn with(mut self, value: f64, factor: f64, other: &Self) -> Self {
+        for (by, other) in self.by.iter_mut().zip(&other.by) {
+            *by += factor * other;
+        }
+        self.value = value;
+        self
     }
 }
 
@@ -104,10 +118,7 @@ impl Add for Jet {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
-        Self {
-            value: self.value + other.value,
-            by: core::array::from_fn(|k| self.by[k] + other.by[k]),
-        }
+        self.with(self.value + other.value, 1.0, &other)
     }
 }
 
@@ -115,7 +126,7 @@ impl Sub for Jet {
     type Output = Self;
 
     fn sub(self, other: Self) -> Self {
-        self + -other
+        self.with(self.value - other.value, -1.0, &other)
     }
 }
 
@@ -131,9 +142,9 @@ impl Mul for Jet {
     type Output = Self;
 
     fn mul(self, other: Self) -> Self {
-        let first = self.chained(self.value * other.value, other.value);
-        let second = other.chained(0.0, self.value);
-        first + second
+        let value = self.value * other.value;
+        self.chained(value, other.value)
+            .with(value, self.value, &other)
     }
 }
 
@@ -149,6 +160,9 @@ impl Add<f64> for Jet {
     type Output = Self;
 
     fn add(self, constant: f64) -> Self {
-        self.chained(self.value + constant, 1.0)
+        Self {
+            value: self.value + constant,
+            by: self.by,
+        }
     }
 }

@@ -6,10 +6,11 @@
 //!                                       of each family, and polynomials --> Evidence
 //! ```
 //!
-//! A fit minimises the distances along the normal, each in its own standard deviation, over
-//! the samples that are not too far off to be noise. Its numbers come with standard
+//! A fit minimises how far samples lie off along their rays, each in its own standard deviation,
+//! over the samples that are not too far off to be noise. Its numbers come with standard
 //! uncertainties: those of the noise met, to first order.
 
+mod descent;
 mod evidence;
 mod fit;
 mod jet;

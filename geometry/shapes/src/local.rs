@@ -59,57 +59,29 @@ impl Local {
         }
     }
 
-    /// Signed distance of a point, millimetres, positive above; with its derivatives by the
-    /// numbers of a step.
-    pub(crate) fn distance<S: Scalar>(&self, point: &Vector3<f64>) -> S {
-        let from = point - self.place;
-        let across = self.normal.cross(&self.along);
-        let (u, v, s) = (
-            from.dot(&self.along),
-            from.dot(&across),
-            from.dot(&self.normal),
-        );
-        let [number, second, third] = [0, 1, 2].map(|k| S::free(self.numbers[k], NUMBERS + k));
-        let along = S::varying(u, [(TILT_ALONG, -s), (TURN, v)]);
-        let across = S::varying(v, [(TILT_ACROSS, -s), (TURN, -u)]);
-        let s = S::varying(s, [(SHIFT, -1.0), (TILT_ALONG, u), (TILT_ACROSS, v)]);
-        match self.family {
-            Family::Plane => s,
-            Family::Sphere => off_round(number, along * along + across * across + s * s, s),
-            Family::Cylinder => off_round(number, across * across + s * s, s),
-            Family::Cone => {
-                let (sin, cos) = second.sin_cos();
-                let out = sin * along + cos * s;
-                let up = cos * along - sin * s;
-                cos * off_round(number, across * across + out * out, out) - sin * up
-            }
-            Family::Torus => {
-                let (sin, cos) = second.sin_cos();
-                let radius = third.recip();
-                let raised = s + radius;
-                let out = cos * raised - sin * along;
-                let up = sin * raised + cos * along;
-                let off = off_round(number, across * across + out * out, out);
-                let from_centre = (off * off + up * up).sqrt();
-                if third.value() < 0.0 {
-                    -from_centre - radius
-                } else {
-                    from_centre - radius
-                }
-            }
-        }
+    /// How far samples lie off along their rays, in their standard deviations, positive above.
+    pub(crate) fn offs(&self, samples: &[Sample]) -> impl Iterator<Item = f64> {
+        let distances = self.distances::<f64>();
+        samples.iter().map(move |sample| distances.off(sample))
     }
 
-    /// How far a sample lies off along its ray, in its standard deviations, positive above; with
-    /// the derivatives. To first order: the distance over the share of it that the ray covers.
-    pub(crate) fn off<S: Scalar>(&self, sample: &Sample) -> S {
-        /// How far along the ray the distance is looked at once more, millimetres.
-        const STEP_MM: f64 = 1e-3;
-        let here: S = self.distance(&sample.point_mm);
-        let further: S = self.distance(&(sample.point_mm + sample.ray * STEP_MM));
-        let covered = (further - here) * (1.0 / STEP_MM);
-        let deviation = (covered * covered + ACROSS * ACROSS).sqrt() * sample.sigma_mm;
-        here * deviation.recip()
+    /// Tells distances from the shape, with their derivatives by the numbers of a step.
+    pub(crate) fn distances<S: Scalar>(&self) -> Distances<'_, S> {
+        let [first, second, third] = [0, 1, 2].map(|k| S::free(self.numbers[k], NUMBERS + k));
+        let nothing = S::constant(0.0);
+        Distances {
+            local: self,
+            across: self.normal.cross(&self.along),
+            curvature: first,
+            angle: match self.family {
+                Family::Cone | Family::Torus => second.sin_cos(),
+                _ => (nothing, nothing),
+            },
+            tube: match self.family {
+                Family::Torus => third.recip(),
+                _ => nothing,
+            },
+        }
     }
 
     /// The shape after a step.
@@ -207,6 +179,77 @@ impl Local {
     }
 }
 
+/// What tells distances from a shape: what is the same for all points is worked out once.
+pub(crate) struct Distances<'a, S> {
+    local: &'a Local,
+    across: Vector3<f64>,
+    /// The first of the shape's numbers.
+    curvature: S,
+    /// Sine and cosine of the second.
+    angle: (S, S),
+    /// Radius of a torus's tube, negative where it is hollow.
+    tube: S,
+}
+
+impl<S: Scalar> Distances<'_, S> {
+    /// Signed distance of a point, millimetres, positive above.
+    pub(crate) fn distance(&self, point: &Vector3<f64>) -> S {
+        let from = point - self.local.place;
+        let (u, v, s) = (
+            from.dot(&self.local.along),
+            from.dot(&self.across),
+            from.dot(&self.local.normal),
+        );
+        let along = S::varying(u, [(TILT_ALONG, -s), (TURN, v)]);
+        let across = S::varying(v, [(TILT_ACROSS, -s), (TURN, -u)]);
+        let s = S::varying(s, [(SHIFT, -1.0), (TILT_ALONG, u), (TILT_ACROSS, v)]);
+        let curvature = self.curvature;
+        let (sin, cos) = self.angle;
+        match self.local.family {
+            Family::Plane => s,
+            Family::Sphere => off_round(curvature, along * along + across * across + s * s, s),
+            Family::Cylinder => off_round(curvature, across * across + s * s, s),
+            Family::Cone => {
+                let out = sin * along + cos * s;
+                let up = cos * along - sin * s;
+                cos * off_round(curvature, across * across + out * out, out) - sin * up
+            }
+            Family::Torus => {
+                let raised = s + self.tube;
+                let out = cos * raised - sin * along;
+                let up = sin * raised + cos * along;
+                let off = off_round(curvature, across * across + out * out, out);
+                let from_centre = (off * off + up * up).sqrt();
+                if self.tube.value() < 0.0 {
+                    -from_centre - self.tube
+                } else {
+                    from_centre - self.tube
+                }
+            }
+        }
+    }
+
+    /// How far a sample lies off along its ray, in its standard deviations, positive above: to
+    /// first order, the distance over the share of it that the ray covers.
+    pub(crate) fn off(&self, sample: &Sample) -> S {
+        let here = self.distance(&sample.point_mm);
+        here * self.deviation_from(here, sample).recip()
+    }
+
+    /// Standard deviation of a sample's distance, millimetres.
+    pub(crate) fn deviation_mm(&self, sample: &Sample) -> S {
+        self.deviation_from(self.distance(&sample.point_mm), sample)
+    }
+
+    fn deviation_from(&self, here: S, sample: &Sample) -> S {
+        /// How far along the ray the distance is looked at once more, millimetres.
+        const STEP_MM: f64 = 1e-3;
+        let further = self.distance(&(sample.point_mm + sample.ray * STEP_MM));
+        let covered = (further - here) * (1.0 / STEP_MM);
+        (covered * covered + ACROSS * ACROSS).sqrt() * sample.sigma_mm
+    }
+}
+
 /// How much farther a point is from the centre of a circle than the circle, which passes
 /// through the origin with this curvature: from the point's squared distance to the origin
 /// and how far it is above it. As the curvature goes to zero this becomes the height.
@@ -264,7 +307,10 @@ mod tests {
                 continue;
             };
             for point in points() {
-                let (near, far) = (local.distance::<f64>(&point), shape.distance_mm(&point));
+                let (near, far) = (
+                    local.distances::<f64>().distance(&point),
+                    shape.distance_mm(&point),
+                );
                 assert!((near - far).abs() < 1e-9, "{shape:?}: {near} {far}");
             }
         }
@@ -275,13 +321,13 @@ mod tests {
         const STEP: f64 = 1e-6;
         for local in all() {
             for point in points() {
-                let jet: Jet = local.distance(&point);
-                assert_eq!(jet.value, local.distance::<f64>(&point));
+                let jet = local.distances::<Jet>().distance(&point);
+                assert_eq!(jet.value, local.distances::<f64>().distance(&point));
                 for &k in local.free() {
                     let moved = |by: f64| {
                         let mut step = [0.0; MOST_FREE];
                         step[k] = by;
-                        local.moved(&step).distance::<f64>(&point)
+                        local.moved(&step).distances::<f64>().distance(&point)
                     };
                     let slope = (moved(STEP) - moved(-STEP)) / (2.0 * STEP);
                     let off = (slope - jet.by[k]).abs();
