@@ -7,7 +7,7 @@ pub type ReadAgainError = Box<dyn core::error::Error + Send + Sync>;
 
 /// The columns of a scan, to be gone through as often as needed: the range image says where
 /// surfaces are, the samples then say exactly how they run. They may be in memory or not.
-pub trait Columns {
+pub trait Columns: Sync {
     /// Hands every column to `take`, in their order, until one is refused with `false`.
     ///
     /// # Errors

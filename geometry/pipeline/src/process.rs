@@ -199,6 +199,18 @@ pub fn process_in_view(
 ) -> Result<Outcome, PipelineError> {
     settings.validate()?;
     observer.check()?;
+    regrid::with_threads(settings.regrid.threads, || {
+        in_view(image, columns, view, settings, observer)
+    })?
+}
+
+fn in_view(
+    image: &RangeImage,
+    columns: Option<&dyn Columns>,
+    view: &View,
+    settings: &Settings,
+    observer: &dyn Observer,
+) -> Result<Outcome, PipelineError> {
     let nodes = image.valid_nodes();
     let roi = settings.regrid.roi;
     if nodes == 0 {
@@ -215,9 +227,11 @@ pub fn process_in_view(
 
     observer.stage(Stage::Reconstruct);
     let part_image = part.image.as_ref().unwrap_or(image);
-    let reconstruction =
-        reconstruct::reconstruct(part_image, &part.regions, &settings.reconstruct, observer)?;
-    let kinds = kinds(part_image, &part.regions, columns, observer)?;
+    let (reconstruction, kinds) = rayon::join(
+        || reconstruct::reconstruct(part_image, &part.regions, &settings.reconstruct, observer),
+        || kinds(part_image, &part.regions, columns, observer),
+    );
+    let (reconstruction, kinds) = (reconstruction?, kinds?);
     Ok(Outcome {
         regions: part.regions,
         background: part.background,

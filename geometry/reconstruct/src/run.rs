@@ -2,6 +2,7 @@
 
 use nurbs::{Observation, PatchSurface};
 use range_image::{Monitor, RangeImage, RegionMap};
+use rayon::prelude::*;
 
 use crate::assemble::{Carrier, Placement, domains, model};
 use crate::border::cracks::trace;
@@ -114,13 +115,19 @@ pub fn reconstruct(
     // By the letter of the paper the border comes first, and the surface covers it.
     let mut early = Vec::new();
     if settings.method == Method::Relief {
-        for (k, nodes) in nodes.iter().enumerate() {
-            monitor.check()?;
-            let domain = around(image, nodes).ok_or(FitError::Empty);
-            let surface =
-                domain.and_then(|domain| surface(image, nodes, &domain, &noise, settings));
-            early.push(surface.map_err(failed(pieces.regions[k]))?);
-        }
+        let fitted = nodes
+            .par_iter()
+            .zip(&pieces.regions)
+            .map(|(nodes, region)| {
+                monitor.check()?;
+                let domain = around(image, nodes).ok_or(FitError::Empty);
+                let surface =
+                    domain.and_then(|domain| surface(image, nodes, &domain, &noise, settings));
+                surface.map_err(failed(*region))
+            });
+        // Of several errors the first, as without threads.
+        let fitted: Vec<Result<_, ReconstructError>> = fitted.collect();
+        early = fitted.into_iter().collect::<Result<_, _>>()?;
     }
     let placed = intersections(&cracks, &early, placement);
     monitor.progress(0.4);

@@ -165,7 +165,10 @@ fn check_nodes(columns: u64, rows: u64, settings: &RegridSettings) -> Result<(),
 }
 
 /// Runs the work on this many threads; 0 for all processors.
-fn with_threads<T: Send>(
+///
+/// # Errors
+/// [`RegridError::Threads`] if so many cannot be had.
+pub fn with_threads<T: Send>(
     threads: usize,
     work: impl FnOnce() -> T + Send,
 ) -> Result<T, RegridError> {

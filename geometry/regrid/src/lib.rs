@@ -39,7 +39,7 @@ mod support;
 mod textbook;
 mod window;
 
-pub use batch::regrid;
+pub use batch::{regrid, with_threads};
 pub use error::RegridError;
 pub use regridder::Regridder;
 pub use settings::{Estimator, RegridSettings, Roi, SettingsError, SupportSettings};

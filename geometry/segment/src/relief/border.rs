@@ -8,6 +8,8 @@
 
 mod place;
 
+use rayon::prelude::*;
+
 use crate::merge::Border;
 use crate::scene::Scene;
 use place::{Place, place};
@@ -88,6 +90,7 @@ fn reading(scene: &Scene<'_>, labels: &[u32], border: &Border, reach: usize) -> 
     let pairs = &border.pairs;
     let wanted = pairs.len().min(PLACES);
     let mut places: Vec<Place> = (0..wanted)
+        .into_par_iter()
         .filter_map(|k| {
             let pair = pairs[(2 * k + 1) * pairs.len() / (2 * wanted)];
             place(scene, labels, border.regions, pair, reach)
