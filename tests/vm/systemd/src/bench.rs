@@ -1,5 +1,6 @@
 //! The bench: a simulated scanner that is plugged in, and what is done with it through `relief`.
 
+use std::path::Path;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
@@ -45,8 +46,9 @@ impl Bench {
         })
     }
 
-    /// Plugs the scanner in.
-    pub(crate) fn plug_in(&mut self) -> Result<()> {
+    /// Plugs the scanner in, in place of the one that is, if any.
+    pub(crate) fn plug_in(&mut self, personality: Personality) -> Result<()> {
+        self.server = None;
         let mut config = SimConfig {
             overrides: Overrides {
                 columns: Some(COLUMNS),
@@ -58,7 +60,7 @@ impl Bench {
         };
         config.device.line_rate_hz = Some(LINE_RATE_HZ);
         let source = config.source()?;
-        let server = config.serve_usb(source, Personality::CdcAcm, Attachment::ThisMachine)?;
+        let server = config.serve_usb(source, personality, Attachment::ThisMachine)?;
         self.server = Some(server);
         Ok(())
     }
@@ -97,18 +99,22 @@ impl Bench {
 
     /// The first scan is still there, whole.
     pub(crate) fn first_is_kept(&self) -> Result<()> {
-        let first = self.first()?;
-        let scan = scan(first)?;
+        self.picture_of(self.first()?).map(drop)
+    }
+
+    /// The picture of a scan's heights, in a result that is whole and has a CAD file.
+    pub(crate) fn picture_of(&self, id: &str) -> Result<Vec<u8>> {
+        let scan = scan(id)?;
         ensure!(scan["state"] == "complete", "{scan}");
         ensure!(scan["columns"] == COLUMNS, "{scan}");
-        let out = "/tmp/fetched";
-        if system::exists(out) {
+        let out = Path::new("/tmp/fetched");
+        if out.exists() {
             std::fs::remove_dir_all(out)?;
         }
         // Holds each file against the manifest.
-        run("relief", &["fetch", first, "--output", out])?;
-        ensure!(system::exists("/tmp/fetched/house.igs"), "no CAD file");
-        Ok(())
+        run("relief", &["fetch", id, "--output", "/tmp/fetched"])?;
+        ensure!(out.join("house.igs").exists(), "no CAD file");
+        Ok(std::fs::read(out.join("range.png"))?)
     }
 }
 

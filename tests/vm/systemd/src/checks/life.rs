@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 use rustix::process::{Pid, Signal, kill_process};
+use sim_scanner::endpoint::usb::Personality;
 
 use crate::bench::{
     Bench, COLUMNS, PORT, SERIAL_PORTS, is_over, ready, relief, replaced, scan as scan_of, text,
@@ -20,7 +21,7 @@ const CONFIGURATION: &str = "/etc/relief/reliefd.toml";
 /// port of a kind that no device had when it started.
 pub(super) fn first_plug(bench: &mut Bench) -> Result<()> {
     configure()?;
-    bench.plug_in()?;
+    bench.plug_in(Personality::CdcAcm)?;
     wait_for_path(PORT, true)?;
     let device = owner(PORT)?;
     ensure!(
@@ -107,10 +108,44 @@ fn comes_to_an_end(bench: &Bench, id: &str) -> Result<()> {
 }
 
 pub(super) fn cable(bench: &mut Bench) -> Result<()> {
-    let id = bench.amid_a_scan("cable")?;
+    pulled_and_put_back(bench, "cable")?;
+    let told = relief(&["scan", "--name", "after", "--wait"])?;
+    ensure!(told["scan"]["columns"] == COLUMNS, "{told}");
+    Ok(())
+}
+
+/// From here on the scanner has an interface of its own: no driver of the kernel's, and another
+/// kind of device node that the sandbox must let through.
+pub(super) fn bulk(bench: &mut Bench) -> Result<()> {
+    let configuration = fs::read_to_string(CONFIGURATION)?;
+    let bulk = configuration
+        .replace("transport = \"serial\"", "transport = \"usb\"")
+        // Of a serial port alone, and refused with any other.
+        .replace("\nport =", "\n# port =")
+        .replace("\nbaud =", "\n# baud =");
+    ensure!(!bulk.contains(&format!("\nport = {PORT:?}")));
+    fs::write(CONFIGURATION, bulk)?;
+    systemctl(&["restart", SERVICE])?;
+    let gone = relief(&["status"])?;
+    ensure!(gone["scanner"]["link"] != "ready", "{gone}");
+    bench.plug_in(Personality::Vendor)?;
+    wait_for_path(PORT, false)?;
+    ready()?;
+    let told = relief(&["scan", "--name", "house", "--wait"])?;
+    ensure!(told["job"]["state"] == "done", "{told}");
+    let id = text(&told["scan"]["id"])?;
+    ensure!(
+        bench.picture_of(&id)? == bench.picture_of(bench.first()?)?,
+        "it measured otherwise than over the serial port"
+    );
+    pulled_and_put_back(bench, "bulk")
+}
+
+/// The cable is pulled in the midst of a scan, and put back.
+fn pulled_and_put_back(bench: &Bench, name: &str) -> Result<()> {
+    let id = bench.amid_a_scan(name)?;
     let (pid, restarts) = (number("MainPID")?, number("NRestarts")?);
     bench.control()?.unplug();
-    wait_for_path(PORT, false)?;
     bench.laser_goes_off()?;
     wait("the service notices", || {
         let status = relief(&["status"])?;
@@ -118,11 +153,8 @@ pub(super) fn cable(bench: &mut Bench) -> Result<()> {
     })?;
     ensure!(scan_of(&id)?["columns"].as_u64() > Some(0));
     bench.control()?.replug();
-    wait_for_path(PORT, true)?;
     comes_to_an_end(bench, &id)?;
     ready()?;
-    let told = relief(&["scan", "--name", "after", "--wait"])?;
-    ensure!(told["scan"]["columns"] == COLUMNS, "{told}");
     ensure!(
         (number("MainPID")?, number("NRestarts")?) == (pid, restarts),
         "it was replaced"

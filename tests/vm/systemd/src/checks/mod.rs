@@ -30,7 +30,7 @@ const fn long(name: &'static str, run: fn(&mut Bench) -> Result<()>) -> Check {
     }
 }
 
-pub(crate) fn all() -> [Check; 16] {
+pub(crate) fn all() -> [Check; 17] {
     [
         check("package: installed, enabled, started", package::install),
         check("service: in its sandbox", service::sandbox),
@@ -58,6 +58,10 @@ pub(crate) fn all() -> [Check; 16] {
         long(
             "configuration: read again; unsound, not tried again",
             service::configuration,
+        ),
+        check(
+            "scanner with an interface of its own: scan, cable pulled and put back",
+            life::bulk,
         ),
         check(
             "package: upgraded in mid-scan, state kept",
