@@ -57,14 +57,7 @@ pub(crate) fn run(service: &Arc<Service>, ticket: Ticket) {
     let pulse = service.liveness.begin(station.loop_name("scan"));
     // A defect in the taking of one scan must not keep the scanner busy for ever. What the
     // panic passes on its way drops the stream, which turns the laser off.
-    let outcome =
-        catch_unwind(AssertUnwindSafe(|| take(service, &ticket, &pulse))).unwrap_or_else(|panic| {
-            Err(format!(
-                "the scan ended unexpectedly: {}; this is a defect of the program, please \
-                 report it",
-                panic_text(&*panic)
-            ))
-        });
+    let outcome = despite_defects(|| take(service, &ticket, &pulse));
     let (state, reason) = match (outcome, ticket.abort.reason()) {
         (Ok(()), _) => (ScanState::Complete, None),
         (Err(_), Some(reason)) => (ScanState::Aborted, Some(reason)),
@@ -79,6 +72,16 @@ pub(crate) fn run(service: &Arc<Service>, ticket: Ticket) {
     // What it did not take is free for the next scan, which may begin once this one has ended.
     drop(ticket.room);
     service.end_scan(&station, &id, state, reason);
+}
+
+/// What this gives, or that it had a defect.
+fn despite_defects<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        Err(format!(
+            "the scan ended unexpectedly: {}; this is a defect of the program, please report it",
+            panic_text(&*panic)
+        ))
+    })
 }
 
 /// The text of an error is the scan's reason.
@@ -262,7 +265,10 @@ impl<'a> Keeper<'a> {
                 .name(station.loop_name("scan-feed"))
                 .spawn_scoped(scope, move || feed(service, station, stream, &sender))
                 .map_err(|error| format!("cannot start a thread: {error}"))?;
-            let result = self.drain(&receiver, pulse, &|index| acknowledger.acknowledge(index));
+            // The feeder has the stream: unless it is told of a defect here, too, it waits for
+            // columns for which nobody acknowledges those before.
+            let acknowledge = |index| acknowledger.acknowledge(index);
+            let result = despite_defects(|| self.drain(&receiver, pulse, &acknowledge));
             // With the receiver gone the feeder ends at its next column; an abort wakes a
             // feeder that waits for one.
             drop(receiver);

@@ -1,3 +1,4 @@
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -7,6 +8,7 @@ use relief_api::{
     Event, Job, JobList, JobState, Rerun, Scan, ScanList, ScanState, SpoolEntry, StartScan, path,
 };
 use scan_record::{EndCause, Ending, JournalReader};
+use storage::{Deed, HinderedDisk, Hindrance};
 
 use crate::fake::{COLUMNS, SAMPLES};
 use crate::rig::{Rig, ended, job_over, json};
@@ -134,6 +136,60 @@ async fn a_defect_in_one_scan_leaves_room_for_the_next() {
     assert_eq!(scan.state, ScanState::Failed);
     let reason = scan.reason.unwrap();
     assert!(reason.contains("a defect made for this test"), "{reason}");
+    rig.scan_to_result("next").await;
+    rig.daemon.shutdown().await;
+}
+
+/// Has a defect when a journal is synced for this number of times.
+#[derive(Debug, Clone)]
+struct Defect(Arc<AtomicU32>);
+
+impl Hindrance for Defect {
+    fn before(&self, deed: Deed, path: &Path) -> io::Result<()> {
+        let is_journal = path.extension().is_some_and(|e| e == "scan");
+        if deed == Deed::SyncFile && is_journal {
+            let left = self.0.fetch_sub(1, Ordering::Relaxed);
+            assert!(left != 1, "a defect made for this test");
+        }
+        Ok(())
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_defect_in_mid_scan_turns_the_laser_off_and_keeps_the_columns() {
+    const SYNCED: u32 = 6;
+    let disk = HinderedDisk(Defect(Arc::new(AtomicU32::new(u32::MAX))));
+    let left = Arc::clone(&disk.0.0);
+    let every_column = |config: &mut reliefd::Config| config.journal.sync_columns = 1;
+    let folder = tempfile::tempdir().unwrap();
+    let rig = Rig::start_on(folder, Arc::new(disk), every_column).await;
+    let mut events = rig.client.events().await;
+    rig.scanner.allow(SYNCED);
+    let scan = rig.start_scan("broken").await;
+    let at = |event: &Event| {
+        matches!(
+            event,
+            Event::Column {
+                columns: SYNCED,
+                ..
+            }
+        )
+        .then_some(())
+    };
+    events.until(at).await;
+    assert!(rig.scanner.laser_is_on());
+    // One more column comes, and no other: whoever feeds them waits for the next one.
+    left.store(1, Ordering::Relaxed);
+    rig.scanner.allow(SYNCED + 1);
+    let scan = ended(&mut events, &scan.id).await;
+    assert!(!rig.scanner.laser_is_on());
+    assert_eq!(scan.state, ScanState::Failed);
+    let reason = scan.reason.unwrap();
+    assert!(reason.contains("a defect made for this test"), "{reason}");
+    let (columns, ending) = read_journal(&rig.journal(&scan.id));
+    assert!(columns >= SYNCED, "{columns}");
+    assert!(matches!(ending, Ending::Closed(EndCause::Fault(_))));
+    rig.scanner.allow(COLUMNS);
     rig.scan_to_result("next").await;
     rig.daemon.shutdown().await;
 }
