@@ -1,5 +1,6 @@
 //! From the configuration to the stations.
 
+use std::hash::{BuildHasher, RandomState};
 use std::sync::Arc;
 
 use scanner_driver::{Scanner, ScannerError, SerialScanner, UsbScanner};
@@ -20,9 +21,24 @@ pub type OpenScanner<'a> =
 pub(crate) fn open_attached(named: NamedScanner<'_>) -> Result<Arc<dyn Scanner>, ScannerError> {
     let config = named.config;
     Ok(match config.transport {
-        Transport::Serial => Arc::new(SerialScanner::open(config.serial())?),
-        Transport::Usb => Arc::new(UsbScanner::open(config.usb())?),
+        Transport::Serial => {
+            let mut settings = config.serial();
+            settings.link.jitter_seed = jitter_seed();
+            Arc::new(SerialScanner::open(settings)?)
+        }
+        Transport::Usb => {
+            let mut settings = config.usb();
+            settings.link.jitter_seed = jitter_seed();
+            Arc::new(UsbScanner::open(settings)?)
+        }
     })
+}
+
+/// Another for each scanner of each service: those that lost the same hub are not to come back
+/// in step.
+fn jitter_seed() -> u64 {
+    // The standard library's source of numbers that nobody can foresee.
+    RandomState::new().hash_one(())
 }
 
 /// A scanner for each section, in the order of their names.

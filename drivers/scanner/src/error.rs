@@ -111,6 +111,12 @@ pub enum ScannerError {
         /// What the operating system says.
         message: String,
     },
+    /// The driver itself failed.
+    #[error("the scanner's driver had a defect, and has begun anew: {what}; please report it")]
+    Defect {
+        /// What it said.
+        what: String,
+    },
     /// Something answers, but it is no scanner of ours.
     #[error("{port} answers, but not as a scanner: {heard}")]
     WrongDevice {

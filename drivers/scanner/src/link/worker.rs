@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError};
 use std::time::Duration;
 
@@ -104,7 +105,21 @@ impl Worker {
         self.clock.now()
     }
 
+    /// Works until the driver is dropped. A defect costs what is under way; the thread begins anew,
+    /// since nobody else can speak to the device.
     pub(super) fn run(mut self) {
+        while let Err(panic) = catch_unwind(AssertUnwindSafe(|| self.work())) {
+            let text = panic.downcast_ref::<&str>().copied();
+            let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+            let what = text.unwrap_or("no message").to_owned();
+            tracing::error!(what, "a defect in the scanner's driver: it begins anew");
+            self.stream = None;
+            self.disconnected(&ScannerError::Defect { what });
+        }
+        self.say_farewell();
+    }
+
+    fn work(&mut self) {
         while self.take_calls() {
             if self.line.is_some() {
                 self.exchange();
@@ -114,7 +129,6 @@ impl Worker {
             self.take_events();
             self.mind_the_scan();
         }
-        self.say_farewell();
     }
 
     /// Takes the calls that have come; without a connection it waits for them until the

@@ -311,3 +311,27 @@ fn a_device_that_comes_is_not_kept_waiting_for_the_next_attempt() {
     came.store(true, Ordering::Relaxed);
     assert!(scanner.identify().is_ok());
 }
+
+#[test]
+fn a_defect_costs_what_is_under_way_and_no_more() {
+    let (ours, theirs) = memory::pair();
+    let mut ends = vec![Some(ours), None];
+    let connector = ("memory".to_owned(), move || match ends.pop() {
+        Some(Some(end)) => Ok(Box::new(end) as Box<dyn Transport>),
+        Some(None) => panic!("a defect made for this test"),
+        None => Err(ScannerError::NoSuchPort {
+            port: "memory".to_owned(),
+        }),
+    });
+    let device = Arc::new(Mutex::new(Device::new()));
+    let _running = Running::serve(device, theirs);
+    let scanner = LinkScanner::start(connector, unhurried()).unwrap();
+    // The thread connects by itself: whoever calls in time is told, and others find it mended.
+    let identity = loop {
+        match scanner.identify() {
+            Ok(identity) => break identity,
+            Err(error) => assert!(matches!(error, ScannerError::Defect { .. }), "{error}"),
+        }
+    };
+    assert_eq!(identity.model.as_str(), "Bench");
+}
