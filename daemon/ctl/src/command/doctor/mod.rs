@@ -39,6 +39,16 @@ const PACKAGED: &str = "/etc/relief/reliefd.toml";
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
+/// What is to be said of a port or device that nobody seems to have open: only root sees what
+/// other users' programs have.
+fn free() -> &'static str {
+    if rustix::process::geteuid().is_root() {
+        "free"
+    } else {
+        "in the hands of none of this user's programs (as root, the doctor sees everybody's)"
+    }
+}
+
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Told {

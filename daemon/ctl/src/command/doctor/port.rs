@@ -8,6 +8,7 @@ use rustix::fs::{Access, access};
 use scanner_driver::transport::serial::{self, PortInfo};
 
 use super::finding::Finding;
+use super::free;
 
 const CHECK: &str = "scanner port";
 
@@ -53,7 +54,7 @@ pub(super) fn check(port: &Path) -> Vec<Finding> {
             format!("{shown} is in use by {holder}"),
             "end that program, or keep it from the port; two programs cannot share it",
         ),
-        None => Finding::good(CHECK, format!("{shown} is there, permitted and free")),
+        None => Finding::good(CHECK, format!("{shown} is there, permitted and {}", free())),
     }]
 }
 

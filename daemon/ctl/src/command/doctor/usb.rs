@@ -7,6 +7,7 @@ use scanner_driver::UsbSettings;
 use scanner_driver::transport::usb::{UsbDevice, list};
 
 use super::finding::Finding;
+use super::free;
 
 const CHECK: &str = "scanner on USB";
 
@@ -148,7 +149,7 @@ fn judge_one(device: &Seen) -> Vec<Finding> {
             "end that program; two programs cannot share a scanner",
         ),
         Some(holder) => Finding::good(CHECK, format!("{text} is in the hands of {holder}")),
-        None => Finding::good(CHECK, format!("{text} is there, permitted and free")),
+        None => Finding::good(CHECK, format!("{text} is there, permitted and {}", free())),
     }];
     if device.may_sleep {
         findings.push(Finding::doubtful(
