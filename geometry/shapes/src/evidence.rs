@@ -1,6 +1,6 @@
 //! Which kind of surface the samples speak for.
 //!
-//! Every family is fitted, and so are polynomials, which stand for whatever is none of them.
+//! Every family that could yet be the best is fitted, and so are polynomials, which stand for whatever is none of them.
 //! What tells is how much of the samples' scatter a surface leaves over, with a price for
 //! every number it needs (Schwarz 1978, "Estimating the dimension of a model"): never a
 //! distance that someone has fixed, so that a shallow bend is no plane where the noise is
@@ -41,7 +41,7 @@ pub struct Candidate {
 pub struct Evidence {
     /// The verdict.
     pub verdict: Verdict,
-    /// All that was compared, the best first.
+    /// What was fitted to all samples, the best first.
     pub candidates: Vec<Candidate>,
 }
 
@@ -51,8 +51,9 @@ const PER_NUMBER: f64 = 3.0;
 const MOST: f64 = 4.0;
 /// How much better a polynomial must be than a shape not to be one by chance.
 const DOUBT: f64 = 5.0;
-/// A shape that leaves so many times as much as another surface where some of the samples have
-/// led it is not fitted to all: they would not make up for it.
+/// A shape that would not be the best if it left so many times less than it does where some of
+/// the samples have led it is not fitted to all: they make up for a few hundredths of it, and for
+/// more only where the descent has not ended.
 const HOPELESS: f64 = 3.0;
 /// What each number costs above its price, so that of a hundred planes not one gets a radius
 /// from its noise.
@@ -73,7 +74,7 @@ pub fn decide(samples: &[Sample], area: f64) -> Evidence {
         if enough(family.freedom())
             && scale.leaves_room(family.freedom())
             && let Some(found) = found(family, samples)
-            && scale.leaves_hope(found.offs(samples).collect())
+            && scale.leaves_hope(&found.offs(samples).collect::<Vec<_>>(), family.freedom())
             && let Some(fit) = finished(found, samples, area)
         {
             scale.surfaces.push(Surface {
@@ -131,6 +132,9 @@ impl Scale {
     /// for all their freedom.
     fn leaves_room(&self, freedom: usize) -> bool {
         let most = self.most();
+        if self.surfaces.is_empty() {
+            return true;
+        }
         let shapes = self.surfaces.iter().filter(|surface| surface.fit.is_some());
         let scores = shapes.map(|shape| self.score(shape.left(most), shape.freedom));
         scores.fold(f64::INFINITY, f64::min) > self.score(self.floor(most), freedom)
@@ -144,12 +148,14 @@ impl Scale {
         left.fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether a shape that lies so far off the samples could be the best once it is fitted to all
-    /// of them.
-    fn leaves_hope(&self, off: Vec<f64>) -> bool {
+    /// Whether a shape with so many free numbers that lies so far off the samples could be the best
+    /// once it is fitted to all of them.
+    fn leaves_hope(&self, off: &[f64], freedom: usize) -> bool {
         let most = self.most();
-        let floor = self.floor(most).max(robust::LEAST_SCATTER.powi(2));
-        left(&off, most) <= HOPELESS * floor
+        let scores = self.surfaces.iter();
+        let scores = scores.map(|surface| self.score(surface.left(most), surface.freedom));
+        let least = scores.fold(f64::INFINITY, f64::min);
+        self.score(left(off, most) / HOPELESS, freedom) <= least + DOUBT
     }
 
     fn scored(&self) -> Vec<(Candidate, Option<&Fit>)> {

@@ -45,7 +45,7 @@ pub struct Fit {
 
 impl Fit {
     /// How far samples lie off the shape along their rays, in their standard deviations.
-    pub fn offs(&self, samples: &[Sample]) -> impl Iterator<Item = f64> {
+    pub(crate) fn offs(&self, samples: &[Sample]) -> impl Iterator<Item = f64> {
         self.local.offs(samples)
     }
 }

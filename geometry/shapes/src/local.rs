@@ -72,7 +72,7 @@ impl Local {
         Distances {
             local: self,
             across: self.normal.cross(&self.along),
-            curvature: first,
+            first,
             angle: match self.family {
                 Family::Cone | Family::Torus => second.sin_cos(),
                 _ => (nothing, nothing),
@@ -183,8 +183,8 @@ impl Local {
 pub(crate) struct Distances<'a, S> {
     local: &'a Local,
     across: Vector3<f64>,
-    /// The first of the shape's numbers.
-    curvature: S,
+    /// The first of the shape's numbers: a curvature, or 1 / distance from the axis.
+    first: S,
     /// Sine and cosine of the second.
     angle: (S, S),
     /// Radius of a torus's tube, negative where it is hollow.
@@ -203,22 +203,22 @@ impl<S: Scalar> Distances<'_, S> {
         let along = S::varying(u, [(TILT_ALONG, -s), (TURN, v)]);
         let across = S::varying(v, [(TILT_ACROSS, -s), (TURN, -u)]);
         let s = S::varying(s, [(SHIFT, -1.0), (TILT_ALONG, u), (TILT_ACROSS, v)]);
-        let curvature = self.curvature;
+        let first = self.first;
         let (sin, cos) = self.angle;
         match self.local.family {
             Family::Plane => s,
-            Family::Sphere => off_round(curvature, along * along + across * across + s * s, s),
-            Family::Cylinder => off_round(curvature, across * across + s * s, s),
+            Family::Sphere => off_round(first, along * along + across * across + s * s, s),
+            Family::Cylinder => off_round(first, across * across + s * s, s),
             Family::Cone => {
                 let out = sin * along + cos * s;
                 let up = cos * along - sin * s;
-                cos * off_round(curvature, across * across + out * out, out) - sin * up
+                cos * off_round(first, across * across + out * out, out) - sin * up
             }
             Family::Torus => {
                 let raised = s + self.tube;
                 let out = cos * raised - sin * along;
                 let up = sin * raised + cos * along;
-                let off = off_round(curvature, across * across + out * out, out);
+                let off = off_round(first, across * across + out * out, out);
                 let from_centre = (off * off + up * up).sqrt();
                 if self.tube.value() < 0.0 {
                     -from_centre - self.tube
