@@ -154,6 +154,11 @@ fn pulled_and_put_back(bench: &Bench, name: &str) -> Result<()> {
     ensure!(scan_of(&id)?["columns"].as_u64() > Some(0));
     bench.control()?.replug();
     comes_to_an_end(bench, &id)?;
+    let scan = scan_of(&id)?;
+    ensure!(
+        scan["state"] == "complete" && scan["columns"] == COLUMNS,
+        "it did not go on: {scan}"
+    );
     ready()?;
     ensure!(
         (number("MainPID")?, number("NRestarts")?) == (pid, restarts),
