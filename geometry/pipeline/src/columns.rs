@@ -6,7 +6,8 @@ use range_image::Column;
 pub type ReadAgainError = Box<dyn core::error::Error + Send + Sync>;
 
 /// The columns of a scan, to be gone through as often as needed: the range image says where
-/// surfaces are, the samples then say exactly how they run. They may be in memory or not.
+/// surfaces are, the samples then say exactly how they run. They may be in memory or not; they
+/// are gone through while another thread makes the model.
 pub trait Columns: Sync {
     /// Hands every column to `take`, in their order, until one is refused with `false`.
     ///

@@ -171,8 +171,8 @@ pub fn process_columns(
     Ok((image, outcome))
 }
 
-/// From a range image alone to a model. The image need not come from `settings.regrid`; that
-/// part is only checked.
+/// From a range image alone to a model. The image need not come from `settings.regrid`; only its
+/// region of interest and its threads are asked for.
 ///
 /// # Errors
 /// As [`process_in_view`].
@@ -188,8 +188,8 @@ pub fn process(
 /// looked at: a plane that ends before the view does is not cut off by it, so it is no table.
 ///
 /// # Errors
-/// Any [`PipelineError`] but [`PipelineError::Regrid`]. [`PipelineError::hint`] says what
-/// to do.
+/// Any [`PipelineError`], of [`PipelineError::Regrid`] only that the threads cannot be had.
+/// [`PipelineError::hint`] says what to do.
 pub fn process_in_view(
     image: &RangeImage,
     columns: Option<&dyn Columns>,

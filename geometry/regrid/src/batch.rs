@@ -164,7 +164,9 @@ fn check_nodes(columns: u64, rows: u64, settings: &RegridSettings) -> Result<(),
     Ok(())
 }
 
-/// Runs the work on this many threads; 0 for all processors.
+/// Runs the work on this many threads of its own, 0 for as many as there are processors: on
+/// those that others use too, a thread that waits would begin with the work of another job, and
+/// only then go on.
 ///
 /// # Errors
 /// [`RegridError::Threads`] if so many cannot be had.
@@ -172,9 +174,6 @@ pub fn with_threads<T: Send>(
     threads: usize,
     work: impl FnOnce() -> T + Send,
 ) -> Result<T, RegridError> {
-    if threads == 0 {
-        return Ok(work());
-    }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()

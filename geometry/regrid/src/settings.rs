@@ -190,8 +190,8 @@ pub struct RegridSettings {
     pub seed: u64,
     /// When a node gets a value.
     pub support: SupportSettings,
-    /// Threads of [`crate::regrid`](fn@crate::regrid); 0 (default) for all processors. The
-    /// result does not depend on it.
+    /// Threads of [`crate::regrid`](fn@crate::regrid) and of what follows it; 0 (default) for all
+    /// processors. The result does not depend on it.
     pub threads: usize,
 }
 

@@ -61,6 +61,13 @@ pub(crate) fn all(subject: &Subject, image: &RangeImage, view: View) -> Result<V
         .with_context(|| format!("view {}", view.name()))
 }
 
+/// Runs the work on one thread, on which nothing else runs: a thread that the scenes share would
+/// begin with another scene while it waits.
+fn on_a_thread_of_its_own<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T> {
+    let done = std::thread::scope(|scope| scope.spawn(|| regrid::with_threads(1, work)).join());
+    Ok(done.map_err(|_| anyhow::anyhow!("a thread ended in a panic"))??)
+}
+
 /// The labels by one of our methods.
 pub(crate) fn ours(method: Method, image: &RangeImage) -> Result<Vec<u16>> {
     let settings = SegmentSettings {
@@ -70,7 +77,7 @@ pub(crate) fn ours(method: Method, image: &RangeImage) -> Result<Vec<u16>> {
         },
         ..pipeline::Settings::new(image.pitch_mm()).segment
     };
-    let regions = segment::segment(image, &settings, &Unmonitored)?;
+    let regions = on_a_thread_of_its_own(|| segment::segment(image, &settings, &Unmonitored))??;
     Ok(regions.raw_labels().to_vec())
 }
 
