@@ -120,6 +120,9 @@ fn full() -> anyhow::Result<()> {
     study::run(&study::Study::Crashes {
         options: Vec::new(),
     })?;
+    study::run(&study::Study::Faults {
+        options: Vec::new(),
+    })?;
     study::program("soak", &["--minutes".into(), "60".into()])?;
     study::run(&study::Study::Segmentation {
         options: ["--set", "judge", "--full", "--peers", "--check"]

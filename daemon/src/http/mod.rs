@@ -96,7 +96,7 @@ fn complete(tokens: Router<Context>, context: &Context) -> Router {
         .with_state(context.clone())
 }
 
-// Waits for whoever just writes a line to the log of a laser.
+// Waits for whoever just writes a record, or a line to the log of a laser.
 async fn status(State(context): State<Context>) -> Result<Json<Status>, Refusal> {
     let status = blocking(context, |service| Ok(service.status()));
     status.await.map(Json)
