@@ -21,7 +21,7 @@ impl Service {
         let config = self.config();
         let processing = config.processing().with_overrides(&request.settings)?;
         let reservation = station.reserve()?;
-        let identity = station.scanner.identify().map_err(|error| {
+        let identity = station.identify().map_err(|error| {
             station.note(ScannerLink::Trouble, Some(error.to_string()));
             ServiceError::scanner(&station, error)
         })?;

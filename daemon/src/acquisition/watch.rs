@@ -38,7 +38,7 @@ fn look(station: &Station) {
             }
         })
     } else {
-        station.scanner.identify().map(|identity| {
+        station.identify().map(|identity| {
             station.note_identity(&identity);
             Ok(())
         })

@@ -32,7 +32,8 @@ pub struct ScannerConfig {
     pub vendor_id: u16,
     /// Product number on USB.
     pub product_id: u16,
-    /// Serial number on USB; without one, the only scanner of those numbers.
+    /// Serial number: on USB that of the device, without one the only scanner of those numbers;
+    /// on a serial port what the scanner itself has to say, without one any.
     #[serde(deserialize_with = "value::serial_number")]
     pub serial_number: Option<String>,
     /// How long a reply to one request may take.

@@ -101,7 +101,7 @@ impl<'a> Section<'a> {
 /// Refuses keys that belong to the other way of attaching a scanner: they would do nothing.
 fn other_transport(section: &Section<'_>, transport: Transport) -> Result<(), Fault> {
     const SERIAL: [&str; 2] = ["port", "baud"];
-    const USB: [&str; 3] = ["vendor_id", "product_id", "serial_number"];
+    const USB: [&str; 2] = ["vendor_id", "product_id"];
     let (of_the_other, other, own): (&[&str], _, _) = match transport {
         Transport::Serial => (&USB, "usb", "serial"),
         Transport::Usb => (&SERIAL, "serial", "usb"),
@@ -136,15 +136,22 @@ fn apart(
     }
     let (line, _) = line_and_column(text, before.at);
     let beside = format!("[{}], line {line},", earlier.section());
+    let alike = |serial: &str| {
+        format!("{beside} has the serial number {serial} too: each scanner has its own")
+    };
     let (key, message) = match one.transport {
         Transport::Serial => {
             // `Path` takes no notice of doubled and trailing slashes.
-            if port(&one.port) != port(&other.port) {
-                return Ok(());
+            if port(&one.port) == port(&other.port) {
+                let at = other.port.display();
+                let message = format!("{beside} is on the port {at} too: each scanner has its own");
+                ("port", message)
+            } else {
+                match (&one.serial_number, &other.serial_number) {
+                    (Some(one), Some(other)) if one == other => ("serial_number", alike(one)),
+                    _ => return Ok(()),
+                }
             }
-            let at = other.port.display();
-            let message = format!("{beside} is on the port {at} too: each scanner has its own");
-            ("port", message)
         }
         Transport::Usb => {
             if (one.vendor_id, one.product_id) != (other.vendor_id, other.product_id) {
@@ -152,9 +159,7 @@ fn apart(
             }
             let message = match (&one.serial_number, &other.serial_number) {
                 (Some(one), Some(other)) if one != other => return Ok(()),
-                (Some(serial), Some(_)) => {
-                    format!("{beside} has the serial number {serial} too: each scanner has its own")
-                }
+                (Some(serial), Some(_)) => alike(serial),
                 _ => format!(
                     "{beside} has the same vendor and product number: both need a serial_number, \
                      or each might take the other's scanner"

@@ -227,6 +227,14 @@ fn scanner_problem(error: &ScannerError) -> (StatusCode, &'static str, Option<&'
             "wrong-device",
             Some("set scanner.port in the configuration to the port the scanner is on"),
         ),
+        ScannerError::WrongScanner { .. } => (
+            S::BAD_GATEWAY,
+            "wrong-scanner",
+            Some(
+                "have two cables been swapped? Put them right, or set scanner.port or \
+                 scanner.serial_number to what is there",
+            ),
+        ),
         ScannerError::Timeout { .. } => (
             S::GATEWAY_TIMEOUT,
             "scanner-silent",

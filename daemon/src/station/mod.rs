@@ -10,11 +10,11 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use relief_api::{Event, Scan, ScanState, ScannerLink, ScannerStatus, ScannerSummary, THE_SCANNER};
-use scanner_driver::Scanner;
+use scanner_driver::{Scanner, ScannerError};
 use scanner_protocol::Identity;
 
 use crate::acquisition::{AbortRequest, describe_trouble};
-use crate::config::NamedScanner;
+use crate::config::{NamedScanner, Transport};
 use crate::error::ServiceError;
 use crate::events::Hub;
 use crate::laser::{Laser, Watched};
@@ -47,6 +47,8 @@ pub(crate) struct Station {
     /// Longer than its driver may take for anything before it gives up.
     pub(crate) longest_wait: Duration,
     pub(crate) scanner: Arc<dyn Scanner>,
+    /// What the scanner has to say that its own is.
+    serial_number: Option<String>,
     pub(crate) laser: Arc<Laser>,
     hub: Arc<Hub>,
     slot: Mutex<Slot>,
@@ -110,6 +112,11 @@ impl Station {
             section: configured.section(),
             longest_wait: configured.config.longest_wait(),
             scanner: Arc::new(Watched::new(scanner, Arc::clone(&laser))),
+            serial_number: match configured.config.transport {
+                Transport::Serial => configured.config.serial_number.clone(),
+                // The USB device is chosen by its own.
+                Transport::Usb => None,
+            },
             laser,
             hub,
             slot: Mutex::new(Slot::Free),
@@ -128,6 +135,23 @@ impl Station {
 
     pub(crate) fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Asks the scanner who it is. Blocks until it has said so.
+    ///
+    /// # Errors
+    /// It cannot be asked, or is another one than the configuration says: names of serial ports
+    /// change with the order in which scanners are plugged in.
+    pub(crate) fn identify(&self) -> Result<Identity, ScannerError> {
+        let identity = self.scanner.identify()?;
+        match &self.serial_number {
+            Some(wanted) if identity.serial.as_str() != wanted => Err(ScannerError::WrongScanner {
+                place: lock(&self.status).endpoint.clone(),
+                found: identity.serial.as_str().to_owned(),
+                wanted: wanted.clone(),
+            }),
+            _ => Ok(identity),
+        }
     }
 
     /// Its section of the configuration.

@@ -325,6 +325,11 @@ fn several_scanners_are_told_apart_and_faults_with_their_lines() {
              has its own",
         ),
         (
+            port("a") + "serial_number = \"1\"\n" + &port("b") + "serial_number = \"1\"\n",
+            "line 6, column 1: [scanners.a], line 1, has the serial number 1 too: each scanner \
+             has its own",
+        ),
+        (
             usb("a", "1") + "[scanners.b]\ntransport = \"usb\"\n",
             "line 4, column 11: [scanners.a], line 1, has the same vendor and product number: \
              both need a serial_number, or each might take the other's scanner",

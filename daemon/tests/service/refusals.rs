@@ -179,6 +179,17 @@ async fn trouble_with_the_scanner_is_told_in_its_own_words() {
             "scanner.serial_number",
         ),
         (
+            ScannerError::WrongScanner {
+                place: "/dev/ttyUSB0".into(),
+                found: "A".into(),
+                wanted: "B".into(),
+            },
+            502,
+            "wrong-scanner",
+            "has the serial number A, and not B",
+            "scanner.serial_number",
+        ),
+        (
             ScannerError::UsbBusy {
                 device: "1209:0001".into(),
                 holder: Some("the kernel's driver usbtest".into()),
@@ -268,6 +279,33 @@ async fn a_socket_left_by_a_dead_service_is_taken_over() {
     assert_eq!(mode & 0o777, 0o660);
     rig.daemon.shutdown().await;
     assert!(!path.exists());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn another_scanner_on_the_port_is_not_used() {
+    let serial = |serial: &'static str| {
+        move |config: &mut reliefd::Config| config.scanner.serial_number = Some(serial.into())
+    };
+    let rig = Rig::start(tempfile::tempdir().unwrap(), serial("F-2")).await;
+    let problem = refused(&rig.client, "POST", path::SCANS, None).await;
+    assert_eq!(
+        (
+            problem.status,
+            problem.kind.as_str(),
+            problem.detail.as_str()
+        ),
+        (
+            502,
+            "wrong-scanner",
+            "the scanner on /dev/ttyUSB0 has the serial number F-1, and not F-2"
+        )
+    );
+    assert!(!rig.scanner.laser_is_on());
+    let status: Status = rig.client.get(path::STATUS).await;
+    assert_eq!(status.scanner.problem, Some(problem.detail));
+    let rig = rig.restart_with(serial("F-1")).await;
+    rig.scan_to_result("a").await;
+    rig.daemon.shutdown().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

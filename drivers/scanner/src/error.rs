@@ -111,6 +111,16 @@ pub enum ScannerError {
         /// What the operating system says.
         message: String,
     },
+    /// The scanner is another one than it has to be.
+    #[error("the scanner on {place} has the serial number {found}, and not {wanted}")]
+    WrongScanner {
+        /// Where it is.
+        place: String,
+        /// What it says.
+        found: String,
+        /// What it has to say.
+        wanted: String,
+    },
     /// The driver itself failed.
     #[error("the scanner's driver had a defect, and has begun anew: {what}; please report it")]
     Defect {
