@@ -6,8 +6,12 @@ use std::io::Read as _;
 use std::path::Path;
 
 use flate2::read::GzDecoder;
-use relief_api::{Job, JobList, JobState, Rerun, ScanList, ScanState, path};
+use relief_api::{
+    Job, JobList, JobState, LaserLog, LaserState, Rerun, ScanList, ScanState, TokenList, path,
+};
+use tokio::net::TcpStream;
 
+use crate::client::exchange;
 use crate::rig::{Rig, job_over};
 
 /// Unpacks a state folder.
@@ -88,5 +92,50 @@ async fn version_1_journals_alone_give_the_same_scans() {
             (&kept.settings, &kept.started_at)
         );
     }
+    rig.daemon.shutdown().await;
+}
+
+/// What `relief token create` has shown when the kept file was made.
+const TOKEN: &str = "relief_8ef486a7e56fa6a8bf16a534bdfa4cfdadbba743b6e3a652315301f3237ff12a";
+
+#[tokio::test(flavor = "multi_thread")]
+async fn tokens_and_laser_log_of_version_1_hold() {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/state-1");
+    let folder = tempfile::tempdir().unwrap();
+    let state = folder.path().join("state");
+    fs::create_dir_all(&state).unwrap();
+    for name in ["tokens.json", "laser.jsonl"] {
+        fs::copy(golden.join(name), state.join(name)).unwrap();
+    }
+    let rig = Rig::start(folder, |config| {
+        config.service.listen = Some("127.0.0.1:0".parse().unwrap());
+    })
+    .await;
+    let address = rig.daemon.listen().unwrap();
+    let stream = TcpStream::connect(address).await.unwrap();
+    let fields = format!("{address}\r\nAuthorization: Bearer {TOKEN}");
+    let reply = exchange(stream, &fields, "GET", path::STATUS, None).await;
+    assert_eq!(reply.status, 200);
+    let tokens: TokenList = rig.client.get(path::TOKENS).await;
+    assert_eq!(tokens.tokens[0].name, "bench");
+
+    let log: LaserLog = rig.client.get(path::LASER).await;
+    let kept: Vec<(&str, LaserState, Option<&str>)> = log
+        .entries
+        .iter()
+        .map(|entry| (entry.cause.as_str(), entry.laser, entry.scan.as_deref()))
+        .collect();
+    let (house, gone) = (
+        Some("20261122T203111.821Z-house"),
+        Some("20261122T203113.345Z-gone"),
+    );
+    let before = [
+        ("the scanner says that it is off", LaserState::Off, None),
+        ("a scan begins", LaserState::On, house),
+        ("the scan is complete", LaserState::Off, house),
+        ("a scan begins", LaserState::On, gone),
+        ("aborted on request", LaserState::Off, gone),
+    ];
+    assert_eq!(kept[..before.len()], before);
     rig.daemon.shutdown().await;
 }
