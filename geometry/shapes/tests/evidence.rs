@@ -87,6 +87,25 @@ fn noise_makes_no_bends() {
 }
 
 #[test]
+fn a_plane_is_told_by_fewer_samples_than_a_polynomial() {
+    for seed in 0..20 {
+        let evidence = decide(&sheet(10, seed, |x, y| 0.3 * x - 0.1 * y), 1.0);
+        assert_eq!(family(&evidence), Some(Family::Plane), "{seed}");
+        let all = &evidence.candidates;
+        assert!(all.iter().all(|candidate| candidate.family.is_some()));
+    }
+}
+
+#[test]
+fn where_no_family_comes_near_none_is_fitted() {
+    let bumps = |x: f64, y: f64| 3.0 * libm::sin(x / 12.0) * libm::sin(y / 12.0);
+    let evidence = decide(&sheet(4000, 3, bumps), 1.0);
+    assert!(matches!(evidence.verdict, Verdict::FreeForm));
+    let all = &evidence.candidates;
+    assert!(!all.is_empty() && all.iter().all(|candidate| candidate.family.is_none()));
+}
+
+#[test]
 fn too_few_samples_tell_nothing() {
     let few = sheet(6, 1, |_, _| 0.0);
     assert!(matches!(decide(&few, 1.0).verdict, Verdict::Unknown));
