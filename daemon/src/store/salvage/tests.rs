@@ -90,15 +90,20 @@ fn all_jobs() -> Vec<Job> {
     (0..JOBS_KEPT).map(job).collect()
 }
 
+/// Makes records of which that of one scan is damaged.
+fn make_damaged(path: &Path) {
+    let mut bytes = make(path);
+    for at in places(&bytes, r#""record":{"id":"scan-150""#) {
+        bytes[at] = b'x';
+    }
+    fs::write(path, bytes).unwrap();
+}
+
 #[test]
 fn one_damaged_record_costs_no_other() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("reliefd.redb");
-    let mut bytes = make(&path);
-    for at in places(&bytes, r#""record":{"id":"scan-150""#) {
-        bytes[at] = b'x';
-    }
-    fs::write(&path, bytes).unwrap();
+    make_damaged(&path);
     let store = open(&path).unwrap();
     let expected: Vec<usize> = (0..SCANS_KEPT).filter(|&number| number != 150).collect();
     assert_eq!(kept_scans(&store), expected);
@@ -148,11 +153,7 @@ impl Hindrance for Refusing {
 fn what_was_read_of_damaged_records_survives_a_start_that_is_cut_short() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("reliefd.redb");
-    let mut bytes = make(&path);
-    for at in places(&bytes, r#""record":{"id":"scan-150""#) {
-        bytes[at] = b'x';
-    }
-    fs::write(&path, bytes).unwrap();
+    make_damaged(&path);
     Store::open(Arc::new(HinderedDisk(Refusing(path.clone()))), &path).unwrap_err();
     assert!(!path.exists(), "it was cut short elsewhere");
     let store = open(&path).unwrap();
