@@ -1,10 +1,10 @@
 //! Which kind of surface the samples speak for.
 //!
-//! Every family that could yet be the best is fitted, and so are polynomials, which stand for whatever is none of them.
-//! What tells is how much of the samples' scatter a surface leaves over, with a price for
-//! every number it needs (Schwarz 1978, "Estimating the dimension of a model"): never a
-//! distance that someone has fixed, so that a shallow bend is no plane where the noise is
-//! small, and noise makes no cone of a cylinder.
+//! Every family that could yet be the best is fitted, and so are polynomials, which stand for
+//! whatever is none of them. What tells is how much of the samples' scatter a surface leaves
+//! over, with a price for every number it needs (Schwarz 1978, "Estimating the dimension of a
+//! model"): never a distance that someone has fixed, so that a shallow bend is no plane where
+//! the noise is small, and noise makes no cone of a cylinder.
 
 use nalgebra::SVector;
 
