@@ -35,8 +35,9 @@
 //! A record is on disk once [`JournalWriter::sync`] has returned; how many appends share
 //! one sync is the caller's policy. A file whose end is missing, torn or damaged is read
 //! up to the first record that does not check, and [`Ending::Damaged`] tells the byte and
-//! what was kept. Reading needs memory for one column; lengths are checked against
-//! [`MAX_SAMPLES`] and [`MAX_HEADER_BYTES`] before anything is allocated.
+//! what was kept; [`JournalWriter::continue_on`] goes on behind it. Reading needs memory for
+//! one column; lengths are checked against [`MAX_SAMPLES`] and [`MAX_HEADER_BYTES`] before
+//! anything is allocated.
 
 mod column;
 mod format;
@@ -47,5 +48,5 @@ mod writer;
 pub use column::{RawColumn, RawSample};
 pub use format::{MAGIC, MAX_HEADER_BYTES, MAX_REASON_BYTES, MAX_SAMPLES, SAMPLE_BYTES, VERSION};
 pub use header::Header;
-pub use reader::{Ending, JournalReader, ReadError};
+pub use reader::{Continuation, Ending, JournalReader, ReadError};
 pub use writer::{EndCause, JournalWriter, Storage, WriteError, most_bytes};

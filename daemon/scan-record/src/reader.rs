@@ -74,6 +74,22 @@ impl std::fmt::Display for Ending {
     }
 }
 
+/// Where a journal without an end record can be gone on with: behind its last sound record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Continuation {
+    pub(crate) at_byte: u64,
+    pub(crate) columns: u32,
+    pub(crate) last_index: Option<u32>,
+}
+
+impl Continuation {
+    /// Bytes of the sound records.
+    #[must_use]
+    pub fn at_byte(&self) -> u64 {
+        self.at_byte
+    }
+}
+
 /// Streams the columns of a journal; holds one at a time.
 #[derive(Debug)]
 pub struct JournalReader<R> {
@@ -143,6 +159,20 @@ impl<R: Read> JournalReader<R> {
     #[must_use]
     pub fn header(&self) -> &Header {
         &self.header
+    }
+
+    /// Where it can be gone on with, once all its columns have been read; `None` before, and if
+    /// it has its end record.
+    #[must_use]
+    pub fn continuation(&self) -> Option<Continuation> {
+        match self.ending {
+            Some(Ending::Damaged { at_byte, .. }) => Some(Continuation {
+                at_byte,
+                columns: self.columns,
+                last_index: self.last_index,
+            }),
+            Some(Ending::Closed(_)) | None => None,
+        }
     }
 
     /// The next column; `None` at the end, which [`Self::ending`] then describes.

@@ -12,6 +12,7 @@ use crate::format::{
     checksum, record_head,
 };
 use crate::header::Header;
+use crate::reader::Continuation;
 
 /// Where a journal goes. A file in service; tests put a failing or forgetful medium here.
 pub trait Storage: Write {
@@ -125,10 +126,36 @@ impl JournalWriter {
         }
         Ok(writer)
     }
+
+    /// Goes on with a journal that was cut short: what stands behind its last sound record is
+    /// cut off, and what stands before it is synced.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`].
+    pub fn continue_on(
+        disk: &dyn Disk,
+        path: &Path,
+        continuation: Continuation,
+    ) -> Result<Self, WriteError> {
+        let file = disk.open(path)?;
+        file.set_len(continuation.at_byte)?;
+        let mut writer = Self {
+            storage: Appender::behind(file, continuation.at_byte),
+            record: Vec::new(),
+            payload: Vec::new(),
+            last_index: continuation.last_index,
+            columns: continuation.columns,
+            bytes: continuation.at_byte,
+            failed: false,
+        };
+        // Its columns may never have been: a process that is killed has no time for it.
+        writer.sync()?;
+        Ok(writer)
+    }
 }
 
 impl JournalWriter {
-    /// Sets room aside for the whole scan, so that it cannot end for want of it. What is not
+    /// Sets room aside for so many columns more, so that it cannot end for want of it. What is not
     /// needed is given back by [`JournalWriter::finish`].
     ///
     /// # Errors
@@ -249,13 +276,13 @@ impl<S: Storage> JournalWriter<S> {
         Ok(self.storage)
     }
 
-    /// Columns appended so far.
+    /// Columns in it.
     #[must_use]
     pub fn columns(&self) -> u32 {
         self.columns
     }
 
-    /// Bytes written so far.
+    /// Its size in bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes

@@ -21,13 +21,22 @@ impl Appender {
         Self { file, at_byte: 0 }
     }
 
+    /// Goes on with a file of so many bytes.
+    #[must_use]
+    pub fn behind(file: Box<dyn DiskFile>, bytes: u64) -> Self {
+        Self {
+            file,
+            at_byte: bytes,
+        }
+    }
+
     /// The file.
     #[must_use]
     pub fn file(&self) -> &dyn DiskFile {
         &*self.file
     }
 
-    /// Bytes written so far.
+    /// Bytes written so far, those that were there before included.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.at_byte

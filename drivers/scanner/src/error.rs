@@ -187,6 +187,9 @@ pub enum ScannerError {
         /// Why, as far as the device said.
         cause: String,
     },
+    /// This program itself ended in mid-scan, and was started again.
+    #[error("the service ended in mid-scan and has been started again")]
+    ProgramEnded,
     /// The device stopped because it did not hear from the host in time.
     #[error("the scanner stopped by itself, since it did not hear from this computer in time")]
     DeadMan,
@@ -233,6 +236,9 @@ pub enum ScannerError {
     /// The scanner came back with another calibration.
     #[error("the scanner has been calibrated anew since the scan was begun")]
     OtherCalibration,
+    /// A scan that was interrupted earlier cannot be taken up.
+    #[error("{0}")]
+    NotTakenUp(String),
     /// No scan is paused.
     #[error("no scan is paused")]
     NothingPaused,

@@ -17,7 +17,7 @@ mod settings;
 
 pub use error::ScannerError;
 pub use link::{LinkScanner, SerialScanner, UsbScanner};
-pub use recovery::Pause;
+pub use recovery::{ColumnSource, InterruptedScan, Pause};
 pub use scanner::{
     Acknowledger, DeviceStatus, LineCounts, RawColumn, RawSample, ScanInfo, ScanProgress,
     ScanStream, Scanner, StreamControl, StreamItem,

@@ -1,6 +1,7 @@
-//! The journal from outside: round trips, torn tails, hostile bytes, version 1.
+//! The journal from outside: round trips, torn tails, going on, hostile bytes, version 1.
 
 mod common;
+mod continued;
 mod durability;
 mod hostile;
 mod round_trip;

@@ -1,9 +1,12 @@
 //! Scanners by the way they are attached: a link, and where it leads.
 
+use std::time::Duration;
+
 use scanner_protocol::{Identity, ScanPlan};
 
 use super::LinkScanner;
 use crate::error::ScannerError;
+use crate::recovery::InterruptedScan;
 use crate::scanner::{DeviceStatus, ScanStream, Scanner};
 use crate::transport::serial::{SerialConnector, SerialSettings};
 use crate::transport::usb::{UsbConnector, UsbSettings};
@@ -49,6 +52,15 @@ macro_rules! attached {
 
             fn start_scan(&self, plan: &ScanPlan) -> Result<ScanStream, ScannerError> {
                 self.link.start_scan(plan)
+            }
+
+            fn take_up_scan(
+                &self,
+                scan: InterruptedScan,
+                before: Duration,
+                person_first: bool,
+            ) -> Result<ScanStream, ScannerError> {
+                self.link.take_up_scan(scan, before, person_first)
             }
 
             fn resume_scan(&self) -> Result<(), ScannerError> {

@@ -11,10 +11,12 @@ pub use attached::{SerialScanner, UsbScanner};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use scanner_protocol::{Identity, ScanPlan};
 
 use crate::error::ScannerError;
+use crate::recovery::InterruptedScan;
 use crate::scanner::{DeviceStatus, ScanInfo, ScanStream, Scanner, StreamControl, StreamItem};
 use crate::session::{Answer, Command};
 use crate::settings::LinkSettings;
@@ -30,7 +32,15 @@ enum Call {
     Acknowledge(ScanNumber, u32),
     CloseScan(ScanNumber),
     Resume(SyncSender<Result<Outcome, ScannerError>>),
+    TakeUp(Box<TakeUp>, SyncSender<Result<Outcome, ScannerError>>),
     Shutdown,
+}
+
+/// A scan to be taken up; see [`Scanner::take_up_scan`].
+struct TakeUp {
+    scan: InterruptedScan,
+    before: Duration,
+    person_first: bool,
 }
 
 /// What a call comes to.
@@ -108,6 +118,19 @@ impl LinkScanner {
         self.call(|reply| Call::Do(command, reply))
     }
 
+    fn stream(&self, outcome: Outcome) -> Result<ScanStream, ScannerError> {
+        match outcome {
+            Outcome::Scan(info, number, items) => {
+                let control = StreamEnd {
+                    number,
+                    calls: self.calls.clone(),
+                };
+                Ok(ScanStream::new(info, items, Arc::new(control)))
+            }
+            _ => Err(ScannerError::Closed),
+        }
+    }
+
     fn call(
         &self,
         call: impl FnOnce(SyncSender<Result<Outcome, ScannerError>>) -> Call,
@@ -140,16 +163,21 @@ impl Scanner for LinkScanner {
     }
 
     fn start_scan(&self, plan: &ScanPlan) -> Result<ScanStream, ScannerError> {
-        match self.run(Command::Scan(*plan))? {
-            Outcome::Scan(info, number, items) => {
-                let control = StreamEnd {
-                    number,
-                    calls: self.calls.clone(),
-                };
-                Ok(ScanStream::new(info, items, Arc::new(control)))
-            }
-            _ => Err(ScannerError::Closed),
-        }
+        self.stream(self.run(Command::Scan(*plan))?)
+    }
+
+    fn take_up_scan(
+        &self,
+        scan: InterruptedScan,
+        before: Duration,
+        person_first: bool,
+    ) -> Result<ScanStream, ScannerError> {
+        let scan = Box::new(TakeUp {
+            scan,
+            before,
+            person_first,
+        });
+        self.stream(self.call(|reply| Call::TakeUp(scan, reply))?)
     }
 
     fn resume_scan(&self) -> Result<(), ScannerError> {

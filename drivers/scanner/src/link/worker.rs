@@ -14,7 +14,7 @@ use scanner_protocol::{Identity, ScanPlan};
 use super::backoff::Backoff;
 use super::clock::Clock;
 use super::stream::Stream;
-use super::{Call, Outcome, ScanNumber};
+use super::{Call, Outcome, ScanNumber, TakeUp};
 use crate::error::ScannerError;
 use crate::limits::MAX_OUTBOX;
 use crate::recovery::Recovery;
@@ -178,6 +178,11 @@ impl Worker {
                     None => Err(ScannerError::NothingPaused),
                 };
                 let _ = reply.send(resumed.map(|()| Outcome::Done));
+                self.hurry();
+            }
+            Call::TakeUp(taken, reply) => {
+                let begun = self.take_up(*taken, now);
+                let _ = reply.send(begun);
                 self.hurry();
             }
             Call::Do(Command::Scan(_), reply) if self.is_paused() => {
@@ -345,6 +350,34 @@ impl Worker {
         }
     }
 
+    /// A stream of a scan that waits for the device, which need not be there.
+    fn take_up(&mut self, taken: TakeUp, now: Duration) -> Result<Outcome, ScannerError> {
+        if self.stream.is_some() || !self.plans.is_empty() {
+            return Err(ScannerError::ScanRunning);
+        }
+        let Some(settings) = self.settings.resume.clone() else {
+            return Err(ScannerError::NotTakenUp(
+                "scans do not go on after an interruption: `resume` is off".to_owned(),
+            ));
+        };
+        let TakeUp {
+            scan,
+            before,
+            person_first,
+        } = taken;
+        let info = scan.info();
+        let mut scan = Recovery::taken_up(settings, scan, before, person_first, now);
+        if let Some(identity) = self.identity.clone() {
+            // It has said who it is before, and does not say so again.
+            scan.event(Event::Ready(identity), now);
+        }
+        self.next_scan += 1;
+        let number = ScanNumber(self.next_scan);
+        let (stream, items) = Stream::new(number, scan, self.settings.credits);
+        self.stream = Some(stream);
+        Ok(Outcome::Scan(info, number, items))
+    }
+
     /// Lets a paused scan go on, and passes on what has come of it.
     fn mind_the_scan(&mut self) {
         let now = self.now();
@@ -377,6 +410,9 @@ impl Worker {
         self.parked.clear();
         for reply in std::mem::take(&mut self.callers).into_values() {
             let _ = reply.send(Err(error.clone()));
+        }
+        if let Some(stream) = &mut self.stream {
+            stream.scan.unreachable(error);
         }
         // A scan that can go on waits for the connection.
         self.mind_the_scan();

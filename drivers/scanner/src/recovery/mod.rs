@@ -15,6 +15,7 @@
 //! Like the session it knows neither I/O nor clocks: events of the session and the time go
 //! in; columns, each once, and word of pauses come out.
 
+mod interrupted;
 mod overlap;
 mod pause;
 
@@ -23,6 +24,7 @@ use std::time::Duration;
 
 use scanner_protocol::{Faults, Head, Identity, ScanPlan};
 
+pub use interrupted::{ColumnSource, InterruptedScan};
 use overlap::Kept;
 pub use pause::Pause;
 use pause::{Class, class, for_a_person};
@@ -53,7 +55,7 @@ pub enum Progress {
 pub struct Recovery {
     /// Without them the first trouble ends the scan.
     settings: Option<ResumeSettings>,
-    identity: Box<Identity>,
+    source: ColumnSource,
     plan: ScanPlan,
     info: ScanInfo,
     state: State,
@@ -80,8 +82,8 @@ pub struct Recovery {
 #[derive(Debug)]
 struct Paused {
     told: Pause,
-    /// Since then nothing has been measured, and nobody has said a word.
-    since: Duration,
+    /// Until then the laser may go on again without a person's word.
+    unattended_until: Duration,
     /// Faults that a person has been told of and has not yet said a word about.
     shown: Faults,
     /// Faults that a person has seen to: they may be cleared, once.
@@ -118,7 +120,7 @@ impl Recovery {
     ) -> Self {
         Self {
             settings,
-            identity,
+            source: ColumnSource::of(&identity),
             plan,
             info,
             state: State::Running,
@@ -130,6 +132,58 @@ impl Recovery {
             again: Vec::new(),
             pause: None,
             attempts: 0,
+            same_device: true,
+            next_ticket: OWN_TICKETS,
+        }
+    }
+
+    /// A scan that the program was in when it last ended, `before` ago at the latest: a pause
+    /// like others, that ends as soon as the device is there and what is kept has been measured
+    /// again, or once a person says so. `person_first` has it wait for that in any case.
+    #[must_use]
+    pub fn taken_up(
+        settings: ResumeSettings,
+        scan: InterruptedScan,
+        before: Duration,
+        person_first: bool,
+        now: Duration,
+    ) -> Self {
+        let mut kept = Kept::default();
+        for column in scan.kept.into_columns() {
+            kept.push(column, settings.overlap_columns);
+        }
+        let unattended = settings.unattended;
+        let needs_person = person_first || before >= unattended;
+        let told = Pause {
+            cause: ScannerError::ProgramEnded,
+            needs_person,
+            columns: scan.columns,
+        };
+        Self {
+            settings: Some(settings),
+            source: scan.source,
+            plan: scan.plan,
+            info: scan.info,
+            state: if needs_person {
+                State::Attended
+            } else {
+                State::Waiting(now)
+            },
+            progress: VecDeque::from([Progress::Paused(told.clone())]),
+            measured: now,
+            handed: scan.columns,
+            acknowledged: Acknowledged::all_below(scan.columns),
+            kept,
+            again: Vec::new(),
+            pause: Some(Paused {
+                told,
+                unattended_until: now + unattended.saturating_sub(before),
+                shown: Faults::NONE,
+                attended: Faults::NONE,
+                failures: 0,
+            }),
+            attempts: 0,
+            // Said by the device as soon as it is there.
             same_device: true,
             next_ticket: OWN_TICKETS,
         }
@@ -156,10 +210,11 @@ impl Recovery {
     /// # Errors
     /// [`ScannerError::NothingPaused`] if it has not stopped.
     pub fn resume(&mut self, now: Duration) -> Result<(), ScannerError> {
+        let unattended = self.unattended();
         let (Some(pause), false) = (&mut self.pause, self.state == State::Over) else {
             return Err(ScannerError::NothingPaused);
         };
-        pause.since = now;
+        pause.unattended_until = now + unattended;
         pause.failures = 0;
         // The same trouble once more is news again.
         if std::mem::take(&mut pause.told.needs_person) {
@@ -172,6 +227,14 @@ impl Recovery {
             self.state = State::Waiting(now);
         }
         Ok(())
+    }
+
+    /// The device cannot be reached, which is news to a scan that has just been taken up.
+    pub fn unreachable(&mut self, error: &ScannerError) {
+        let just_taken_up = |pause: &Paused| pause.told.cause == ScannerError::ProgramEnded;
+        if self.pause.as_ref().is_some_and(just_taken_up) {
+            self.tell(error.clone(), self.needs_person());
+        }
     }
 
     /// Ends a paused scan; one that runs is ended by the session.
@@ -212,12 +275,11 @@ impl Recovery {
 
     /// Does what is due; `session` is there while there is a connection.
     pub fn poll(&mut self, session: Option<&mut Session>, now: Duration) {
-        let Some(settings) = &self.settings else {
+        if self.settings.is_none() {
             return;
-        };
-        let unattended = settings.unattended;
+        }
         if let (State::Waiting(_) | State::Homed, Some(pause)) = (self.state, &mut self.pause)
-            && now >= pause.since + unattended
+            && now >= pause.unattended_until
         {
             pause.told.needs_person = true;
             pause.attended = Faults::NONE;
@@ -269,14 +331,19 @@ impl Recovery {
     /// When [`Recovery::poll`] has something to do, events aside.
     #[must_use]
     pub fn deadline(&self) -> Option<Duration> {
-        let (Some(settings), Some(pause)) = (&self.settings, &self.pause) else {
-            return None;
-        };
+        let pause = self.pause.as_ref().filter(|_| self.settings.is_some())?;
         match self.state {
-            State::Waiting(from) => Some(from.min(pause.since + settings.unattended)),
-            State::Homed => Some(pause.since + settings.unattended),
+            State::Waiting(from) => Some(from.min(pause.unattended_until)),
+            State::Homed => Some(pause.unattended_until),
             _ => None,
         }
+    }
+
+    /// How long the laser may stay off before a person has to say that it may go on again.
+    fn unattended(&self) -> Duration {
+        self.settings
+            .as_ref()
+            .map_or(Duration::ZERO, |settings| settings.unattended)
     }
 
     /// Whether a person has been asked to let the scan go on, and has not done so.
@@ -317,7 +384,7 @@ impl Recovery {
         if !last {
             return;
         }
-        let count_mm = match self.identity.calibration.head {
+        let count_mm = match self.source.calibration.head {
             Head::Polar { range_count_pm, .. } => f64::from(range_count_pm) * 1e-9,
             Head::Cartesian { count_pm } => f64::from(count_pm) * 1e-9,
         };
@@ -343,19 +410,7 @@ impl Recovery {
     }
 
     fn meet(&mut self, identity: &Identity) {
-        let ours = &self.identity;
-        let other = if (identity.model.as_str(), identity.serial.as_str())
-            != (ours.model.as_str(), ours.serial.as_str())
-        {
-            Some(ScannerError::OtherScanner {
-                wanted: format!("{} {}", ours.model, ours.serial),
-                found: format!("{} {}", identity.model, identity.serial),
-            })
-        } else if identity.calibration != ours.calibration {
-            Some(ScannerError::OtherCalibration)
-        } else {
-            None
-        };
+        let other = self.source.other_than(&ColumnSource::of(identity));
         self.same_device = other.is_none();
         if let Some(error) = other
             && self.is_paused()
@@ -423,13 +478,13 @@ impl Recovery {
             needs_person,
             columns: self.handed,
         };
-        let since = self.measured;
+        let unattended_until = self.measured + self.unattended();
         let pause = self.pause.get_or_insert_with(|| Paused {
             told: Pause {
                 columns: u32::MAX,
                 ..told.clone()
             },
-            since,
+            unattended_until,
             shown: Faults::NONE,
             attended: Faults::NONE,
             failures: 0,

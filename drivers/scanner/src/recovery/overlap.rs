@@ -35,7 +35,7 @@ const HOMING_MM: f64 = 0.02;
 const MAD_TO_SIGMA: f64 = 1.4826;
 
 /// The columns handed on that are measured again for a comparison.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Kept {
     columns: VecDeque<RawColumn>,
     /// The first so many are from before a gap in the object: the last that could prove
@@ -82,6 +82,11 @@ impl Kept {
     /// All, in order.
     pub(super) fn iter(&self) -> impl Iterator<Item = &RawColumn> {
         self.columns.iter()
+    }
+
+    /// All, in order.
+    pub(super) fn into_columns(self) -> impl Iterator<Item = RawColumn> {
+        self.columns.into_iter()
     }
 
     fn samples_from(&self, first: usize) -> usize {

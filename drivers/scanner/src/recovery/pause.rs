@@ -22,6 +22,8 @@ impl fmt::Display for Pause {
         write!(f, "{}", self.cause)?;
         if self.needs_person {
             f.write_str("; see to it, then let the scan go on with `relief resume`")
+        } else if self.cause == ScannerError::ProgramEnded {
+            f.write_str("; the scan goes on by itself once its last columns are found unchanged")
         } else {
             f.write_str("; the scan goes on by itself once that is over")
         }

@@ -33,6 +33,15 @@ pub struct Acknowledged {
 }
 
 impl Acknowledged {
+    /// All below this index, and no others.
+    #[must_use]
+    pub fn all_below(below: u32) -> Self {
+        Self {
+            below,
+            ahead: BTreeSet::new(),
+        }
+    }
+
     /// Adds a column, if it is one of those `handed` on and is not in already; says whether
     /// all below some further index are safe now.
     pub fn add(&mut self, column: u32, handed: u32) -> bool {

@@ -73,7 +73,7 @@ impl Drop for Running {
 }
 
 /// A connector over the transports that are put into the channel, one for each connection.
-fn plug() -> (mpsc::Sender<MemoryTransport>, impl Connector) {
+pub(crate) fn plug() -> (mpsc::Sender<MemoryTransport>, impl Connector) {
     let (sockets, plugged) = mpsc::channel::<MemoryTransport>();
     let connector = ("memory".to_owned(), move || {
         plugged

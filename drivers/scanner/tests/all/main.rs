@@ -15,4 +15,5 @@ mod pty;
 mod recovery;
 mod resume;
 mod scans;
+mod taken_up;
 mod usb;
