@@ -184,11 +184,13 @@ impl Daemon {
             tokens,
         };
         let service = Arc::new(Service::new(config, stations, hub, kept, scans_dir));
-        service.recover_scans().map_err(StartError::Recover)?;
+        let cut_short = service.recover_scans().map_err(StartError::Recover)?;
         service.adopt_journals().map_err(StartError::Recover)?;
         service.recover_jobs().map_err(StartError::Recover)?;
         service.sweep();
         service.measure_free();
+        let taken_up = service.take_up_scans(cut_short);
+        taken_up.map_err(StartError::Recover)?;
 
         let stop = CancellationToken::new();
         let context = Context {

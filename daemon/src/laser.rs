@@ -9,9 +9,10 @@ use std::collections::VecDeque;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use relief_api::{LaserEntry, LaserState, ScanState, THE_SCANNER};
-use scanner_driver::{DeviceStatus, ScanStream, Scanner, ScannerError};
+use scanner_driver::{DeviceStatus, InterruptedScan, ScanStream, Scanner, ScannerError};
 use scanner_protocol::{Identity, ScanPlan};
 use storage::Disk;
 
@@ -190,6 +191,18 @@ impl Laser {
         known.note(LaserState::On, "a scan begins");
     }
 
+    /// A scan that was cut short is about to be taken up.
+    fn take_up(&self) {
+        let mut known = lock(&self.known);
+        known.acts += 1;
+        known.ended_meanwhile = false;
+        known.scan = known.next_scan.take();
+        known.add(
+            LaserState::Unknown,
+            "a scan is taken up that was cut short when the service last ended",
+        );
+    }
+
     /// The scanner is told to stop; why, if that is known.
     fn stopping(&self) -> Option<String> {
         let mut known = lock(&self.known);
@@ -333,6 +346,16 @@ impl Scanner for Watched {
             self.laser.note(LaserState::Unknown, &error.to_string());
         }
         started
+    }
+
+    fn take_up_scan(
+        &self,
+        scan: InterruptedScan,
+        before: Duration,
+        person_first: bool,
+    ) -> Result<ScanStream, ScannerError> {
+        self.laser.take_up();
+        self.scanner.take_up_scan(scan, before, person_first)
     }
 
     fn resume_scan(&self) -> Result<(), ScannerError> {

@@ -1,14 +1,19 @@
 //! Taking up what an earlier run left, and what the disk refused to keep.
 
+mod cut_short;
+
 use std::fs;
 use std::path::Path;
 
 use relief_api::{Event, JobState, Scan, ScanState};
 use scan_record::{EndCause, Ending, JournalReader};
 
+use crate::acquisition::Rest;
 use crate::error::ServiceError;
 use crate::ids::now;
 use crate::service::{Service, lock};
+
+pub(crate) use cut_short::CutShort;
 
 /// What a journal tells of its scan, whatever became of the service meanwhile.
 #[derive(Debug)]
@@ -18,19 +23,25 @@ struct Found {
     columns: u32,
     state: ScanState,
     reason: Option<String>,
+    /// What is missing of a scan that was cut short, or why it cannot be gone on with.
+    rest: Result<Rest, String>,
 }
 
 impl Found {
     fn in_journal(path: &Path) -> Self {
-        let interrupted = |begun, columns, what: String| Self {
+        let interrupted = |begun, columns, what: String, rest| Self {
             begun,
             columns,
             state: ScanState::Interrupted,
             reason: Some(format!("the service ended during the scan ({what})")),
+            rest,
         };
         let mut reader = match JournalReader::open(path) {
             Ok(reader) => reader,
-            Err(error) => return interrupted(None, 0, error.to_string()),
+            Err(error) => {
+                let what = error.to_string();
+                return interrupted(None, 0, what.clone(), Err(what));
+            }
         };
         let begun = serde_json::from_slice(&reader.header().metadata).ok();
         let failed = loop {
@@ -45,14 +56,21 @@ impl Found {
             Some(Ending::Closed(EndCause::Complete)) => (ScanState::Complete, None),
             Some(Ending::Closed(EndCause::Aborted(by))) => (ScanState::Aborted, Some(by.clone())),
             Some(Ending::Closed(EndCause::Fault(what))) => (ScanState::Failed, Some(what.clone())),
-            Some(damaged) => return interrupted(begun, columns, damaged.to_string()),
-            None => return interrupted(begun, columns, failed.unwrap_or_default()),
+            Some(damaged) => {
+                let rest = Rest::of(&reader, path);
+                return interrupted(begun, columns, damaged.to_string(), rest);
+            }
+            None => {
+                let what = failed.unwrap_or_default();
+                return interrupted(begun, columns, what.clone(), Err(what));
+            }
         };
         Self {
             begun,
             columns,
             state,
             reason,
+            rest: Err("it has its end".to_owned()),
         }
     }
 
@@ -61,19 +79,32 @@ impl Found {
         scan.columns = self.columns;
         scan.state = self.state;
         scan.reason = self.reason;
+        scan.needs_person = false;
         scan.ended_at = Some(now());
     }
 }
 
 impl Service {
     /// After a restart: notes how scans ended that were under way, and what was kept of
-    /// them. One that had its last column is complete, and is processed.
-    pub(crate) fn recover_scans(&self) -> Result<(), ServiceError> {
+    /// them. One that had its last column is complete, and is processed. Gives those that can
+    /// be gone on with.
+    pub(crate) fn recover_scans(&self) -> Result<Vec<CutShort>, ServiceError> {
+        let mut cut_short = Vec::new();
         for mut scan in self.store.scans()? {
             if scan.state.is_over() {
                 continue;
             }
-            Found::in_journal(&self.journal_path(&scan.id)).end(&mut scan);
+            let found = Found::in_journal(&self.journal_path(&scan.id));
+            if found.state == ScanState::Interrupted {
+                match self.may_go_on(&scan, &found) {
+                    Ok(rest) => {
+                        cut_short.push(rest);
+                        continue;
+                    }
+                    Err(why) => tracing::info!(scan = %scan.id, why, "a scan is not gone on with"),
+                }
+            }
+            found.end(&mut scan);
             self.give_back_room(&scan.id);
             if scan.state == ScanState::Complete {
                 tracing::info!(scan = %scan.id, "a scan was complete when the service last ended");
@@ -86,7 +117,7 @@ impl Service {
             }
             self.keep_ended(&mut scan)?;
         }
-        Ok(())
+        Ok(cut_short)
     }
 
     /// After a restart: makes records of scans that have none, from their journals. That is
@@ -131,7 +162,7 @@ impl Service {
     }
 
     /// Gives back what was set aside for the rest of a scan that was cut short.
-    fn give_back_room(&self, scan: &str) {
+    pub(crate) fn give_back_room(&self, scan: &str) {
         let path = self.journal_path(scan);
         // One that is not there is not to be made.
         let cut =

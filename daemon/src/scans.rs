@@ -5,7 +5,7 @@ use std::sync::Arc;
 use relief_api::{Aborted, Event, Scan, ScanState, ScannerLink, StartScan};
 use scanner_driver::ScannerError;
 
-use crate::acquisition::{AbortRequest, Ticket, calibration, check_grid, resolve, run};
+use crate::acquisition::{AbortRequest, Task, Ticket, calibration, check_grid, resolve, run};
 use crate::error::ServiceError;
 use crate::ids::{now, shown_name};
 use crate::service::{Service, lock};
@@ -28,7 +28,11 @@ impl Service {
         station.note_identity(&identity);
         let plan = request.plan.or(&config.scan_on(station.name()));
         let plan = resolve(&plan, &identity)?;
-        check_grid(&processing.regrid, &plan, &calibration(&identity))?;
+        check_grid(
+            &processing.regrid,
+            &plan,
+            &calibration(&identity.calibration),
+        )?;
         let id = self.ids.next(&request.name, |id| {
             self.spool.has(id) || self.journal_path(id).exists()
         });
@@ -42,6 +46,8 @@ impl Service {
             scanner: station.name().to_owned(),
             state: ScanState::Starting,
             reason: None,
+            needs_person: false,
+            interruption: None,
             started_at: now(),
             ended_at: None,
             columns_planned: plan.plan.columns,
@@ -55,8 +61,7 @@ impl Service {
         let ticket = Ticket {
             station: Arc::clone(&station),
             scan: scan.clone(),
-            plan,
-            identity,
+            task: Task::Begin { plan, identity },
             processing,
             room,
             abort: Arc::clone(&abort),
@@ -333,6 +338,8 @@ mod tests {
             scanner: String::new(),
             state: ScanState::Scanning,
             reason: None,
+            needs_person: false,
+            interruption: None,
             started_at: now(),
             ended_at: None,
             columns_planned: 9,

@@ -51,7 +51,8 @@ pub use job::{Job, JobId, JobList, JobState, Rerun, SpoolEntry, SpoolFile, Stage
 pub use laser::{LaserEntry, LaserLog, LaserState};
 pub use problem::Problem;
 pub use scan::{
-    Aborted, MAX_NAME_CHARS, PlanRequest, Scan, ScanList, ScanState, SettingOverrides, StartScan,
+    Aborted, Interruption, MAX_NAME_CHARS, PlanRequest, Scan, ScanList, ScanState,
+    SettingOverrides, StartScan,
 };
 pub use status::{
     ScannerLink, ScannerList, ScannerStatus, ScannerSummary, Status, StorageStatus, THE_SCANNER,

@@ -175,6 +175,12 @@ pub struct Scan {
     /// What went wrong, or who ended it; of a paused scan, why.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
+    /// It is paused until a person says that it may go on.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub needs_person: bool,
+    /// When the service last ended in the midst of it, if it did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interruption: Option<Interruption>,
     /// Start, RFC 3339 in UTC.
     pub started_at: String,
     /// End, RFC 3339 in UTC.
@@ -198,6 +204,17 @@ pub struct Scan {
     /// When columns that had been removed were found again, RFC 3339.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub put_back_at: Option<String>,
+}
+
+/// The service ended in the midst of a scan.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Interruption {
+    /// Since when, at the latest, nothing was measured: RFC 3339 in UTC.
+    pub since: String,
+    /// Columns that were safe on disk.
+    pub columns: u32,
+    /// How often the service has ended in a row without a new column.
+    pub times: u32,
 }
 
 /// The scans that were asked to end: read as a [`Scan`], it is the first of them.

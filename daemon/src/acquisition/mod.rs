@@ -1,29 +1,33 @@
 //! Taking a scan: from the scanner's columns to the journal on disk, and live to whoever
 //! looks on.
 
+mod feed;
 pub(crate) mod grid_file;
+mod heading;
+mod keep;
+mod live;
 mod plan;
 mod run;
+mod taken_up;
 mod view;
 mod watch;
 
 use std::sync::{Mutex, PoisonError};
 
 use range_image::{Calibration, calibration::Head};
-use scanner_protocol::Identity;
 
 pub use plan::PlanError;
 pub(crate) use plan::resolve;
-pub(crate) use run::{Ticket, run};
+pub(crate) use run::{Task, Ticket, not_taken_up, run};
+pub(crate) use taken_up::{Rest, TakeUp};
 pub(crate) use view::check_grid;
 pub(crate) use watch::{describe_trouble, watch};
 
 /// What the device announced, as the geometry needs it.
-pub(crate) fn calibration(identity: &Identity) -> Calibration {
+pub(crate) fn calibration(wire: &scanner_protocol::Calibration) -> Calibration {
     const NM_PER_MM: f64 = 1e6;
     const PM_PER_MM: f64 = 1e9;
     const PRAD_PER_RAD: f64 = 1e12;
-    let wire = &identity.calibration;
     Calibration {
         table_origin_mm: wire.table_origin_nm as f64 / NM_PER_MM,
         table_count_mm: f64::from(wire.table_count_pm) / PM_PER_MM,

@@ -72,7 +72,7 @@ pub(crate) fn resolve(
     identity: &Identity,
 ) -> Result<ResolvedPlan, PlanError> {
     let limits = &identity.limits;
-    let calibration = super::calibration(identity);
+    let calibration = super::calibration(&identity.calibration);
     let table = Axis {
         name: "table",
         unit: "mm",

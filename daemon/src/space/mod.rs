@@ -20,6 +20,7 @@ use storage::remove_file_if_there;
 use crate::error::ServiceError;
 use crate::ids::now;
 use crate::service::{Service, lock};
+use promise::taken_bytes;
 pub(crate) use promise::{Promise, Promises};
 use sweep::{Kept, surplus};
 
@@ -67,9 +68,11 @@ impl Service {
     ) -> Result<Promise, ServiceError> {
         let reserve_bytes = self.config().storage.reserve_bytes();
         let journal_bytes = scan_record::most_bytes(columns, samples.into());
+        // Of a scan that is gone on with, some of it is there.
+        let missing_bytes = journal_bytes.saturating_sub(taken_bytes(&self.journal_path(scan)));
         let look = |promised_bytes| {
             let folders = [
-                (self.scans_dir(), journal_bytes, promised_bytes),
+                (self.scans_dir(), missing_bytes, promised_bytes),
                 (self.spool.root(), 0, 0),
             ];
             let mut folders = folders.into_iter();

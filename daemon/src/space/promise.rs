@@ -55,7 +55,7 @@ impl Promises {
 }
 
 /// Bytes that a journal has taken of its disk, those set aside included.
-fn taken_bytes(journal: &Path) -> u64 {
+pub(super) fn taken_bytes(journal: &Path) -> u64 {
     fs::metadata(journal).map_or(0, |journal| journal.blocks().saturating_mul(BLOCK_BYTES))
 }
 

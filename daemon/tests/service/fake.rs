@@ -8,8 +8,8 @@ use scanner_driver::protocol::{
     Activity, Calibration, Faults, Head, Identity, Limits, ScanPlan, text,
 };
 use scanner_driver::{
-    DeviceStatus, LineCounts, RawColumn, RawSample, ScanInfo, ScanStream, Scanner, ScannerError,
-    StreamControl, StreamItem,
+    DeviceStatus, InterruptedScan, LineCounts, Pause, RawColumn, RawSample, ScanInfo, ScanStream,
+    Scanner, ScannerError, StreamControl, StreamItem,
 };
 
 /// Micrometres per count, of table and profile.
@@ -106,6 +106,38 @@ impl FakeScanner {
     /// Called once, when the next scan is about to start.
     pub(crate) fn on_start(&self, hook: impl Fn() + Send + 'static) {
         *self.on_start.lock().unwrap() = Some(Box::new(hook));
+    }
+
+    /// The columns from this one on; behind others, after a pause.
+    fn deliver(&self, plan: ScanPlan, first: u32) -> ScanStream {
+        let (sender, receiver) = sync_channel(4);
+        let this = self.this.get().unwrap().clone();
+        let scanner = this.upgrade().unwrap();
+        std::thread::spawn(move || {
+            if first > 0 {
+                let pause = Pause {
+                    cause: ScannerError::ProgramEnded,
+                    needs_person: false,
+                    columns: first,
+                };
+                let _ = sender.send(StreamItem::Paused(pause));
+                let _ = sender.send(StreamItem::Resumed);
+            }
+            let end = (first..plan.columns).try_for_each(|index| {
+                scanner.wait_for_leave(index)?;
+                sender
+                    .send(StreamItem::Column(column(&plan, index)))
+                    .map_err(|_| ScannerError::Closed)
+            });
+            scanner.change(|state| state.laser_on = false);
+            let _ = sender.send(StreamItem::End(end));
+        });
+        let info = ScanInfo {
+            columns: plan.columns,
+            spacing_um: plan.angle_step_counts.unsigned_abs() * COUNT_UM,
+            uniform: true,
+        };
+        ScanStream::new(info, receiver, Arc::new(Control(this)))
     }
 
     fn check(&self) -> Result<(), ScannerError> {
@@ -244,29 +276,22 @@ impl Scanner for FakeScanner {
             state.aborted = false;
             state.laser_on = true;
         });
-        let (sender, receiver) = sync_channel(4);
-        let this = self.this.get().unwrap().clone();
-        let scanner = this.upgrade().unwrap();
-        let plan = *plan;
-        std::thread::spawn(move || {
-            let end = (0..plan.columns).try_for_each(|index| {
-                scanner.wait_for_leave(index)?;
-                sender
-                    .send(StreamItem::Column(column(&plan, index)))
-                    .map_err(|_| ScannerError::Closed)
-            });
-            scanner.change(|state| state.laser_on = false);
-            let _ = sender.send(StreamItem::End(end));
+        Ok(self.deliver(*plan, 0))
+    }
+
+    fn take_up_scan(
+        &self,
+        scan: InterruptedScan,
+        _before: Duration,
+        person_first: bool,
+    ) -> Result<ScanStream, ScannerError> {
+        assert!(!person_first, "nobody is there to say so");
+        self.change(|state| {
+            state.homed = true;
+            state.aborted = false;
+            state.laser_on = true;
         });
-        Ok(ScanStream::new(
-            ScanInfo {
-                columns: plan.columns,
-                spacing_um: plan.angle_step_counts.unsigned_abs() * COUNT_UM,
-                uniform: true,
-            },
-            receiver,
-            Arc::new(Control(this)),
-        ))
+        Ok(self.deliver(scan.plan(), scan.columns()))
     }
 
     fn abort(&self) -> Result<(), ScannerError> {

@@ -85,6 +85,12 @@ impl InterruptedScan {
         Ok(())
     }
 
+    /// What was asked of the device.
+    #[must_use]
+    pub fn plan(&self) -> ScanPlan {
+        self.plan
+    }
+
     /// What the device said when it accepted the scan.
     #[must_use]
     pub fn info(&self) -> ScanInfo {

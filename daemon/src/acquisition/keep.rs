@@ -1,0 +1,207 @@
+//! Keeping a scan's columns, and passing them on.
+
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::time::Instant;
+
+use range_image::Calibration;
+use relief_api::{Event, ScanState, ScannerLink};
+use scan_record::{EndCause, Header, JournalWriter, RawColumn};
+use scanner_driver::ScanStream;
+
+use super::AbortRequest;
+use super::feed::{Fed, feed};
+use super::live::Live;
+use super::run::{Ticket, despite_defects};
+use crate::config::JournalConfig;
+use crate::liveness::Pulse;
+use crate::service::Service;
+use crate::station::Station;
+
+/// Columns between the driver and the journal.
+const CHANNEL_COLUMNS: usize = 64;
+
+/// What a column meets on its way.
+pub(super) struct Keeper<'a> {
+    service: &'a Service,
+    station: &'a Station,
+    id: &'a str,
+    abort: &'a AbortRequest,
+    policy: JournalConfig,
+    calibration: Calibration,
+    journal: JournalWriter,
+    live: Live<'a>,
+}
+
+impl<'a> Keeper<'a> {
+    /// One that keeps the columns behind those that are in the journal and in the live range
+    /// image.
+    pub(super) fn new(
+        service: &'a Service,
+        ticket: &'a Ticket,
+        header: &Header,
+        journal: JournalWriter,
+        live: Live<'a>,
+    ) -> Self {
+        Self {
+            service,
+            station: &ticket.station,
+            id: &ticket.scan.id,
+            abort: &ticket.abort,
+            policy: service.config().journal,
+            calibration: header.calibration,
+            journal,
+            live,
+        }
+    }
+
+    /// Keeps all that comes, to the end.
+    pub(super) fn keep_all(mut self, stream: ScanStream, pulse: &Pulse) -> Result<(), String> {
+        let (service, station) = (self.service, self.station);
+        let acknowledger = stream.acknowledger();
+        let (sender, receiver) = sync_channel(CHANNEL_COLUMNS);
+        let result = std::thread::scope(|scope| {
+            let feeder = std::thread::Builder::new()
+                .name(station.loop_name("scan-feed"))
+                .spawn_scoped(scope, move || feed(service, station, stream, &sender))
+                .map_err(|error| format!("cannot start a thread: {error}"))?;
+            // The feeder has the stream: unless it is told of a defect here, too, it waits for
+            // columns for which nobody acknowledges those before.
+            let acknowledge = |index| acknowledger.acknowledge(index);
+            let result = despite_defects(|| self.drain(&receiver, pulse, &acknowledge));
+            // With the receiver gone the feeder ends at its next column; an abort wakes a
+            // feeder that waits for one.
+            drop(receiver);
+            if result.is_err()
+                && !feeder.is_finished()
+                && let Err(error) = station.scanner.abort()
+            {
+                tracing::warn!(%error, "cannot tell the scanner to stop");
+            }
+            result
+        });
+        let cause = match (&result, self.abort.reason()) {
+            (Ok(()), _) => EndCause::Complete,
+            (Err(_), Some(reason)) => EndCause::Aborted(reason),
+            (Err(problem), None) => EndCause::Fault(problem.clone()),
+        };
+        let closed = self.journal.finish(&cause).map_err(|e| e.to_string());
+        let result = result.and(closed.map(drop));
+        self.live.finish(result.is_ok());
+        result
+    }
+
+    /// Keeps column after column until the end. One sync serves all columns that came
+    /// while the one before was under way, or within the configured interval.
+    fn drain(
+        &mut self,
+        receiver: &Receiver<Fed>,
+        pulse: &Pulse,
+        acknowledge: &dyn Fn(u32),
+    ) -> Result<(), String> {
+        let mut batch: Vec<RawColumn> = Vec::new();
+        let mut due = Instant::now();
+        loop {
+            let fed = if batch.is_empty() {
+                pulse.rest();
+                receiver.recv().map_err(|_| RecvTimeoutError::Disconnected)
+            } else {
+                receiver.recv_timeout(due.saturating_duration_since(Instant::now()))
+            };
+            pulse.work(self.station.longest_wait);
+            match fed {
+                Ok(Fed::Column(column)) => {
+                    if batch.is_empty() {
+                        due = Instant::now() + self.policy.interval();
+                    }
+                    self.journal.append(&column).map_err(|e| e.to_string())?;
+                    batch.push(column);
+                    if batch.len() >= self.policy.sync_columns as usize {
+                        self.commit(&mut batch, acknowledge)?;
+                    }
+                }
+                Ok(Fed::Paused {
+                    reason,
+                    needs_person,
+                }) => {
+                    self.commit(&mut batch, acknowledge)?;
+                    tracing::warn!(scan = self.id, %reason, "scan paused");
+                    self.station.laser.scan_paused(&reason);
+                    self.note_pause(Some(reason), needs_person);
+                }
+                Ok(Fed::Resumed) => {
+                    self.commit(&mut batch, acknowledge)?;
+                    tracing::info!(scan = self.id, "scan goes on");
+                    self.station.laser.scan_goes_on();
+                    self.note_pause(None, false);
+                    // Of a scan that was taken up nobody has asked yet; the scanner has said it.
+                    if self.station.status().model.is_none()
+                        && let Ok(identity) = self.station.identify()
+                    {
+                        self.station.note_identity(&identity);
+                    }
+                }
+                Ok(Fed::End(end)) => {
+                    self.commit(&mut batch, acknowledge)?;
+                    return end.map_err(|e| e.to_string());
+                }
+                Err(RecvTimeoutError::Timeout) => self.commit(&mut batch, acknowledge)?,
+                Err(RecvTimeoutError::Disconnected) => {
+                    self.commit(&mut batch, acknowledge)?;
+                    return Err("the scanner's driver ended without a word".into());
+                }
+            }
+        }
+    }
+
+    /// Tells all who look on that the scan stands still, or goes on.
+    fn note_pause(&self, reason: Option<String>, needs_person: bool) {
+        let (state, link) = match reason {
+            Some(_) => (ScanState::Paused, ScannerLink::Trouble),
+            None => (ScanState::Scanning, ScannerLink::Scanning),
+        };
+        self.station.note(link, reason.clone());
+        let scan = self.station.update_active(|scan| {
+            scan.state = state;
+            scan.reason = reason;
+            scan.needs_person = needs_person;
+        });
+        // The record of a pause is for those who look; the columns do not hang on it.
+        if let Some(Err(error)) = scan.map(|scan| self.service.keep_scan(&scan)) {
+            tracing::error!(scan = self.id, %error, "cannot keep the record of a scan");
+        }
+    }
+
+    /// Syncs, and only then acknowledges and passes on.
+    fn commit(
+        &mut self,
+        batch: &mut Vec<RawColumn>,
+        acknowledge: &dyn Fn(u32),
+    ) -> Result<(), String> {
+        if batch.is_empty() {
+            return Ok(());
+        }
+        self.journal.sync().map_err(|e| e.to_string())?;
+        for column in batch.iter() {
+            acknowledge(column.index);
+        }
+        let before = self.journal.columns() - batch.len() as u32;
+        for (column, kept) in batch.drain(..).zip(before + 1..) {
+            let scan = self.station.update_active(|scan| scan.columns = kept);
+            let columns_planned = scan.map_or(0, |scan| scan.columns_planned);
+            let live = self.live.push(column.calibrated(&self.calibration));
+            if self.service.hub.has_listeners() {
+                self.service.hub.tell(Event::Column {
+                    scan: self.id.to_owned(),
+                    scanner: self.station.name().to_owned(),
+                    columns: kept,
+                    columns_planned,
+                    samples: column.samples.len() as u32,
+                    x_mm: self.calibration.x_mm(column.table_counts),
+                    pitch_mm: self.live.pitch_mm(),
+                    live,
+                });
+            }
+        }
+        Ok(())
+    }
+}

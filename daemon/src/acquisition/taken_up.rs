@@ -1,0 +1,138 @@
+//! Going on with a scan that the service was in when it last ended.
+
+use std::io::Read;
+use std::path::Path;
+use std::time::Duration;
+
+use scan_record::{EndCause, JournalReader, JournalWriter, RawColumn, most_bytes};
+
+use super::heading::interrupted;
+use super::keep::Keeper;
+use super::live::Live;
+use super::run::{Failure, Ticket};
+use crate::liveness::Pulse;
+use crate::service::Service;
+
+/// Columns that may be behind the last sound record of a journal whose writing was cut short:
+/// more than are written between two syncs.
+const UNSYNCED_COLUMNS: u32 = 256;
+
+/// What the journal of a scan that was cut short says about the rest.
+#[derive(Debug, Clone)]
+pub(crate) struct Rest {
+    /// Columns that the scan is to have.
+    pub(crate) columns: u32,
+    /// Most samples of a column.
+    pub(crate) samples: u16,
+}
+
+impl Rest {
+    /// What is missing in a journal whose columns have all been read.
+    ///
+    /// # Errors
+    /// In words, why it cannot be gone on with.
+    pub(crate) fn of<R: Read>(reader: &JournalReader<R>, path: &Path) -> Result<Self, String> {
+        let (scan, plan) = interrupted(reader.header())
+            .ok_or("its journal does not say enough about the scanner")?;
+        let continuation = reader
+            .continuation()
+            .ok_or("its journal has not been read to its end")?;
+        let bytes = std::fs::metadata(path).map_err(|e| e.to_string())?.len();
+        let behind = bytes.saturating_sub(continuation.at_byte());
+        // Columns that were acknowledged are not cut off, even if they can no longer be read.
+        if behind > most_bytes(UNSYNCED_COLUMNS, plan.samples.into()) {
+            return Err(format!(
+                "its journal is damaged long before its end, {behind} bytes of it"
+            ));
+        }
+        Ok(Self {
+            columns: scan.info().columns,
+            samples: plan.samples,
+        })
+    }
+}
+
+/// How a scan is taken up.
+#[derive(Debug)]
+pub(crate) struct TakeUp {
+    /// How long, at most, nothing has been measured.
+    pub(crate) before: Duration,
+    /// It waits for a person in any case.
+    pub(crate) person_first: bool,
+}
+
+/// Takes the rest of the scan.
+pub(super) fn take_up(
+    service: &Service,
+    ticket: &Ticket,
+    how: &TakeUp,
+    pulse: &Pulse,
+) -> Result<(), Failure> {
+    let id = ticket.scan.id.as_str();
+    let path = service.journal_path(id);
+    let not = |why: &dyn std::fmt::Display| Failure::not_taken_up(&why.to_string());
+    let mut reader = JournalReader::open(&path).map_err(|error| not(&error))?;
+    let header = reader.header().clone();
+    let (mut scan, plan) =
+        interrupted(&header).ok_or_else(|| not(&"its journal says too little"))?;
+    let mut live = Live::new(service, id, &ticket.processing, &header, &plan);
+    while let Some(column) = reader.next_column().map_err(|error| not(&error))? {
+        pulse.beat();
+        if let Some(reason) = ticket.abort.reason() {
+            return Err(Failure::from(reason));
+        }
+        live.push(column.calibrated(&header.calibration));
+        scan.add(measured(column)).map_err(|error| not(&error))?;
+    }
+    let continuation = reader
+        .continuation()
+        .ok_or_else(|| not(&"its journal has an end"))?;
+    drop(reader);
+    let journal = JournalWriter::continue_on(&*service.disk, &path, continuation);
+    let mut journal = journal.map_err(|error| not(&error))?;
+    if scan.is_whole() {
+        journal
+            .finish(&EndCause::Complete)
+            .map_err(|error| not(&error))?;
+        live.finish(true);
+        return Ok(());
+    }
+    journal
+        .reserve(
+            scan.info().columns.saturating_sub(scan.columns()),
+            plan.samples.into(),
+        )
+        .map_err(|error| not(&error))?;
+    tracing::info!(
+        scan = id,
+        scanner = ticket.station.name(),
+        columns = scan.columns(),
+        person_first = how.person_first,
+        "a scan is taken up that was cut short when the service last ended"
+    );
+    let scanner = &ticket.station.scanner;
+    let stream = scanner
+        .take_up_scan(scan, how.before, how.person_first)
+        .map_err(|error| not(&error))?;
+    let keeper = Keeper::new(service, ticket, &header, journal, live);
+    Ok(keeper.keep_all(stream, pulse)?)
+}
+
+/// The journal's column as the driver gave it.
+fn measured(column: RawColumn) -> scanner_driver::RawColumn {
+    scanner_driver::RawColumn {
+        index: column.index,
+        table_counts: column.table_counts,
+        dropouts: column.dropouts,
+        samples: column
+            .samples
+            .into_iter()
+            .map(|sample| scanner_driver::RawSample {
+                lateral_counts: sample.lateral_counts,
+                range_counts: sample.range_counts,
+                intensity: sample.intensity,
+                saturated: sample.saturated,
+            })
+            .collect(),
+    }
+}

@@ -1,0 +1,129 @@
+//! Scans that the service was in when it last ended, and that can be gone on with.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use jiff::Timestamp;
+use relief_api::{Interruption, Scan, ScanState};
+use scanner_driver::ScannerError;
+
+use super::Found;
+use crate::acquisition::{AbortRequest, Rest, TakeUp, Task, Ticket, not_taken_up, run};
+use crate::error::ServiceError;
+use crate::ids::{now, rfc3339};
+use crate::service::Service;
+
+/// After so many ends of the service in a row without a new column a person is asked: the scan
+/// itself may be what ends it.
+const MOST_IN_A_ROW: u32 = 3;
+
+/// A scan that the service was in when it last ended, and that can be gone on with.
+#[derive(Debug)]
+pub(crate) struct CutShort {
+    scan: Scan,
+    rest: Rest,
+    how: TakeUp,
+}
+
+impl Service {
+    /// How a scan can be gone on with whose journal has this in it.
+    ///
+    /// # Errors
+    /// In words, why it cannot.
+    pub(super) fn may_go_on(&self, scan: &Scan, found: &Found) -> Result<CutShort, String> {
+        let rest = found.rest.clone()?;
+        let station = self.station(&scan.scanner).map_err(|e| e.to_string())?;
+        let config = self.config();
+        let mut scanners = config.each_scanner().into_iter();
+        if !scanners.any(|scanner| scanner.name == station.name() && scanner.config.resume) {
+            return Err(format!("[{}] resume is false", station.section()));
+        }
+        let last = scan.interruption.as_ref();
+        let last = last.filter(|last| last.columns == found.columns);
+        // The journal was last written when its last column came, but for what taking it up
+        // does to it.
+        let since = last
+            .and_then(|last| last.since.parse().ok())
+            .or_else(|| self.journal_written(&scan.id))
+            .unwrap_or(Timestamp::UNIX_EPOCH);
+        let times = last.map_or(0, |last| last.times) + 1;
+        let mut scan = scan.clone();
+        let person_first = scan.needs_person || times > MOST_IN_A_ROW;
+        scan.interruption = Some(Interruption {
+            since: rfc3339(since),
+            columns: found.columns,
+            times,
+        });
+        scan.state = ScanState::Paused;
+        scan.reason = Some(ScannerError::ProgramEnded.to_string());
+        scan.columns = found.columns;
+        scan.columns_planned = rest.columns;
+        let before = Timestamp::now().duration_since(since);
+        Ok(CutShort {
+            scan,
+            rest,
+            how: TakeUp {
+                // A clock that was put back says nothing about how long it has been.
+                before: before.try_into().unwrap_or(Duration::MAX),
+                person_first,
+            },
+        })
+    }
+
+    /// Goes on with scans that were cut short. One that cannot be gone on with after all stays
+    /// as it is, with all columns that are kept.
+    pub(crate) fn take_up_scans(
+        self: &Arc<Self>,
+        scans: Vec<CutShort>,
+    ) -> Result<(), ServiceError> {
+        for CutShort { scan, rest, how } in scans {
+            let mut left = scan.clone();
+            if let Err(error) = self.take_up_scan(scan, &rest, how) {
+                tracing::warn!(scan = %left.id, %error, "a scan that was cut short is not gone on with");
+                left.state = ScanState::Interrupted;
+                left.reason = Some(not_taken_up(&error.to_string()));
+                left.needs_person = false;
+                left.ended_at = Some(now());
+                self.give_back_room(&left.id);
+                self.keep_ended(&mut left)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn take_up_scan(
+        self: &Arc<Self>,
+        scan: Scan,
+        rest: &Rest,
+        how: TakeUp,
+    ) -> Result<(), ServiceError> {
+        let station = Arc::clone(self.station(&scan.scanner)?);
+        let processing = self.config().processing().with_overrides(&scan.settings)?;
+        let reservation = station.reserve()?;
+        let room = self.promise_room(&scan.id, rest.columns, rest.samples)?;
+        let abort = Arc::new(AbortRequest::default());
+        let ticket = Ticket {
+            station: Arc::clone(&station),
+            scan: scan.clone(),
+            task: Task::TakeUp(how),
+            processing,
+            room,
+            abort: Arc::clone(&abort),
+        };
+        reservation.take(&scan, abort, || {
+            self.store.put_scan(&scan)?;
+            station.laser.scan_begins(&scan.id);
+            let service = Arc::clone(self);
+            std::thread::Builder::new()
+                .name(station.loop_name("scan"))
+                .spawn(move || run(&service, ticket))
+                .map_err(ServiceError::Thread)
+        })
+    }
+
+    /// When the scan's journal was last written, as far as the disk says so.
+    fn journal_written(&self, scan: &str) -> Option<Timestamp> {
+        let written = std::fs::metadata(self.journal_path(scan)).ok()?.modified();
+        Timestamp::try_from(written.ok()?).ok()
+    }
+}
