@@ -9,7 +9,6 @@ use std::collections::VecDeque;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
 
 use relief_api::{LaserEntry, LaserState, ScanState, THE_SCANNER};
 use scanner_driver::{DeviceStatus, InterruptedScan, ScanStream, Scanner, ScannerError};
@@ -348,14 +347,9 @@ impl Scanner for Watched {
         started
     }
 
-    fn take_up_scan(
-        &self,
-        scan: InterruptedScan,
-        before: Duration,
-        person_first: bool,
-    ) -> Result<ScanStream, ScannerError> {
+    fn take_up_scan(&self, scan: InterruptedScan) -> Result<ScanStream, ScannerError> {
         self.laser.take_up();
-        self.scanner.take_up_scan(scan, before, person_first)
+        self.scanner.take_up_scan(scan)
     }
 
     fn resume_scan(&self) -> Result<(), ScannerError> {

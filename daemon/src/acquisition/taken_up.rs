@@ -56,9 +56,9 @@ impl Rest {
 #[derive(Debug)]
 pub(crate) struct TakeUp {
     /// How long, at most, nothing has been measured.
-    pub(crate) before: Duration,
-    /// It waits for a person in any case.
-    pub(crate) person_first: bool,
+    pub(crate) silent: Duration,
+    /// Why a person has to say that it may go on, however short the silence.
+    pub(crate) waits_for: Option<String>,
 }
 
 /// Takes the rest of the scan.
@@ -107,13 +107,13 @@ pub(super) fn take_up(
         scan = id,
         scanner = ticket.station.name(),
         columns = scan.columns(),
-        person_first = how.person_first,
+        waits_for = how.waits_for,
         "a scan is taken up that was cut short when the service last ended"
     );
+    scan.silent = how.silent;
+    scan.waits_for.clone_from(&how.waits_for);
     let scanner = &ticket.station.scanner;
-    let stream = scanner
-        .take_up_scan(scan, how.before, how.person_first)
-        .map_err(|error| not(&error))?;
+    let stream = scanner.take_up_scan(scan).map_err(|error| not(&error))?;
     let keeper = Keeper::new(service, ticket, &header, journal, live);
     Ok(keeper.keep_all(stream, pulse)?)
 }

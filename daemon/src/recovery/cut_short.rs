@@ -48,24 +48,36 @@ impl Service {
             .unwrap_or(Timestamp::UNIX_EPOCH);
         let times = last.map_or(0, |last| last.times) + 1;
         let mut scan = scan.clone();
-        let person_first = scan.needs_person || times > MOST_IN_A_ROW;
+        let waits_for = if scan.needs_person {
+            scan.reason.take()
+        } else {
+            (times > MOST_IN_A_ROW).then(|| {
+                format!(
+                    "the service has ended {times} times in a row at this column; see to it, then \
+                     let the scan go on with `relief resume`"
+                )
+            })
+        };
         scan.interruption = Some(Interruption {
             since: rfc3339(since),
             columns: found.columns,
             times,
         });
-        scan.state = ScanState::Paused;
-        scan.reason = Some(ScannerError::ProgramEnded.to_string());
+        scan.needs_person = waits_for.is_some();
+        // Paused once the driver has it, and can be told to go on.
+        scan.state = ScanState::Starting;
+        let before = waits_for.clone();
+        scan.reason = Some(ScannerError::ProgramEnded { before }.to_string());
         scan.columns = found.columns;
         scan.columns_planned = rest.columns;
-        let before = Timestamp::now().duration_since(since);
+        let silent = Timestamp::now().duration_since(since);
         Ok(CutShort {
             scan,
             rest,
             how: TakeUp {
                 // A clock that was put back says nothing about how long it has been.
-                before: before.try_into().unwrap_or(Duration::MAX),
-                person_first,
+                silent: silent.try_into().unwrap_or(Duration::MAX),
+                waits_for,
             },
         })
     }

@@ -116,7 +116,7 @@ impl FakeScanner {
         std::thread::spawn(move || {
             if first > 0 {
                 let pause = Pause {
-                    cause: ScannerError::ProgramEnded,
+                    cause: ScannerError::ProgramEnded { before: None },
                     needs_person: false,
                     columns: first,
                 };
@@ -279,13 +279,8 @@ impl Scanner for FakeScanner {
         Ok(self.deliver(*plan, 0))
     }
 
-    fn take_up_scan(
-        &self,
-        scan: InterruptedScan,
-        _before: Duration,
-        person_first: bool,
-    ) -> Result<ScanStream, ScannerError> {
-        assert!(!person_first, "nobody is there to say so");
+    fn take_up_scan(&self, scan: InterruptedScan) -> Result<ScanStream, ScannerError> {
+        assert_eq!(scan.waits_for, None, "nobody is there to say so");
         self.change(|state| {
             state.homed = true;
             state.aborted = false;

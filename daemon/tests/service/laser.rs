@@ -172,6 +172,17 @@ async fn scanning(dead_man_ms: u32) -> Running {
     let _: Scan = client.post(path::SCANS, &StartScan::default()).await;
     control.wait_until(GUARD, |device| device.laser_on).unwrap();
     known_as(&client, LaserState::On).await;
+    let kept = async {
+        loop {
+            let status: Status = client.get(path::STATUS).await;
+            if status.scan.is_some_and(|scan| scan.columns > 0) {
+                return;
+            }
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    };
+    let kept = tokio::time::timeout(GUARD, kept).await;
+    kept.expect("a column is kept");
     Running {
         child,
         control,
@@ -266,21 +277,27 @@ async fn killed_in_any_way_the_service_leaves_the_laser_to_the_dead_man() {
         running.laser_goes_off();
         assert_eq!(running.logged().pop().unwrap().laser, LaserState::On);
 
-        // The next start says what nobody saw, and looks.
+        // The next start says what nobody saw, and goes on.
         let at = running.folder.path().to_owned();
         running.child = start(&at);
         let client = up(&at).await;
-        known_as(&client, LaserState::Off).await;
+        known_as(&client, LaserState::On).await;
         let logged = running.logged();
-        let [.., unknown, off] = logged.as_slice() else {
+        let [.., dead, taken_up, on] = logged.as_slice() else {
             panic!("{logged:?}");
         };
+        use LaserState::{On, Unknown};
         assert_eq!(
-            (unknown.laser, off.laser),
-            (LaserState::Unknown, LaserState::Off)
+            (dead.laser, taken_up.laser, on.laser),
+            (Unknown, Unknown, On)
         );
+        assert!(dead.cause.contains("dead-man"), "{dead:?}");
+        assert!(taken_up.cause.contains("taken up"), "{taken_up:?}");
+        assert!(on.scan.is_some() && on.scan == taken_up.scan, "{logged:?}");
         running.signal(Signal::SIGTERM);
         assert!(running.child.wait().unwrap().success());
+        assert_eq!(running.logged().pop().unwrap().laser, LaserState::Off);
+        assert!(!running.control.snapshot().laser_on);
     }
 }
 

@@ -188,8 +188,11 @@ pub enum ScannerError {
         cause: String,
     },
     /// This program itself ended in mid-scan, and was started again.
-    #[error("the service ended in mid-scan and has been started again")]
-    ProgramEnded,
+    #[error("{PROGRAM_ENDED}{}", .before.as_deref().map(before_that).unwrap_or_default())]
+    ProgramEnded {
+        /// What a person was told before, who has not yet said a word.
+        before: Option<String>,
+    },
     /// The device stopped because it did not hear from the host in time.
     #[error("the scanner stopped by itself, since it did not hear from this computer in time")]
     DeadMan,
@@ -274,6 +277,18 @@ impl ScannerError {
                 }
         )
     }
+}
+
+/// How [`ScannerError::ProgramEnded`] reads.
+const PROGRAM_ENDED: &str = "the service ended in mid-scan and has been started again";
+
+/// What follows it.
+const BEFORE_THAT: &str = "; before that: ";
+
+/// What was said before the program ended, however often it has done so since.
+fn before_that(said: &str) -> String {
+    let said = said.rsplit(BEFORE_THAT).next().unwrap_or_default();
+    format!("{BEFORE_THAT}{said}")
 }
 
 /// What a reject's detail adds for the user.

@@ -41,20 +41,15 @@ pub trait Scanner: Send + Sync {
     /// What the device refuses, or [`ScannerError::ScanRunning`].
     fn start_scan(&self, plan: &ScanPlan) -> Result<ScanStream, ScannerError>;
 
-    /// Takes up a scan that the program was in when it last ended, `before` ago at the latest:
-    /// it is paused until its last columns have been measured again and are as they were. The
-    /// device need not be there yet. With `person_first`, or once it has been longer than the
-    /// laser may go on by itself, it waits for [`Scanner::resume_scan`].
+    /// Takes up a scan that the program was in when it last ended: it is paused until its last
+    /// columns have been measured again and are as they were. The device need not be there yet.
+    /// If a person was waited for, or it has been longer than the laser may go on by itself, it
+    /// waits for [`Scanner::resume_scan`].
     ///
     /// # Errors
     /// [`ScannerError::NotTakenUp`] if this scanner cannot do so; [`ScannerError::ScanRunning`].
-    fn take_up_scan(
-        &self,
-        scan: InterruptedScan,
-        before: Duration,
-        person_first: bool,
-    ) -> Result<ScanStream, ScannerError> {
-        let _ = (scan, before, person_first);
+    fn take_up_scan(&self, scan: InterruptedScan) -> Result<ScanStream, ScannerError> {
+        drop(scan);
         Err(ScannerError::NotTakenUp(
             "scans of this scanner do not go on after an interruption".to_owned(),
         ))

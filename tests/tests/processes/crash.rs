@@ -9,7 +9,7 @@ use relief_api::{
 };
 use relief_tests::rig::{self, Client, GUARD, journal_columns, leisurely_house, small_house};
 use reliefd::{Config, Daemon};
-use scan_record::{Ending, JournalReader};
+use scan_record::{EndCause, Ending, JournalReader};
 use sim_scanner::device::Event as Happened;
 
 use crate::role::{Role, SERVICE};
@@ -100,36 +100,98 @@ pub(crate) fn what_was_acknowledged_survives_the_death_of_the_service() -> Resul
 
     let (service, client) = start(folder.path(), scanner.port())?;
     runtime.block_on(async {
+        let mut events = client.events().await?;
         let scan: Scan = client.get(&path::scan(&id)).await?;
-        ensure!(scan.state == ScanState::Interrupted, "{scan:?}");
-        let reason = scan.reason.unwrap_or_default();
+        let interruption = scan.interruption.clone().context("no word of the end")?;
         ensure!(
-            reason.contains("the service ended during the scan"),
-            "{reason}"
+            interruption.columns >= safe && interruption.times == 1,
+            "{interruption:?} of {safe} columns"
         );
-        ensure!(
-            scan.columns >= safe,
-            "{} of {safe} columns are kept",
-            scan.columns
-        );
-        let journal = folder.path().join("downloaded.scan");
-        std::fs::write(&journal, client.download(&path::scan_journal(&id)).await?)?;
-        ensure!(journal_columns(&journal)?.len() == scan.columns as usize);
-        let mut reader = JournalReader::open(&journal)?;
+        // It goes on by itself, to the same columns as if nothing had happened.
+        if !scan.state.is_over() {
+            events.scan_complete(&id).await?;
+        }
+        let scan: Scan = client.get(&path::scan(&id)).await?;
+        ensure!(scan.state == ScanState::Complete, "{scan:?}");
+        ensure!(scan.jobs.len() == 1, "{scan:?}");
+        let kept = client.download(&path::scan_journal(&id)).await?;
+        let first = folder.path().join("first.scan");
+        std::fs::write(&first, kept)?;
+        let mut reader = JournalReader::open(&first)?;
         while reader.next_column()?.is_some() {}
         let ending = reader.ending().context("an ending")?;
-        ensure!(matches!(ending, Ending::Damaged { .. }), "{ending}");
+        ensure!(*ending == Ending::Closed(EndCause::Complete), "{ending}");
+        let log: LaserLog = client.get(path::LASER).await?;
+        let states: Vec<LaserState> = log.entries.iter().map(|entry| entry.laser).collect();
+        use LaserState::{Off, On, Unknown};
+        // As it was when the service died, found so, taken up, gone on with, complete.
+        ensure!(
+            states.ends_with(&[On, Unknown, Unknown, On, Off]),
+            "{log:?}"
+        );
 
-        // And the scanner can be used again.
-        let mut events = client.events().await?;
-        let mut next = named("next");
-        next.plan.columns = Some(60);
-        let next: Scan = client.post(path::SCANS, &next).await?;
+        let next: Scan = client.post(path::SCANS, &named("next")).await?;
         let next = events.scan_complete(&next.id).await?;
-        ensure!(next.columns == 60, "{next:?}");
+        ensure!(next.interruption.is_none(), "{next:?}");
+        let second = folder.path().join("second.scan");
+        std::fs::write(
+            &second,
+            client.download(&path::scan_journal(&next.id)).await?,
+        )?;
+        ensure!(journal_columns(&first)? == journal_columns(&second)?);
         Ok(())
     })?;
     service.end()
+}
+
+pub(crate) fn a_part_moved_while_the_service_was_dead_waits_for_a_person() -> Result<()> {
+    let folder = tempfile::tempdir()?;
+    let scanner = leisurely_house().serve_pty(None)?;
+    let (service, client) = start(folder.path(), scanner.port())?;
+    let runtime = runtime()?;
+    let id = runtime.block_on(async {
+        let mut events = client.events().await?;
+        let scan: Scan = client.post(path::SCANS, &named("moved")).await?;
+        // The part is in view.
+        events.columns(&scan.id, 900).await?;
+        Ok::<_, anyhow::Error>(scan.id)
+    })?;
+    service.kill()?;
+    let moved = sim_scanner::Vec3::new(0.0, 0.0, 1.5);
+    scanner.control().move_part(moved);
+
+    let (service, client) = start(folder.path(), scanner.port())?;
+    let reason = runtime.block_on(waits_for_a_person(&client, &id))?;
+    ensure!(reason.contains("has moved"), "{reason}");
+    // Whoever had to be asked has to be asked by the next as well.
+    service.kill()?;
+    let (service, client) = start(folder.path(), scanner.port())?;
+    scanner.control().move_part(-moved);
+    runtime.block_on(async {
+        let mut events = client.events().await?;
+        let reason = waits_for_a_person(&client, &id).await?;
+        ensure!(
+            reason.contains("service ended") && reason.contains("has moved"),
+            "{reason}"
+        );
+        let told: Scan = client.ask(&path::scan_resume(&id)).await?;
+        ensure!(told.id == id);
+        events.scan_complete(&id).await?;
+        Ok(())
+    })?;
+    service.end()
+}
+
+/// Waits until the scan waits for a person; why.
+async fn waits_for_a_person(client: &Client, id: &str) -> Result<String> {
+    loop {
+        let scan: Scan = client.get(&path::scan(id)).await?;
+        ensure!(!scan.state.is_over(), "{scan:?}");
+        if scan.state == ScanState::Paused && scan.needs_person {
+            return Ok(scan.reason.unwrap_or_default());
+        }
+        tokio::time::sleep(std::time::Duration::from_millis(10)).await;
+    }
 }
 
 pub(crate) fn two_scans_survive_the_death_of_the_service() -> Result<()> {
@@ -156,24 +218,29 @@ pub(crate) fn two_scans_survive_the_death_of_the_service() -> Result<()> {
         Ok::<_, anyhow::Error>(ids)
     })?;
     service.kill()?;
+    let mut safe = Vec::new();
     for scanner in &scanners {
         let mut control = scanner.control();
         control.wait_for(GUARD, |event| *event == Happened::DeadMan)?;
         ensure!(!control.snapshot().laser_on, "a laser is on");
+        safe.push(acknowledged(&control.events()));
     }
     let (service, client) = start_before(folder.path(), &ports)?;
     runtime.block_on(async {
-        for ((id, name), scanner) in ids.iter().zip(["a", "b"]).zip(&scanners) {
-            let safe = acknowledged(&scanner.control().events());
-            let scan: Scan = client.get(&path::scan(id)).await?;
+        for ((id, name), safe) in ids.iter().zip(["a", "b"]).zip(safe) {
+            let mut events = client.events().await?;
+            let mut scan: Scan = client.get(&path::scan(id)).await?;
+            let kept = scan.interruption.as_ref().map_or(0, |cut| cut.columns);
             ensure!(
-                (scan.state, scan.scanner.as_str()) == (ScanState::Interrupted, name),
-                "{scan:?}"
+                safe >= 32 && kept >= safe,
+                "{kept} of {safe} columns are kept"
             );
+            if !scan.state.is_over() {
+                scan = events.scan_complete(id).await?;
+            }
             ensure!(
-                safe >= 32 && scan.columns >= safe,
-                "{} of {safe} columns are kept",
-                scan.columns
+                (scan.state, scan.scanner.as_str()) == (ScanState::Complete, name),
+                "{scan:?}"
             );
             let log: LaserLog = client.get(&path::scanner_laser(name)).await?;
             let told = |entry: &LaserEntry| {

@@ -19,10 +19,14 @@ static ALLOCATOR: PeakAlloc = PeakAlloc;
 
 type Test = (&'static str, fn() -> Result<()>);
 
-const TESTS: [Test; 5] = [
+const TESTS: [Test; 6] = [
     (
         "crash::what_was_acknowledged_survives_the_death_of_the_service",
         crash::what_was_acknowledged_survives_the_death_of_the_service,
+    ),
+    (
+        "crash::a_part_moved_while_the_service_was_dead_waits_for_a_person",
+        crash::a_part_moved_while_the_service_was_dead_waits_for_a_person,
     ),
     (
         "crash::two_scans_survive_the_death_of_the_service",

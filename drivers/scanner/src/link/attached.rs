@@ -1,7 +1,5 @@
 //! Scanners by the way they are attached: a link, and where it leads.
 
-use std::time::Duration;
-
 use scanner_protocol::{Identity, ScanPlan};
 
 use super::LinkScanner;
@@ -54,13 +52,8 @@ macro_rules! attached {
                 self.link.start_scan(plan)
             }
 
-            fn take_up_scan(
-                &self,
-                scan: InterruptedScan,
-                before: Duration,
-                person_first: bool,
-            ) -> Result<ScanStream, ScannerError> {
-                self.link.take_up_scan(scan, before, person_first)
+            fn take_up_scan(&self, scan: InterruptedScan) -> Result<ScanStream, ScannerError> {
+                self.link.take_up_scan(scan)
             }
 
             fn resume_scan(&self) -> Result<(), ScannerError> {

@@ -11,7 +11,6 @@ pub use attached::{SerialScanner, UsbScanner};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
-use std::time::Duration;
 
 use scanner_protocol::{Identity, ScanPlan};
 
@@ -32,15 +31,11 @@ enum Call {
     Acknowledge(ScanNumber, u32),
     CloseScan(ScanNumber),
     Resume(SyncSender<Result<Outcome, ScannerError>>),
-    TakeUp(Box<TakeUp>, SyncSender<Result<Outcome, ScannerError>>),
+    TakeUp(
+        Box<InterruptedScan>,
+        SyncSender<Result<Outcome, ScannerError>>,
+    ),
     Shutdown,
-}
-
-/// A scan to be taken up; see [`Scanner::take_up_scan`].
-struct TakeUp {
-    scan: InterruptedScan,
-    before: Duration,
-    person_first: bool,
 }
 
 /// What a call comes to.
@@ -166,17 +161,8 @@ impl Scanner for LinkScanner {
         self.stream(self.run(Command::Scan(*plan))?)
     }
 
-    fn take_up_scan(
-        &self,
-        scan: InterruptedScan,
-        before: Duration,
-        person_first: bool,
-    ) -> Result<ScanStream, ScannerError> {
-        let scan = Box::new(TakeUp {
-            scan,
-            before,
-            person_first,
-        });
+    fn take_up_scan(&self, scan: InterruptedScan) -> Result<ScanStream, ScannerError> {
+        let scan = Box::new(scan);
         self.stream(self.call(|reply| Call::TakeUp(scan, reply))?)
     }
 

@@ -14,10 +14,10 @@ use scanner_protocol::{Identity, ScanPlan};
 use super::backoff::Backoff;
 use super::clock::Clock;
 use super::stream::Stream;
-use super::{Call, Outcome, ScanNumber, TakeUp};
+use super::{Call, Outcome, ScanNumber};
 use crate::error::ScannerError;
 use crate::limits::MAX_OUTBOX;
-use crate::recovery::Recovery;
+use crate::recovery::{InterruptedScan, Recovery};
 use crate::scanner::ScanInfo;
 use crate::session::{Answer, Command, Event, Session, Ticket};
 use crate::settings::LinkSettings;
@@ -180,8 +180,8 @@ impl Worker {
                 let _ = reply.send(resumed.map(|()| Outcome::Done));
                 self.hurry();
             }
-            Call::TakeUp(taken, reply) => {
-                let begun = self.take_up(*taken, now);
+            Call::TakeUp(scan, reply) => {
+                let begun = self.take_up(*scan, now);
                 let _ = reply.send(begun);
                 self.hurry();
             }
@@ -351,7 +351,7 @@ impl Worker {
     }
 
     /// A stream of a scan that waits for the device, which need not be there.
-    fn take_up(&mut self, taken: TakeUp, now: Duration) -> Result<Outcome, ScannerError> {
+    fn take_up(&mut self, scan: InterruptedScan, now: Duration) -> Result<Outcome, ScannerError> {
         if self.stream.is_some() || !self.plans.is_empty() {
             return Err(ScannerError::ScanRunning);
         }
@@ -360,13 +360,8 @@ impl Worker {
                 "scans do not go on after an interruption: `resume` is off".to_owned(),
             ));
         };
-        let TakeUp {
-            scan,
-            before,
-            person_first,
-        } = taken;
         let info = scan.info();
-        let mut scan = Recovery::taken_up(settings, scan, before, person_first, now);
+        let mut scan = Recovery::taken_up(settings, scan, now);
         if let Some(identity) = self.identity.clone() {
             // It has said who it is before, and does not say so again.
             scan.event(Event::Ready(identity), now);

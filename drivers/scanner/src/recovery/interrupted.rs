@@ -1,5 +1,7 @@
 //! A scan that the program was in when it last ended, as far as its columns are kept.
 
+use std::time::Duration;
+
 use scanner_protocol::{Calibration, Identity, ScanPlan, Text};
 
 use super::overlap::Kept;
@@ -53,6 +55,10 @@ pub struct InterruptedScan {
     pub(super) info: ScanInfo,
     pub(super) kept: Kept,
     pub(super) columns: u32,
+    /// How long, at most, nothing has been measured.
+    pub silent: Duration,
+    /// Why a person has to say that it may go on, however short the silence.
+    pub waits_for: Option<String>,
 }
 
 impl InterruptedScan {
@@ -66,6 +72,8 @@ impl InterruptedScan {
             info,
             kept: Kept::default(),
             columns: 0,
+            silent: Duration::ZERO,
+            waits_for: None,
         }
     }
 

@@ -137,25 +137,20 @@ impl Recovery {
         }
     }
 
-    /// A scan that the program was in when it last ended, `before` ago at the latest: a pause
-    /// like others, that ends as soon as the device is there and what is kept has been measured
-    /// again, or once a person says so. `person_first` has it wait for that in any case.
+    /// A scan that the program was in when it last ended: a pause like others, that ends as soon
+    /// as the device is there and what is kept has been measured again, or once a person says so.
     #[must_use]
-    pub fn taken_up(
-        settings: ResumeSettings,
-        scan: InterruptedScan,
-        before: Duration,
-        person_first: bool,
-        now: Duration,
-    ) -> Self {
+    pub fn taken_up(settings: ResumeSettings, scan: InterruptedScan, now: Duration) -> Self {
         let mut kept = Kept::default();
         for column in scan.kept.into_columns() {
             kept.push(column, settings.overlap_columns);
         }
         let unattended = settings.unattended;
-        let needs_person = person_first || before >= unattended;
+        let needs_person = scan.waits_for.is_some() || scan.silent >= unattended;
         let told = Pause {
-            cause: ScannerError::ProgramEnded,
+            cause: ScannerError::ProgramEnded {
+                before: scan.waits_for,
+            },
             needs_person,
             columns: scan.columns,
         };
@@ -177,7 +172,7 @@ impl Recovery {
             again: Vec::new(),
             pause: Some(Paused {
                 told,
-                unattended_until: now + unattended.saturating_sub(before),
+                unattended_until: now + unattended.saturating_sub(scan.silent),
                 shown: Faults::NONE,
                 attended: Faults::NONE,
                 failures: 0,
@@ -231,7 +226,12 @@ impl Recovery {
 
     /// The device cannot be reached, which is news to a scan that has just been taken up.
     pub fn unreachable(&mut self, error: &ScannerError) {
-        let just_taken_up = |pause: &Paused| pause.told.cause == ScannerError::ProgramEnded;
+        let just_taken_up = |pause: &Paused| {
+            matches!(
+                pause.told.cause,
+                ScannerError::ProgramEnded { before: None }
+            )
+        };
         if self.pause.as_ref().is_some_and(just_taken_up) {
             self.tell(error.clone(), self.needs_person());
         }

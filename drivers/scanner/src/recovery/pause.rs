@@ -20,9 +20,16 @@ pub struct Pause {
 impl fmt::Display for Pause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.cause)?;
-        if self.needs_person {
+        let program_ended = match &self.cause {
+            ScannerError::ProgramEnded { before } => Some(before),
+            _ => None,
+        };
+        if program_ended.is_some_and(Option::is_some) && self.needs_person {
+            // What was said before says also what to do.
+            Ok(())
+        } else if self.needs_person {
             f.write_str("; see to it, then let the scan go on with `relief resume`")
-        } else if self.cause == ScannerError::ProgramEnded {
+        } else if program_ended.is_some() {
             f.write_str("; the scan goes on by itself once its last columns are found unchanged")
         } else {
             f.write_str("; the scan goes on by itself once that is over")

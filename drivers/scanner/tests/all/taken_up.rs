@@ -1,7 +1,6 @@
 //! The device's thread takes up a scan that the program was in when it last ended.
 
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
 
 use scanner_driver::protocol::{Calibration, Head, text};
 use scanner_driver::transport::memory;
@@ -49,7 +48,7 @@ fn a_scan_is_taken_up_before_the_device_is_there() {
     for index in 0..25 {
         kept.add(expected(index)).unwrap();
     }
-    let take_up = || scanner.take_up_scan(kept.clone(), Duration::ZERO, false);
+    let take_up = || scanner.take_up_scan(kept.clone());
     let mut stream = take_up().unwrap();
     assert_eq!(take_up().unwrap_err(), ScannerError::ScanRunning);
     let paused = |stream: &mut ScanStream| match stream.next_progress() {
@@ -60,7 +59,7 @@ fn a_scan_is_taken_up_before_the_device_is_there() {
     while !matches!(told.cause, ScannerError::NoSuchPort { .. }) {
         assert_eq!(
             (&told.cause, told.columns),
-            (&ScannerError::ProgramEnded, 25)
+            (&ScannerError::ProgramEnded { before: None }, 25)
         );
         told = paused(&mut stream);
     }
@@ -87,8 +86,6 @@ fn no_scan_is_taken_up_where_none_may_go_on() {
         },
     );
     let kept = InterruptedScan::new(source(), plan(40), ACCEPTED);
-    let error = scanner
-        .take_up_scan(kept, Duration::ZERO, false)
-        .unwrap_err();
+    let error = scanner.take_up_scan(kept).unwrap_err();
     assert!(matches!(error, ScannerError::NotTakenUp(_)), "{error}");
 }

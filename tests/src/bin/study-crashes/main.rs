@@ -18,9 +18,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
 use clap::Parser;
-use relief_api::{Scan, ScanState, StartScan, path};
+use relief_api::{Scan, ScanState, StartScan, Status, path};
 use relief_tests::mutations::Dice;
-use relief_tests::rig::{Program, small_house};
+use relief_tests::rig::{Client, Program, small_house};
 use sim_scanner::config::SimConfig;
 use sim_scanner::control::Control;
 use sim_scanner::device::{DeviceSettings, Event as Happened};
@@ -143,6 +143,7 @@ async fn run(options: &Options) -> Result<()> {
         if kill % 10 == 0 || kill == options.kills {
             let mut service = Program::start(&program, folder.path(), scanner.port(), SETTINGS)?;
             service.ready().await?;
+            none_under_way(service.client()).await?;
             promises
                 .check(service.client())
                 .await
@@ -160,7 +161,9 @@ async fn run(options: &Options) -> Result<()> {
     let (scans, columns, results) = (promises.scans(), promises.columns(), promises.results());
     println!(
         "{scans} scans, {columns} acknowledged columns, {results} results: nothing lost, \
-         nothing half, nothing twice; {} jobs were given up after three kills and asked for again",
+         nothing half, nothing twice; {} scans were cut short and went on to their end, {} jobs \
+         were given up after three kills and asked for again",
+        promises.gone_on_with(),
         promises.given_up()
     );
     Ok(())
@@ -211,6 +214,7 @@ impl Pace {
         live(&mut service, promises, &mut round, Point::Started, true).await?;
         service.ready().await?;
         let start = begun.elapsed();
+        none_under_way(service.client()).await?;
         let begun = Instant::now();
         live(&mut service, promises, &mut round, Point::Complete, true).await?;
         ensure!(!round.failed, "the scan without a kill was not complete");
@@ -283,7 +287,11 @@ async fn live(
         service.idle().await?;
     }
     let mut heard = Heard::listen(service.client()).await?;
-    let scan = start_scan(service).await?;
+    // One that the last kill cut short goes on.
+    let scan = match under_way(service.client()).await? {
+        Some(scan) => scan,
+        None => start_scan(service).await?,
+    };
     promises.accepted(&scan);
     let id = scan.id.clone();
     round.scan = Some(scan);
@@ -297,6 +305,28 @@ async fn live(
     round.heard = Some(heard);
     if point == Point::Published && !round.failed {
         round.published(promises).await?;
+    }
+    Ok(())
+}
+
+/// The scan under way; one that waits for a person, as after several kills in a row without a
+/// new column, is told to go on.
+async fn under_way(client: &Client) -> Result<Option<Scan>> {
+    let status: Status = client.get(path::STATUS).await?;
+    let waits = |scan: &&Scan| scan.needs_person && scan.state == ScanState::Paused;
+    if let Some(scan) = status.scan.as_ref().filter(waits)
+        && let Err(error) = client.ask::<Scan>(&path::scan_resume(&scan.id)).await
+    {
+        // It may have ended in this very moment.
+        eprintln!("{}: {error:#}", scan.id);
+    }
+    Ok(status.scan)
+}
+
+/// Waits until no scan is under way.
+async fn none_under_way(client: &Client) -> Result<()> {
+    while under_way(client).await?.is_some() {
+        tokio::time::sleep(Duration::from_millis(20)).await;
     }
     Ok(())
 }

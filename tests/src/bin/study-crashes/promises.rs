@@ -7,6 +7,7 @@ use anyhow::{Context, Result, ensure};
 use deliverables::{MANIFEST_NAME, Manifest};
 use relief_api::{Job, JobList, JobState, Scan, ScanList, ScanState, path};
 use relief_tests::rig::{Client, journal_columns};
+use scan_record::RawColumn;
 
 /// What somebody outside relies on.
 pub(crate) struct Promises {
@@ -19,6 +20,10 @@ pub(crate) struct Promises {
     seen: BTreeMap<String, Vec<u8>>,
     /// Jobs that were begun too often without an end.
     given_up: u32,
+    /// Complete scans that were cut short before.
+    gone_on_with: usize,
+    /// What every complete scan has in it: the scanner measures the same each time.
+    columns: Vec<RawColumn>,
 }
 
 impl Promises {
@@ -29,6 +34,8 @@ impl Promises {
             published: BTreeSet::new(),
             seen: BTreeMap::new(),
             given_up: 0,
+            gone_on_with: 0,
+            columns: Vec::new(),
         }
     }
 
@@ -59,6 +66,10 @@ impl Promises {
 
     pub(crate) fn given_up(&self) -> u32 {
         self.given_up
+    }
+
+    pub(crate) fn gone_on_with(&self) -> usize {
+        self.gone_on_with
     }
 
     pub(crate) fn results(&self) -> usize {
@@ -128,13 +139,32 @@ impl Promises {
                 scan.columns
             );
         }
+        let complete = |scan: &&Scan| scan.state == ScanState::Complete;
+        self.gone_on_with = scans
+            .scans
+            .iter()
+            .filter(complete)
+            .filter(|scan| scan.interruption.is_some())
+            .count();
         let mut results = BTreeSet::new();
         for scan in known.values() {
             let journal = self.folder.join(format!("state/scans/{}.scan", scan.id));
             if scan.columns > 0 {
                 let columns = journal_columns(&journal)?;
                 ensure!(columns.len() == scan.columns as usize, "{}", scan.id);
+                if scan.state == ScanState::Complete {
+                    if self.columns.is_empty() {
+                        self.columns.clone_from(&columns);
+                    }
+                    ensure!(columns == self.columns, "{} has other columns", scan.id);
+                }
             }
+            ensure!(
+                scan.state != ScanState::Interrupted || scan.columns == 0,
+                "{} was cut short and did not go on: {}",
+                scan.id,
+                scan.reason.as_deref().unwrap_or_default()
+            );
             let own: Vec<_> = jobs.iter().filter(|job| job.scan == scan.id).collect();
             let wanted = usize::from(scan.state == ScanState::Complete);
             ensure!(

@@ -187,17 +187,14 @@ impl Rig {
 
     /// The program ends without a word, and another takes up the scan after this time, of which
     /// it knows.
-    pub(super) fn program_ends(&mut self, time: Duration, person_first: bool) {
+    pub(super) fn program_ends(&mut self, time: Duration, waits_for: Option<&str>) {
         self.session = None;
         self.sleep(time);
         self.told.clear();
-        self.scan = Recovery::taken_up(
-            settings().resume.unwrap(),
-            self.kept.clone(),
-            time,
-            person_first,
-            self.now,
-        );
+        let mut kept = self.kept.clone();
+        kept.silent = time;
+        kept.waits_for = waits_for.map(str::to_owned);
+        self.scan = Recovery::taken_up(settings().resume.unwrap(), kept, self.now);
     }
 
     /// Nothing of the host's runs, as in a computer that is suspended.

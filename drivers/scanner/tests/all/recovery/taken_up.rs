@@ -13,10 +13,13 @@ fn each_column_comes_once_however_often_the_program_ends() {
     let mut rig = Rig::new();
     for restart in 1..=10 {
         let homings = rig.device.homings;
-        rig.program_ends(Duration::from_millis(700 * restart), false);
+        rig.program_ends(Duration::from_millis(700 * restart), None);
         rig.run_until("columns", |rig| rig.columns > 30 + 30 * restart as u32);
         assert_eq!(rig.told.len(), 1, "{:?}", rig.told);
-        assert_eq!(rig.told[0].cause, ScannerError::ProgramEnded);
+        assert_eq!(
+            rig.told[0].cause,
+            ScannerError::ProgramEnded { before: None }
+        );
         assert!(!rig.told[0].needs_person);
         assert_eq!(rig.device.homings, homings + 1);
     }
@@ -26,20 +29,20 @@ fn each_column_comes_once_however_often_the_program_ends() {
 #[test]
 fn a_program_that_ended_before_the_first_column_begins_with_it() {
     let mut rig = Rig::before_any_column();
-    rig.program_ends(MINUTE, false);
+    rig.program_ends(MINUTE, None);
     rig.run_to_its_end();
 }
 
 #[test]
 fn a_scan_that_is_taken_up_late_waits_for_a_person() {
     let mut rig = Rig::new();
-    rig.program_ends(15 * MINUTE, false);
+    rig.program_ends(15 * MINUTE, None);
     rig.stays_dark();
     rig.resume();
     rig.run_to_its_end();
     // The time that has passed already counts.
     let mut rig = Rig::new();
-    rig.program_ends(14 * MINUTE, false);
+    rig.program_ends(14 * MINUTE, None);
     rig.plugged = false;
     rig.run_for(2 * MINUTE);
     assert!(rig.asks());
@@ -52,7 +55,14 @@ fn a_scan_that_is_taken_up_late_waits_for_a_person() {
 #[test]
 fn who_waited_for_a_person_before_waits_again() {
     let mut rig = Rig::new();
-    rig.program_ends(MINUTE, true);
+    rig.program_ends(MINUTE, Some("the door is open; close it"));
+    let said = "the service ended in mid-scan and has been started again; before that: the door is \
+                open; close it";
+    rig.run_for(MINUTE);
+    assert_eq!(rig.last_told().to_string(), said);
+    rig.program_ends(MINUTE, Some(said));
+    rig.run_for(MINUTE);
+    assert_eq!(rig.last_told().to_string(), said);
     rig.stays_dark();
     rig.resume();
     rig.run_to_its_end();
@@ -62,7 +72,7 @@ fn who_waited_for_a_person_before_waits_again() {
 fn an_object_moved_meanwhile_is_noticed() {
     let mut rig = Rig::new();
     rig.device.moved_counts = 50_000;
-    rig.program_ends(MINUTE, false);
+    rig.program_ends(MINUTE, None);
     let cause = rig.until_a_person_is_asked();
     assert!(matches!(cause, ScannerError::Moved { .. }), "{cause:?}");
     rig.device.moved_counts = 0;
@@ -74,7 +84,7 @@ fn an_object_moved_meanwhile_is_noticed() {
 fn another_scanner_or_another_calibration_is_not_used() {
     let mut rig = Rig::new();
     rig.device.serial = "0002";
-    rig.program_ends(MINUTE, false);
+    rig.program_ends(MINUTE, None);
     rig.run_until("other scanner", |rig| {
         let told = rig.told.last();
         told.is_some_and(|told| matches!(told.cause, ScannerError::OtherScanner { .. }))
