@@ -39,8 +39,8 @@ impl Found {
         let mut reader = match JournalReader::open(path) {
             Ok(reader) => reader,
             Err(error) => {
-                let what = error.to_string();
-                return interrupted(None, 0, what.clone(), Err(what));
+                let rest = Err("there is nothing to go on from".to_owned());
+                return interrupted(None, 0, error.to_string(), rest);
             }
         };
         let begun = serde_json::from_slice(&reader.header().metadata).ok();
@@ -61,8 +61,8 @@ impl Found {
                 return interrupted(begun, columns, damaged.to_string(), rest);
             }
             None => {
-                let what = failed.unwrap_or_default();
-                return interrupted(begun, columns, what.clone(), Err(what));
+                let rest = Err("its journal cannot be read".to_owned());
+                return interrupted(begun, columns, failed.unwrap_or_default(), rest);
             }
         };
         Self {
@@ -94,14 +94,17 @@ impl Service {
             if scan.state.is_over() {
                 continue;
             }
-            let found = Found::in_journal(&self.journal_path(&scan.id));
+            let mut found = Found::in_journal(&self.journal_path(&scan.id));
             if found.state == ScanState::Interrupted {
                 match self.may_go_on(&scan, &found) {
                     Ok(rest) => {
                         cut_short.push(rest);
                         continue;
                     }
-                    Err(why) => tracing::info!(scan = %scan.id, why, "a scan is not gone on with"),
+                    Err(why) => {
+                        let what = found.reason.take().unwrap_or_default();
+                        found.reason = Some(format!("{what}, and it does not go on: {why}"));
+                    }
                 }
             }
             found.end(&mut scan);

@@ -37,6 +37,8 @@ struct State {
     laser_on: bool,
     /// Nothing that is asked for comes back.
     hung: bool,
+    /// A person has said that the scan may go on.
+    resumed: bool,
 }
 
 /// The scanner, and the test's hand on it.
@@ -47,6 +49,7 @@ pub(crate) struct FakeScanner {
     on_acknowledge: Mutex<Option<OnAcknowledge>>,
     on_start: Mutex<Option<OnStart>>,
     acknowledged: Mutex<Vec<u32>>,
+    taken_up: Mutex<Vec<InterruptedScan>>,
     this: std::sync::OnceLock<std::sync::Weak<FakeScanner>>,
 }
 
@@ -99,6 +102,11 @@ impl FakeScanner {
         self.acknowledged.lock().unwrap().clone()
     }
 
+    /// The scans that it was asked to go on with.
+    pub(crate) fn taken_up(&self) -> Vec<InterruptedScan> {
+        self.taken_up.lock().unwrap().clone()
+    }
+
     pub(crate) fn on_acknowledge(&self, hook: impl Fn(u32) + Send + Sync + 'static) {
         *self.on_acknowledge.lock().unwrap() = Some(Box::new(hook));
     }
@@ -109,18 +117,20 @@ impl FakeScanner {
     }
 
     /// The columns from this one on; behind others, after a pause.
-    fn deliver(&self, plan: ScanPlan, first: u32) -> ScanStream {
+    fn deliver(&self, plan: ScanPlan, first: u32, waits_for: Option<String>) -> ScanStream {
         let (sender, receiver) = sync_channel(4);
         let this = self.this.get().unwrap().clone();
         let scanner = this.upgrade().unwrap();
         std::thread::spawn(move || {
             if first > 0 {
+                let needs_person = waits_for.is_some();
                 let pause = Pause {
-                    cause: ScannerError::ProgramEnded { before: None },
-                    needs_person: false,
+                    cause: ScannerError::ProgramEnded { before: waits_for },
+                    needs_person,
                     columns: first,
                 };
                 let _ = sender.send(StreamItem::Paused(pause));
+                scanner.wait_for_a_word(needs_person);
                 let _ = sender.send(StreamItem::Resumed);
             }
             let end = (first..plan.columns).try_for_each(|index| {
@@ -151,6 +161,13 @@ impl FakeScanner {
     fn answering(&self) -> MutexGuard<'_, State> {
         let state = self.state.lock().unwrap();
         self.changed.wait_while(state, |state| state.hung).unwrap()
+    }
+
+    /// Waits for a person, if need be.
+    fn wait_for_a_word(&self, needed: bool) {
+        let state = self.state.lock().unwrap();
+        let silent = |state: &mut State| needed && !state.resumed && !state.aborted;
+        drop(self.changed.wait_while(state, silent).unwrap());
     }
 
     /// Waits for leave to deliver column `index`.
@@ -276,17 +293,22 @@ impl Scanner for FakeScanner {
             state.aborted = false;
             state.laser_on = true;
         });
-        Ok(self.deliver(*plan, 0))
+        Ok(self.deliver(*plan, 0, None))
     }
 
     fn take_up_scan(&self, scan: InterruptedScan) -> Result<ScanStream, ScannerError> {
-        assert_eq!(scan.waits_for, None, "nobody is there to say so");
         self.change(|state| {
             state.homed = true;
             state.aborted = false;
             state.laser_on = true;
         });
-        Ok(self.deliver(scan.plan(), scan.columns()))
+        self.taken_up.lock().unwrap().push(scan.clone());
+        Ok(self.deliver(scan.plan(), scan.columns(), scan.waits_for))
+    }
+
+    fn resume_scan(&self) -> Result<(), ScannerError> {
+        self.change(|state| state.resumed = true);
+        Ok(())
     }
 
     fn abort(&self) -> Result<(), ScannerError> {

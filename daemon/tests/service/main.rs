@@ -10,6 +10,7 @@ mod access;
 mod ailing;
 mod client;
 mod config;
+mod cut_short;
 mod events;
 mod fake;
 mod hostile;

@@ -47,6 +47,16 @@ impl Rig {
         disk: Arc<dyn Disk>,
         change: impl FnOnce(&mut Config),
     ) -> Self {
+        Self::start_before(folder, disk, change, |_| {}).await
+    }
+
+    /// Starts the service before scanners that were prepared.
+    pub(crate) async fn start_before(
+        folder: TempDir,
+        disk: Arc<dyn Disk>,
+        change: impl FnOnce(&mut Config),
+        prepare: impl Fn(&FakeScanner),
+    ) -> Self {
         let mut config = config(folder.path());
         change(&mut config);
         let names = config.each_scanner();
@@ -54,6 +64,7 @@ impl Rig {
             .iter()
             .map(|named| (named.name.to_owned(), FakeScanner::new()))
             .collect();
+        scanners.values().for_each(|scanner| prepare(scanner));
         let scanner = Arc::clone(&scanners[names[0].name]);
         let open = |named: NamedScanner<'_>| {
             let scanner: Arc<dyn Scanner> = scanners[named.name].clone();
