@@ -30,7 +30,7 @@ const fn long(name: &'static str, run: fn(&mut Bench) -> Result<()>) -> Check {
     }
 }
 
-pub(crate) fn all() -> [Check; 17] {
+pub(crate) fn all() -> [Check; 18] {
     [
         check("package: installed, enabled, started", package::install),
         check("service: in its sandbox", service::sandbox),
@@ -38,11 +38,18 @@ pub(crate) fn all() -> [Check; 17] {
             "scanner: plugged in for the first time, under the running service",
             life::first_plug,
         ),
+        check(
+            "devices: the scanner's alone, from inside the sandbox",
+            service::devices,
+        ),
         check("scan: through the sandbox, to the CAD file", life::scan),
         check("journal: fields of their own", service::journal),
-        check("killed in mid-scan: started anew, scans kept", life::killed),
         check(
-            "hung in mid-scan: laser off, the watchdog fires",
+            "killed in mid-scan: started anew, the scan goes on",
+            life::killed,
+        ),
+        check(
+            "hung in mid-scan: laser off, the watchdog fires, the scan goes on",
             life::hung,
         ),
         check("cable pulled in mid-scan, and put back", life::cable),

@@ -6,7 +6,7 @@ use std::net::TcpStream;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::bench::{Bench, ready, relief};
+use crate::bench::{Bench, PORT, ready, relief};
 use crate::system::{
     SERVICE, SOCKET, id_of, is_active, journal as entries, number, process_status, property,
     systemctl, try_run,
@@ -122,6 +122,49 @@ pub(super) fn loopback(_: &mut Bench) -> Result<()> {
         "somebody still listens"
     );
     Ok(())
+}
+
+/// A process of the unit itself may open what it needs and nothing else, however open the nodes
+/// are.
+pub(super) fn devices(_: &mut Bench) -> Result<()> {
+    const PLACE: &str = "/etc/systemd/system/reliefd.service.d";
+    const OPENED: &str = "/run/relief/opened";
+    // The kernel's log, memory, a disk and the way to file systems of one's own: for everybody, as
+    // far as their modes say.
+    let foreign = [
+        ("/dev/foreign-log", "c", "1", "11"),
+        ("/dev/foreign-memory", "c", "1", "1"),
+        ("/dev/foreign-disk", "b", "7", "0"),
+        ("/dev/foreign-fuse", "c", "10", "229"),
+    ];
+    for (node, kind, major, minor) in foreign {
+        let (made, _, said) = try_run("mknod", &["-m", "666", node, kind, major, minor])?;
+        ensure!(made, "{node}: {said}");
+    }
+    let nodes: Vec<&str> = foreign.iter().map(|(node, ..)| *node).collect();
+    fs::create_dir_all(PLACE)?;
+    fs::write(
+        format!("{PLACE}/opened.conf"),
+        format!(
+            "[Service]\nExecStartPre=/bin/sh -c 'for node in /dev/null {PORT} {}; do \
+             dd if=$$node of=/dev/null count=0 iflag=nonblock 2>/dev/null && echo $$node; done \
+             >{OPENED}; true'\n",
+            nodes.join(" ")
+        ),
+    )?;
+    anew()?;
+    let opened = fs::read_to_string(OPENED)?;
+    ensure!(
+        opened == format!("/dev/null\n{PORT}\n"),
+        "it opens {opened}"
+    );
+    fs::remove_file(OPENED)?;
+    fs::remove_dir_all(PLACE)?;
+    for node in nodes {
+        fs::remove_file(node)?;
+    }
+    anew()?;
+    ready().map(drop)
 }
 
 /// With the units as they are now.
