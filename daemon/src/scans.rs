@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
-use relief_api::{Aborted, Event, Scan, ScanState, ScannerLink, StartScan};
+use relief_api::{Aborted, Event, Scan, ScanPreview, ScanState, ScannerLink, StartScan};
 use scanner_driver::ScannerError;
 
-use crate::acquisition::{AbortRequest, Task, Ticket, calibration, check_grid, resolve, run};
+use crate::acquisition::{
+    AbortRequest, Task, Ticket, calibration, check_grid, preview, resolve, run,
+};
 use crate::error::ServiceError;
 use crate::ids::{now, shown_name};
 use crate::service::{Service, lock};
@@ -79,6 +81,34 @@ impl Service {
                 .map_err(ServiceError::Thread)
         })?;
         Ok(scan)
+    }
+
+    /// What a scan would come to, with nothing moved and nothing kept. Blocks until the scanner
+    /// has said who it is.
+    pub(crate) fn preview_scan(&self, request: &StartScan) -> Result<ScanPreview, ServiceError> {
+        shown_name(&request.name)?;
+        let station = self.station(&request.scanner)?;
+        let config = self.config();
+        let processing = config.processing().with_overrides(&request.settings)?;
+        let identity = station
+            .identify()
+            .map_err(|error| ServiceError::scanner(station, error))?;
+        let plan = request.plan.or(&config.scan_on(station.name()));
+        let plan = resolve(&plan, &identity)?;
+        check_grid(
+            &processing.regrid,
+            &plan,
+            &calibration(&identity.calibration),
+        )?;
+        let mut preview = preview(station.name(), &identity, &plan, &processing);
+        let refused = self.check_running().and_then(|()| {
+            station.refuse_if_busy()?;
+            // The room is given back at once.
+            let room = self.promise_room("preview", plan.plan.columns, plan.plan.samples);
+            room.map(drop)
+        });
+        preview.refused = refused.err().map(|error| error.to_string());
+        Ok(preview)
     }
 
     /// Ends a scan that is under way. The laser is off when this returns, if the scanner can

@@ -17,6 +17,7 @@
 //! | `GET /v1/scans` | | [`ScanList`], newest first |
 //! | `POST /v1/scans` | [`StartScan`] | 202 [`Scan`] |
 //! | `GET /v1/scans/{scan}` | | [`Scan`] |
+//! | `POST /v1/scans/preview` | [`StartScan`] | what it would come to, with nothing moved: [`ScanPreview`] |
 //! | `POST /v1/scans/{scan}/abort` | | [`Scan`] |
 //! | `POST /v1/scans/{scan}/rerun` | [`Rerun`] | 202 [`Job`] |
 //! | `GET /v1/scans/{scan}/journal` | | the kept raw columns, a `.scan` file |
@@ -41,6 +42,7 @@ mod event;
 mod job;
 mod laser;
 pub mod path;
+mod preview;
 mod problem;
 mod scan;
 mod status;
@@ -49,6 +51,7 @@ mod token;
 pub use event::{Event, LiveColumn};
 pub use job::{Job, JobId, JobList, JobState, Rerun, SpoolEntry, SpoolFile, StageTiming};
 pub use laser::{LaserEntry, LaserLog, LaserState};
+pub use preview::ScanPreview;
 pub use problem::Problem;
 pub use scan::{
     Aborted, Interruption, MAX_NAME_CHARS, PlanRequest, Scan, ScanList, ScanState,

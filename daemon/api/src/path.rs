@@ -4,6 +4,8 @@
 pub const STATUS: &str = "/v1/status";
 /// The scans; a new one is posted here.
 pub const SCANS: &str = "/v1/scans";
+/// Says what a scan would come to.
+pub const SCAN_PREVIEW: &str = "/v1/scans/preview";
 /// Pattern of one scan.
 pub const SCAN: &str = "/v1/scans/{scan}";
 /// Pattern of the abort of one scan.

@@ -7,6 +7,7 @@ mod heading;
 mod keep;
 mod live;
 mod plan;
+mod preview;
 mod run;
 mod taken_up;
 mod view;
@@ -18,6 +19,7 @@ use range_image::{Calibration, calibration::Head};
 
 pub use plan::PlanError;
 pub(crate) use plan::resolve;
+pub(crate) use preview::preview;
 pub(crate) use run::{Task, Ticket, not_taken_up, run};
 pub(crate) use taken_up::{Rest, TakeUp};
 pub(crate) use view::check_grid;

@@ -19,9 +19,9 @@ pub(crate) fn check_grid(
     calibration: &Calibration,
 ) -> Result<(), PlanError> {
     // Without a wish the grid follows the density of the samples.
-    let (Some(pitch_mm), Some(sides_mm)) =
-        (regrid.pitch_mm, view_mm(regrid, resolved, calibration))
-    else {
+    let view = View::of(resolved, calibration);
+    let sides_mm = view.and_then(|view| view.sides_mm(regrid));
+    let (Some(pitch_mm), Some(sides_mm)) = (regrid.pitch_mm, sides_mm) else {
         return Ok(());
     };
     let plan = &resolved.plan;
@@ -47,52 +47,63 @@ pub(crate) fn check_grid(
     )))
 }
 
-/// Width and height of what the rays meet within the region of interest: those of a head that
-/// turns where the part frame's z is 0. `None` where that cannot be told.
-fn view_mm(
-    regrid: &RegridConfig,
-    resolved: &ResolvedPlan,
-    calibration: &Calibration,
-) -> Option<[f64; 2]> {
-    let plan = &resolved.plan;
-    let last = |first: i32, step: i32, count: u32| {
-        let last = i64::from(first) + i64::from(step) * (i64::from(count) - 1);
-        i32::try_from(last).ok()
-    };
-    let y_mm = |lateral: i32| match calibration.head {
-        Head::Cartesian { count_mm } => Some(f64::from(lateral) * count_mm),
-        Head::Polar {
-            camera_y_mm,
-            camera_z_mm,
-            angle_count_rad,
-            ..
-        } => {
-            let angle_rad = f64::from(lateral) * angle_count_rad;
-            (angle_rad.abs() < std::f64::consts::FRAC_PI_2 && camera_z_mm > 0.0)
-                .then(|| camera_y_mm + camera_z_mm * angle_rad.tan())
-        }
-    };
-    let last_table = last(plan.first_table_counts, plan.pitch_counts, plan.columns)?;
-    let last_lateral = last(
-        plan.first_angle_counts,
-        plan.angle_step_counts,
-        plan.samples.into(),
-    )?;
-    let width = within(
-        calibration.x_mm(plan.first_table_counts),
-        calibration.x_mm(last_table),
-        regrid.roi_x_mm,
-    );
-    let height = within(
-        y_mm(plan.first_angle_counts)?,
-        y_mm(last_lateral)?,
-        regrid.roi_y_mm,
-    );
-    Some([width, height])
+/// What the rays of a scan meet.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View {
+    /// x of the first and of the last column, millimetres.
+    pub(super) x_mm: [f64; 2],
+    /// y of the first and of the last sample, millimetres: those of a head that turns where the
+    /// part frame's z is 0. `None` where that cannot be told.
+    pub(super) y_mm: Option<[f64; 2]>,
+}
+
+impl View {
+    /// `None` for a plan beyond all counts.
+    pub(super) fn of(resolved: &ResolvedPlan, calibration: &Calibration) -> Option<Self> {
+        let plan = &resolved.plan;
+        let last = |first: i32, step: i32, count: u32| {
+            let last = i64::from(first) + i64::from(step) * (i64::from(count) - 1);
+            i32::try_from(last).ok()
+        };
+        let y_mm = |lateral: i32| match calibration.head {
+            Head::Cartesian { count_mm } => Some(f64::from(lateral) * count_mm),
+            Head::Polar {
+                camera_y_mm,
+                camera_z_mm,
+                angle_count_rad,
+                ..
+            } => {
+                let angle_rad = f64::from(lateral) * angle_count_rad;
+                (angle_rad.abs() < std::f64::consts::FRAC_PI_2 && camera_z_mm > 0.0)
+                    .then(|| camera_y_mm + camera_z_mm * angle_rad.tan())
+            }
+        };
+        let last_table = last(plan.first_table_counts, plan.pitch_counts, plan.columns)?;
+        let last_lateral = last(
+            plan.first_angle_counts,
+            plan.angle_step_counts,
+            plan.samples.into(),
+        )?;
+        Some(Self {
+            x_mm: [plan.first_table_counts, last_table].map(|counts| calibration.x_mm(counts)),
+            y_mm: y_mm(plan.first_angle_counts)
+                .zip(y_mm(last_lateral))
+                .map(|(first, last)| [first, last]),
+        })
+    }
+
+    /// Width and height of what is met within the region of interest, millimetres.
+    pub(super) fn sides_mm(&self, regrid: &RegridConfig) -> Option<[f64; 2]> {
+        let y_mm = self.y_mm?;
+        Some([
+            within(self.x_mm, regrid.roi_x_mm),
+            within(y_mm, regrid.roi_y_mm),
+        ])
+    }
 }
 
 /// How much of a stretch lies within limits.
-fn within(a_mm: f64, b_mm: f64, limits_mm: Option<[f64; 2]>) -> f64 {
+fn within([a_mm, b_mm]: [f64; 2], limits_mm: Option<[f64; 2]>) -> f64 {
     let [low, high] = limits_mm.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
     (a_mm.max(b_mm).min(high) - a_mm.min(b_mm).max(low)).max(0.0)
 }

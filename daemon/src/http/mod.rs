@@ -76,6 +76,7 @@ fn complete(tokens: Router<Context>, context: &Context) -> Router {
         .route(path::SCANNER_RESUME, post(scans::resume_on))
         .route(path::SCANNER_LASER, get(scanners::laser))
         .route(path::SCANS, get(scans::list).post(scans::start))
+        .route(path::SCAN_PREVIEW, post(scans::preview))
         .route(path::SCAN, get(scans::get))
         .route(path::SCAN_ABORT, post(scans::abort))
         .route(path::SCAN_RESUME, post(scans::resume))

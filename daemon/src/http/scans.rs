@@ -3,7 +3,7 @@
 use axum::extract::{Path, State};
 use axum::http::StatusCode;
 use axum::response::Json;
-use relief_api::{Aborted, Job, Rerun, Scan, ScanList, StartScan};
+use relief_api::{Aborted, Job, Rerun, Scan, ScanList, ScanPreview, StartScan};
 
 use super::problem::{Body, Refusal};
 use super::{Context, blocking};
@@ -22,6 +22,15 @@ pub(super) async fn start(
 ) -> Result<(StatusCode, Json<Scan>), Refusal> {
     let scan = blocking(context, move |service| service.start_scan(&request)).await?;
     Ok((StatusCode::ACCEPTED, Json(scan)))
+}
+
+pub(super) async fn preview(
+    State(context): State<Context>,
+    Body(request): Body<StartScan>,
+) -> Result<Json<ScanPreview>, Refusal> {
+    blocking(context, move |service| service.preview_scan(&request))
+        .await
+        .map(Json)
 }
 
 pub(super) async fn get(

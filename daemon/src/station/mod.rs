@@ -170,14 +170,22 @@ impl Station {
     /// Keeps the place for a scan.
     pub(crate) fn reserve(&self) -> Result<Reservation<'_>, ServiceError> {
         let mut slot = lock(&self.slot);
-        let scan = match &*slot {
-            Slot::Free => {
-                *slot = Slot::Reserved;
-                return Ok(Reservation {
-                    station: self,
-                    used: false,
-                });
-            }
+        self.check_free(&slot)?;
+        *slot = Slot::Reserved;
+        Ok(Reservation {
+            station: self,
+            used: false,
+        })
+    }
+
+    /// Refuses where a scan could not begin now.
+    pub(crate) fn refuse_if_busy(&self) -> Result<(), ServiceError> {
+        self.check_free(&lock(&self.slot))
+    }
+
+    fn check_free(&self, slot: &Slot) -> Result<(), ServiceError> {
+        let scan = match slot {
+            Slot::Free => return Ok(()),
             Slot::Reserved => None,
             Slot::Taken { scan, .. } => Some(scan.id.clone()),
         };

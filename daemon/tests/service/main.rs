@@ -18,6 +18,7 @@ mod jobs;
 mod laser;
 mod old_state;
 mod power;
+mod preview;
 mod refusals;
 mod rig;
 mod scanners;

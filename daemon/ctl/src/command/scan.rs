@@ -1,5 +1,7 @@
 //! `relief scan`.
 
+mod preview;
+
 use relief_api::{Job, PlanRequest, Scan, StartScan, path};
 use serde::Serialize;
 
@@ -51,6 +53,9 @@ pub(crate) struct Args {
     /// Stay until the deliverables are published
     #[arg(long)]
     wait: bool,
+    /// Show what the scan would be and begin nothing
+    #[arg(long, conflicts_with = "wait")]
+    preview: bool,
     /// A processing setting that differs, keyed as in the configuration, such as
     /// regrid.neighbours=25; may be given several times
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = setting::parse)]
@@ -112,36 +117,46 @@ struct Told {
     job: Option<Job>,
 }
 
+impl Args {
+    fn request(self) -> StartScan {
+        let plan = self.plan;
+        let mut settings = setting::overrides(self.settings);
+        self.processed.add_to(&mut settings);
+        StartScan {
+            name: self.name,
+            part: self.part,
+            operator: self.operator,
+            note: self.note,
+            scanner: self.scanner,
+            plan: PlanRequest {
+                x_first_mm: plan.x_first_mm,
+                x_last_mm: plan.x_last_mm,
+                pitch_mm: plan.column_pitch_mm,
+                columns: plan.columns,
+                angle_first_deg: plan.angle_first_deg,
+                angle_last_deg: plan.angle_last_deg,
+                y_first_mm: plan.y_first_mm,
+                y_last_mm: plan.y_last_mm,
+                samples: plan.samples,
+                exposure_us: plan.exposure_us,
+            },
+            settings,
+        }
+    }
+}
+
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
     let client = args.endpoint.client()?;
+    let (wait, preview) = (args.wait, args.preview);
+    let request = args.request();
+    if preview {
+        return preview::show(&client, &request, json).await;
+    }
     // Listening begins before the scan, so that none of its events is missed.
-    let events = if args.wait {
+    let events = if wait {
         Some(client.events().await?)
     } else {
         None
-    };
-    let plan = args.plan;
-    let mut settings = setting::overrides(args.settings);
-    args.processed.add_to(&mut settings);
-    let request = StartScan {
-        name: args.name,
-        part: args.part,
-        operator: args.operator,
-        note: args.note,
-        scanner: args.scanner,
-        plan: PlanRequest {
-            x_first_mm: plan.x_first_mm,
-            x_last_mm: plan.x_last_mm,
-            pitch_mm: plan.column_pitch_mm,
-            columns: plan.columns,
-            angle_first_deg: plan.angle_first_deg,
-            angle_last_deg: plan.angle_last_deg,
-            y_first_mm: plan.y_first_mm,
-            y_last_mm: plan.y_last_mm,
-            samples: plan.samples,
-            exposure_us: plan.exposure_us,
-        },
-        settings,
     };
     let scan: Scan = client.post(path::SCANS, &request).await?;
     let told = match events {
