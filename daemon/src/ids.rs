@@ -86,9 +86,12 @@ pub(crate) fn shown_name(name: &str) -> Result<String, ServiceError> {
 
 /// Now, RFC 3339 in UTC with milliseconds.
 pub(crate) fn now() -> String {
-    Timestamp::now()
-        .strftime("%Y-%m-%dT%H:%M:%S.%3fZ")
-        .to_string()
+    at(Timestamp::now())
+}
+
+/// A time, in the same way.
+pub(crate) fn at(time: Timestamp) -> String {
+    time.strftime("%Y-%m-%dT%H:%M:%S.%3fZ").to_string()
 }
 
 #[cfg(test)]

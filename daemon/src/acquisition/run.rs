@@ -17,7 +17,7 @@ use range_image::{Calibration, Column, GridColumn};
 use regrid::Regridder;
 use relief_api::{Event, LiveColumn, Scan, ScanState, ScannerLink};
 use scan_record::{EndCause, Header, JournalWriter, RawColumn, RawSample};
-use scanner_driver::{ScanProgress, ScanStream, Scanner, ScannerError};
+use scanner_driver::{Pause, ScanProgress, ScanStream, Scanner, ScannerError};
 use scanner_protocol::Identity;
 
 use super::grid_file::GridFile;
@@ -118,7 +118,7 @@ fn take(service: &Arc<Service>, ticket: &Ticket, pulse: &Pulse) -> Result<(), St
         columns = info.columns,
         "scan begins"
     );
-    station.note(ScannerLink::Scanning, None);
+    service.note_scanner(station, ScannerLink::Scanning, None);
     let scan = station.update_active(|scan| {
         scan.columns_planned = info.columns;
         scan.state = ScanState::Scanning;
@@ -211,7 +211,7 @@ impl Live {
 enum Fed {
     Column(RawColumn),
     /// The scan stands still, for this reason.
-    Paused(String),
+    Paused(Pause),
     Resumed,
     End(Result<(), ScannerError>),
 }
@@ -322,17 +322,18 @@ impl<'a> Keeper<'a> {
                         self.commit(&mut batch, acknowledge)?;
                     }
                 }
-                Ok(Fed::Paused(reason)) => {
+                Ok(Fed::Paused(pause)) => {
                     self.commit(&mut batch, acknowledge)?;
+                    let reason = pause.to_string();
                     tracing::warn!(scan = self.id, %reason, "scan paused");
                     self.station.laser.scan_paused(&reason);
-                    self.note_pause(Some(reason));
+                    self.note_pause(Some(reason), pause.needs_person);
                 }
                 Ok(Fed::Resumed) => {
                     self.commit(&mut batch, acknowledge)?;
                     tracing::info!(scan = self.id, "scan goes on");
                     self.station.laser.scan_goes_on();
-                    self.note_pause(None);
+                    self.note_pause(None, false);
                 }
                 Ok(Fed::End(end)) => {
                     self.commit(&mut batch, acknowledge)?;
@@ -348,18 +349,26 @@ impl<'a> Keeper<'a> {
     }
 
     /// Tells all who look on that the scan stands still, or goes on.
-    fn note_pause(&self, reason: Option<String>) {
+    fn note_pause(&self, reason: Option<String>, needs_person: bool) {
         let (state, link) = match reason {
             Some(_) => (ScanState::Paused, ScannerLink::Trouble),
             None => (ScanState::Scanning, ScannerLink::Scanning),
         };
-        self.station.note(link, reason.clone());
+        self.service
+            .note_scanner(self.station, link, reason.clone());
         let scan = self.station.update_active(|scan| {
             scan.state = state;
             scan.reason = reason;
         });
         // The record of a pause is for those who look; the columns do not hang on it.
-        if let Some(Err(error)) = scan.map(|scan| self.service.keep_scan(&scan)) {
+        let kept = scan.map(|scan| {
+            if needs_person {
+                self.service.keep_scan_telling(&scan)
+            } else {
+                self.service.keep_scan(&scan)
+            }
+        });
+        if let Some(Err(error)) = kept {
             tracing::error!(scan = self.id, %error, "cannot keep the record of a scan");
         }
     }
@@ -452,7 +461,7 @@ fn feed(service: &Service, station: &Station, mut stream: ScanStream, sender: &S
             Ok(Some(ScanProgress::Column(column))) => Fed::Column(raw(column)),
             Ok(Some(ScanProgress::Paused(pause))) => {
                 paused = true;
-                Fed::Paused(pause.to_string())
+                Fed::Paused(pause)
             }
             Ok(Some(ScanProgress::Resumed)) => {
                 paused = false;

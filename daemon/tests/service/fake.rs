@@ -8,8 +8,8 @@ use scanner_driver::protocol::{
     Activity, Calibration, Faults, Head, Identity, Limits, ScanPlan, text,
 };
 use scanner_driver::{
-    DeviceStatus, LineCounts, RawColumn, RawSample, ScanInfo, ScanStream, Scanner, ScannerError,
-    StreamControl, StreamItem,
+    DeviceStatus, LineCounts, Pause, RawColumn, RawSample, ScanInfo, ScanStream, Scanner,
+    ScannerError, StreamControl, StreamItem,
 };
 
 /// Micrometres per count, of table and profile.
@@ -37,6 +37,9 @@ struct State {
     laser_on: bool,
     /// Nothing that is asked for comes back.
     hung: bool,
+    /// A pause after this many columns of a scan, until somebody lets it go on.
+    pause_after: Option<(u32, Pause)>,
+    is_paused: bool,
 }
 
 /// The scanner, and the test's hand on it.
@@ -78,6 +81,26 @@ impl FakeScanner {
 
     pub(crate) fn fault_after(&self, columns: u32) {
         self.change(|state| state.fault_after = Some(columns));
+    }
+
+    /// The next scan stands still after this many columns.
+    pub(crate) fn pause_after(&self, columns: u32, pause: Pause) {
+        self.change(|state| state.pause_after = Some((columns, pause)));
+    }
+
+    /// What is to be told before this column, if the scan stands still there.
+    fn pause_before(&self, index: u32) -> Option<Pause> {
+        let mut state = self.state.lock().unwrap();
+        let (_, pause) = state.pause_after.take_if(|(at, _)| *at == index)?;
+        state.is_paused = true;
+        Some(pause)
+    }
+
+    /// Waits until somebody lets the scan go on, or ends it.
+    fn wait_for_resume(&self) {
+        let state = self.state.lock().unwrap();
+        let waiting = |state: &mut State| state.is_paused && !state.aborted;
+        drop(self.changed.wait_while(state, waiting).unwrap());
     }
 
     /// Nothing comes back, not even an error, until what this gives is dropped.
@@ -250,6 +273,12 @@ impl Scanner for FakeScanner {
         let plan = *plan;
         std::thread::spawn(move || {
             let end = (0..plan.columns).try_for_each(|index| {
+                if let Some(pause) = scanner.pause_before(index) {
+                    let tell = |item| sender.send(item).map_err(|_| ScannerError::Closed);
+                    tell(StreamItem::Paused(pause))?;
+                    scanner.wait_for_resume();
+                    tell(StreamItem::Resumed)?;
+                }
                 scanner.wait_for_leave(index)?;
                 sender
                     .send(StreamItem::Column(column(&plan, index)))
@@ -267,6 +296,11 @@ impl Scanner for FakeScanner {
             receiver,
             Arc::new(Control(this)),
         ))
+    }
+
+    fn resume_scan(&self) -> Result<(), ScannerError> {
+        self.change(|state| state.is_paused = false);
+        Ok(())
     }
 
     fn abort(&self) -> Result<(), ScannerError> {

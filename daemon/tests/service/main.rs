@@ -21,3 +21,4 @@ mod refusals;
 mod rig;
 mod scanners;
 mod scans;
+mod webhooks;
