@@ -97,6 +97,9 @@ impl Default for Retry {
     }
 }
 
+/// Each has a thread of its own; more are a mistake.
+const MOST_WEBHOOKS: usize = 16;
+
 /// Where something is wrong, in bytes from the beginning of the text, and what.
 type Fault = (usize, String);
 
@@ -141,6 +144,12 @@ pub(super) fn check(text: &str, config: &Config) -> Result<(), Fault> {
     let mut names = BTreeMap::new();
     each(text, config, |webhook, section| {
         let at = section.value("name");
+        if names.len() == MOST_WEBHOOKS {
+            return Err((
+                at,
+                format!("more than {MOST_WEBHOOKS} webhooks are not possible"),
+            ));
+        }
         if let Some(earlier) = names.insert(webhook.name.clone(), at) {
             let (line, _) = line_and_column(text, earlier);
             let name = &webhook.name;

@@ -175,12 +175,13 @@ impl Hook {
             .0
     }
 
-    /// Waits for the end of the thread, unless that takes too long.
-    fn join(&self) {
+    /// Waits for the end of the thread, but not beyond this time.
+    fn join(&self, until: Instant) {
         let Some(thread) = lock(&self.thread).take() else {
             return;
         };
-        let state = self.wait_while(lock(&self.state), FAREWELL, |state| !state.gone);
+        let longest = until.saturating_duration_since(Instant::now());
+        let state = self.wait_while(lock(&self.state), longest, |state| !state.gone);
         if !state.gone {
             tracing::warn!(
                 webhook = self.name,
@@ -292,8 +293,9 @@ impl Webhooks {
 
     /// Waits for the end of all threads, unless that takes too long.
     pub(crate) fn join(&self) {
+        let until = Instant::now() + FAREWELL;
         for hook in self.all() {
-            hook.join();
+            hook.join(until);
         }
     }
 }

@@ -172,6 +172,13 @@ fn faults_are_told_with_their_line_and_a_way_out() {
     ] {
         assert_eq!(refused(&webhook(&keys)), message);
     }
+    let many: String = (1..=17)
+        .map(|number| format!("[[webhooks]]\nname = \"lab-{number}\"\n{whole}"))
+        .collect();
+    assert_eq!(
+        refused(&many),
+        "relief.toml, line 66, column 8: more than 16 webhooks are not possible"
+    );
     let kind = refused("[queue]\nworkers = \"two\"\n");
     assert!(
         kind.starts_with("relief.toml, line 2, column 11: invalid type"),
