@@ -61,7 +61,8 @@ async fn log(rig: &Rig) -> Vec<Delivery> {
 
 /// Waits until the newest message but so many has come to this.
 async fn settled(rig: &Rig, back: usize, wanted: impl Fn(&Delivery) -> bool) -> Delivery {
-    loop {
+    // Far longer than anything takes that should happen.
+    for _ in 0..12_000 {
         if let Some(delivery) = log(rig).await.into_iter().nth(back)
             && wanted(&delivery)
         {
@@ -69,6 +70,7 @@ async fn settled(rig: &Rig, back: usize, wanted: impl Fn(&Delivery) -> bool) -> 
         }
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
+    panic!("it has come to nothing: {:#?}", log(rig).await)
 }
 
 async fn until_delivered(rig: &Rig) -> Delivery {
