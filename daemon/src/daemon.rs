@@ -27,6 +27,7 @@ use crate::station::{OpenScanner, make_all, open_all, open_attached, stop_all};
 use crate::store::{Store, StoreError};
 use crate::systemd::{Health, Inherited};
 use crate::tokens::{TokenError, Tokens};
+use crate::webhooks::{self, WebhookError, Webhooks};
 
 /// How long connections may take to end once the service stops.
 const DRAIN: Duration = Duration::from_secs(5);
@@ -58,6 +59,9 @@ pub enum StartError {
     /// The tokens do not work.
     #[error(transparent)]
     Tokens(#[from] TokenError),
+    /// The webhooks do not work.
+    #[error(transparent)]
+    Webhooks(#[from] WebhookError),
     /// The log of the laser does not work.
     #[error(transparent)]
     Laser(#[from] LaserLogError),
@@ -172,6 +176,7 @@ impl Daemon {
             Arc::clone(&disk),
             &config.service.state_dir.join("tokens.json"),
         )?;
+        let webhooks = Webhooks::open(&config.webhooks, &store)?;
         let hub = Arc::new(Hub::default());
         let stations = make_all(&config, scanners, &hub, &*disk)?;
         let offered = inherited.or_bind(&config.service).await?;
@@ -182,6 +187,7 @@ impl Daemon {
             store,
             spool,
             tokens,
+            webhooks,
         };
         let service = Arc::new(Service::new(config, stations, hub, kept, scans_dir));
         let cut_short = service.recover_scans().map_err(StartError::Recover)?;
@@ -239,7 +245,7 @@ impl Daemon {
                     .spawn(move || watch(&service, &station))?,
             );
         }
-        Ok(())
+        webhooks::begin_all(&self.service)
     }
 
     fn serve<L>(&mut self, listener: L, app: Router, limits: HttpConfig)
@@ -278,7 +284,10 @@ impl Daemon {
     /// Takes over what may change in service; says what became of it.
     #[must_use = "some changes need a restart, which the user should be told"]
     pub fn reload(&self, config: &Config) -> Reloaded {
-        self.service.reload(config)
+        let outcome = self.service.reload(config);
+        // Also where no key has changed: another secret may stand in the same file.
+        webhooks::reload(&self.service, &config.webhooks);
+        outcome
     }
 
     /// Brings the service to an orderly end: scans under way are aborted and kept, with the
@@ -289,6 +298,7 @@ impl Daemon {
         let service = Arc::clone(&self.service);
         service.begin_stop();
         service.queue.stop();
+        service.webhooks.stop();
         let threads = self.threads;
         let ended = tokio::task::spawn_blocking(move || {
             stop_all(&service.stations, "the service was stopped");
@@ -299,6 +309,7 @@ impl Daemon {
                     tracing::error!(thread = name, "a thread ended by a panic");
                 }
             }
+            service.webhooks.join();
         })
         .await;
         if ended.is_err() {

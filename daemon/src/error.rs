@@ -165,6 +165,23 @@ pub enum ServiceError {
         /// Bytes of these that scans under way may still take.
         promised_bytes: u64,
     },
+    /// There is no such webhook.
+    #[error("there is no webhook {name}; there {}", match .known.as_slice() {
+        [] => "are none".to_owned(),
+        known => format!("{} {}", are(known), known.join(", ")),
+    })]
+    NoSuchWebhook {
+        /// As it was given.
+        name: String,
+        /// Those there are.
+        known: Vec<String>,
+    },
+    /// Somebody else is at it.
+    #[error("the webhook {name} is just being tested")]
+    WebhookBusy {
+        /// The webhook.
+        name: String,
+    },
     /// The records do not work.
     #[error(transparent)]
     Store(#[from] StoreError),

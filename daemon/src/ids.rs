@@ -86,11 +86,11 @@ pub(crate) fn shown_name(name: &str) -> Result<String, ServiceError> {
 
 /// Now, RFC 3339 in UTC with milliseconds.
 pub(crate) fn now() -> String {
-    rfc3339(Timestamp::now())
+    at(Timestamp::now())
 }
 
 /// A time, in the same way.
-pub(crate) fn rfc3339(time: Timestamp) -> String {
+pub(crate) fn at(time: Timestamp) -> String {
     time.strftime("%Y-%m-%dT%H:%M:%S.%3fZ").to_string()
 }
 

@@ -35,6 +35,7 @@ mod spool;
 mod station;
 mod store;
 mod tokens;
+mod webhooks;
 
 pub use acquisition::PlanError;
 pub use arguments::Arguments;
@@ -47,3 +48,4 @@ pub use spool::SpoolError;
 pub use station::OpenScanner;
 pub use store::StoreError;
 pub use tokens::TokenError;
+pub use webhooks::WebhookError;

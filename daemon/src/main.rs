@@ -13,7 +13,7 @@ const EX_CONFIG: u8 = 78;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let config = match Config::load(&arguments.config) {
+    let config = match Config::load_with_files(&arguments.config) {
         Ok(config) => config,
         Err(error) => {
             eprintln!("reliefd: {error}");
@@ -88,7 +88,7 @@ async fn received(signal: &mut Signal) {
 
 /// A configuration that is not sound changes nothing.
 fn reload(daemon: &Daemon, arguments: &Arguments, log: &LogHandle) {
-    let config = match Config::load(&arguments.config) {
+    let config = match Config::load_with_files(&arguments.config) {
         Ok(config) => config,
         Err(error) => {
             tracing::error!(%error, "the configuration stays as it was");

@@ -5,7 +5,7 @@ mod cut_short;
 use std::fs;
 use std::path::Path;
 
-use relief_api::{Event, JobState, Scan, ScanState};
+use relief_api::{Event, JobState, Scan, ScanState, WebhookEvent};
 use scan_record::{EndCause, Ending, JournalReader};
 
 use crate::acquisition::Rest;
@@ -159,7 +159,7 @@ impl Service {
                 state = scan.state.as_str(),
                 "the record of a scan was made anew from its journal"
             );
-            self.keep_ended(&mut scan)?;
+            self.keep_adopted(&mut scan)?;
         }
         Ok(())
     }
@@ -176,10 +176,21 @@ impl Service {
     }
 
     /// Keeps the record of a scan that is over, with its job if it is complete. Where the
-    /// result is in the spool already, the job is found to be done.
+    /// result is in the spool already, the job is found to be done. Webhooks are told.
     pub(crate) fn keep_ended(&self, scan: &mut Scan) -> Result<(), ServiceError> {
+        let event = WebhookEvent::ScanEnded;
         if scan.state == ScanState::Complete && scan.jobs.is_empty() {
-            self.queue_first_job(scan).map(drop)
+            let tell = |scan: &Scan| self.webhooks.of_scan(event, scan);
+            self.queue_first_job(scan, tell).map(drop)
+        } else {
+            Ok(self.put_scan_telling(scan, event)?)
+        }
+    }
+
+    /// The same of a scan that ended long ago, of which nobody is told.
+    fn keep_adopted(&self, scan: &mut Scan) -> Result<(), ServiceError> {
+        if scan.state == ScanState::Complete && scan.jobs.is_empty() {
+            self.queue_first_job(scan, |_| Vec::new()).map(drop)
         } else {
             Ok(self.store.put_scan(scan)?)
         }
@@ -218,7 +229,7 @@ impl Service {
                 job.stage = None;
                 job.ended_at = Some(now());
                 job.directory = Some(self.spool.directory(&job.result).display().to_string());
-                self.store.put_job(&job)?;
+                self.put_job(&job)?;
                 continue;
             }
             if job.state == JobState::Running {

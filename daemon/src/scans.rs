@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use relief_api::{Aborted, Event, Scan, ScanPreview, ScanState, ScannerLink, StartScan};
+use relief_api::{
+    Aborted, Event, Scan, ScanPreview, ScanState, ScannerLink, StartScan, WebhookEvent,
+};
 use scanner_driver::ScannerError;
 
 use crate::acquisition::{
@@ -24,7 +26,7 @@ impl Service {
         let processing = config.processing().with_overrides(&request.settings)?;
         let reservation = station.reserve()?;
         let identity = station.identify().map_err(|error| {
-            station.note(ScannerLink::Trouble, Some(error.to_string()));
+            self.note_scanner(&station, ScannerLink::Trouble, Some(error.to_string()));
             ServiceError::scanner(&station, error)
         })?;
         station.note_identity(&identity);
@@ -231,6 +233,13 @@ impl Service {
         Ok(())
     }
 
+    /// The same of one that waits for a person, of which webhooks are told.
+    pub(crate) fn keep_scan_telling(&self, scan: &Scan) -> Result<(), ServiceError> {
+        self.put_scan_telling(scan, WebhookEvent::ScanPaused)?;
+        self.hub.tell(Event::Scan(scan.clone()));
+        Ok(())
+    }
+
     /// Notes how a scanner's scan ended, queues its job if it is complete, and makes room for
     /// the next.
     pub(crate) fn end_scan(
@@ -256,9 +265,9 @@ impl Service {
         station.free();
         match (state, &scan.reason) {
             (ScanState::Failed, Some(reason)) => {
-                station.note(ScannerLink::Trouble, Some(reason.clone()));
+                self.note_scanner(station, ScannerLink::Trouble, Some(reason.clone()));
             }
-            _ => station.note(ScannerLink::Ready, None),
+            _ => self.note_scanner(station, ScannerLink::Ready, None),
         }
         self.hub.tell(Event::Scan(scan));
     }
@@ -310,6 +319,7 @@ mod tests {
     use crate::spool::Spool;
     use crate::store::Store;
     use crate::tokens::Tokens;
+    use crate::webhooks::Webhooks;
     use range_image::{Calibration, calibration::Head};
     use relief_api::THE_SCANNER;
     use scan_record::{Header, JournalWriter, RawColumn};
@@ -356,6 +366,7 @@ mod tests {
                 spool: Spool::open(Arc::new(LocalDisk), &folder.path().join("spool")).unwrap(),
                 tokens: Tokens::open(Arc::new(LocalDisk), &folder.path().join("tokens.json"))
                     .unwrap(),
+                webhooks: Webhooks::default(),
             },
             folder.path().to_owned(),
         );

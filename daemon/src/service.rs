@@ -21,6 +21,7 @@ use crate::spool::Spool;
 use crate::station::Station;
 use crate::store::Store;
 use crate::tokens::Tokens;
+use crate::webhooks::Webhooks;
 
 /// What outlives the process, and where it is kept.
 pub(crate) struct Kept {
@@ -28,6 +29,8 @@ pub(crate) struct Kept {
     pub(crate) store: Store,
     pub(crate) spool: Spool,
     pub(crate) tokens: Tokens,
+    /// With the messages that wait for them.
+    pub(crate) webhooks: Webhooks,
 }
 
 /// What all parts of the service share.
@@ -39,6 +42,7 @@ pub(crate) struct Service {
     pub(crate) store: Store,
     pub(crate) spool: Spool,
     pub(crate) tokens: Tokens,
+    pub(crate) webhooks: Webhooks,
     pub(crate) hub: Arc<Hub>,
     pub(crate) ids: Ids,
     pub(crate) queue: Queue,
@@ -77,6 +81,7 @@ impl Service {
             store,
             spool,
             tokens,
+            webhooks,
         } = kept;
         Self {
             stations,
@@ -84,6 +89,7 @@ impl Service {
             store,
             spool,
             tokens,
+            webhooks,
             hub,
             ids: Ids::default(),
             queue: Queue::default(),

@@ -33,6 +33,9 @@
 //! | `GET /v1/tokens` | | [`TokenList`], oldest first; on the socket only, as the next two |
 //! | `POST /v1/tokens` | [`CreateToken`] | 201 [`NewToken`] |
 //! | `POST /v1/tokens/{token}/revoke` | | [`Token`] |
+//! | `GET /v1/webhooks` | | [`WebhookList`] |
+//! | `GET /v1/webhooks/{webhook}/deliveries` | | [`DeliveryList`], newest first |
+//! | `POST /v1/webhooks/{webhook}/test` | | the message, and what came back: [`Delivery`] |
 //! | `GET /v1/events` | | server-sent [`Event`]s, first [`Event::Status`] |
 //!
 //! Within `/v1`, fields and event kinds are only ever added; clients ignore those they do
@@ -47,6 +50,7 @@ mod problem;
 mod scan;
 mod status;
 mod token;
+mod webhook;
 
 pub use event::{Event, LiveColumn};
 pub use job::{Job, JobId, JobList, JobState, Rerun, SpoolEntry, SpoolFile, StageTiming};
@@ -61,3 +65,7 @@ pub use status::{
     ScannerLink, ScannerList, ScannerStatus, ScannerSummary, Status, StorageStatus, THE_SCANNER,
 };
 pub use token::{CreateToken, MAX_TOKEN_NAME_CHARS, NewToken, Token, TokenList};
+pub use webhook::{
+    Delivery, DeliveryAttempt, DeliveryList, DeliveryState, Webhook, WebhookData, WebhookEvent,
+    WebhookList, WebhookMessage,
+};

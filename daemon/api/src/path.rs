@@ -48,6 +48,12 @@ pub const LASER: &str = "/v1/laser";
 pub const TOKENS: &str = "/v1/tokens";
 /// Pattern of a token's revocation.
 pub const TOKEN_REVOKE: &str = "/v1/tokens/{token}/revoke";
+/// The webhooks.
+pub const WEBHOOKS: &str = "/v1/webhooks";
+/// Pattern of a webhook's log.
+pub const WEBHOOK_DELIVERIES: &str = "/v1/webhooks/{webhook}/deliveries";
+/// Pattern of a webhook's test.
+pub const WEBHOOK_TEST: &str = "/v1/webhooks/{webhook}/test";
 /// The event stream.
 pub const EVENTS: &str = "/v1/events";
 
@@ -139,6 +145,18 @@ pub fn spool_file(result: &str, file: &str) -> String {
 #[must_use]
 pub fn token_revoke(name: &str) -> String {
     format!("{TOKENS}/{}/revoke", segment(name))
+}
+
+/// Log of a webhook.
+#[must_use]
+pub fn webhook_deliveries(name: &str) -> String {
+    format!("{WEBHOOKS}/{}/deliveries", segment(name))
+}
+
+/// Test of a webhook.
+#[must_use]
+pub fn webhook_test(name: &str) -> String {
+    format!("{WEBHOOKS}/{}/test", segment(name))
 }
 
 /// One segment of a path, escaped (RFC 3986, section 2.3).

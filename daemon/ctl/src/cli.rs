@@ -7,7 +7,7 @@ use clap::{Parser, Subcommand};
 
 use crate::command::{
     abort, change, convert, demo, doctor, fetch, jobs, laser, manual, rerun, resume, scan, scans,
-    status, token, watch,
+    status, token, watch, webhooks,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
@@ -43,6 +43,7 @@ pub(crate) enum Command {
     Fetch(fetch::Args),
     Laser(laser::Args),
     Token(token::Args),
+    Webhooks(webhooks::Args),
     Doctor(doctor::Args),
     Manual(manual::Args),
 }

@@ -10,11 +10,15 @@
 mod common;
 
 use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpListener;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use common::{relief, roof, text};
 use jsonschema::{Retrieve, Uri, Validator};
+use reliefd::config::WebhookConfig;
 use reliefd::{Config, Daemon};
 use serde_json::{Value, json};
 use sim_scanner::config::SimConfig;
@@ -117,7 +121,7 @@ fn the_schemas_are_schemas() {
     }
     for command in [
         "convert", "demo", "scan", "abort", "resume", "status", "scans", "jobs", "retry", "cancel",
-        "rerun", "watch", "fetch", "doctor", "token", "laser",
+        "rerun", "watch", "fetch", "doctor", "token", "laser", "webhooks",
     ] {
         let reference = format!("commands.schema.json#/$defs/{command}");
         assert!(
@@ -439,5 +443,105 @@ async fn tokens_are_made_used_and_revoked() {
 
     token(&["revoke", "kept"]).await;
     refused(&[], with_file, "does not hold").await;
+    daemon.shutdown().await;
+}
+
+/// Takes one connection after the other, and answers all that is posted with this.
+fn receiver(answer: &'static str) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = format!("http://{}/relief", listener.local_addr().unwrap());
+    // Until the process ends, as nobody asks any more.
+    std::thread::spawn(move || {
+        for stream in listener.incoming() {
+            let mut stream = BufReader::new(stream.unwrap());
+            let mut length = 0;
+            loop {
+                let mut line = String::new();
+                stream.read_line(&mut line).unwrap();
+                if let Some(value) = line.to_lowercase().strip_prefix("content-length: ") {
+                    length = value.trim().parse().unwrap();
+                }
+                if line.trim().is_empty() {
+                    break;
+                }
+            }
+            stream.read_exact(&mut vec![0; length]).unwrap();
+            stream.get_mut().write_all(answer.as_bytes()).unwrap();
+        }
+    });
+    url
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn webhooks_are_listed_tested_and_looked_into() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let secret = at.join("secret");
+    fs::write(&secret, "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw").unwrap();
+    fs::set_permissions(&secret, fs::Permissions::from_mode(0o600)).unwrap();
+    let mut config = Config::default();
+    config.service.socket = at.join("s");
+    config.service.state_dir = at.join("state");
+    config.service.spool_dir = at.join("spool");
+    config.scanner.port = at.join("none");
+    let none = Daemon::start(config.clone()).await.unwrap();
+    let told = run(at, &[("RELIEF_SOCKET", "s")], &["webhooks"]).await;
+    let told = String::from_utf8_lossy(&told.stdout).into_owned();
+    assert!(told.starts_with("there are no webhooks"), "{told}");
+    none.shutdown().await;
+
+    let takes = receiver("HTTP/1.1 204 x\r\n\r\n");
+    let refuses = receiver("HTTP/1.1 401 x\r\nContent-Length: 8\r\n\r\nwho are?");
+    config.webhooks = vec![
+        WebhookConfig::new("lab", &takes, &secret),
+        WebhookConfig::new("bad", &refuses, &secret),
+    ];
+    let daemon = Daemon::start(config).await.unwrap();
+    let webhooks = async |arguments: &[&str]| {
+        let told = ask(at, daemon.socket(), &[&["webhooks"], arguments].concat()).await;
+        check("commands.schema.json#/$defs/webhooks", &told);
+        told
+    };
+    let listed = webhooks(&[]).await;
+    assert_eq!(listed["webhooks"][0]["url"], takes.as_str());
+    assert_eq!(webhooks(&["test", "lab"]).await["state"], "delivered");
+    assert_eq!(
+        webhooks(&["test", "bad"]).await["tried"][0]["answer"],
+        "who are?"
+    );
+    assert_eq!(
+        webhooks(&["log", "bad"]).await["deliveries"][0]["event"],
+        "test"
+    );
+    assert_eq!(
+        webhooks(&[]).await["webhooks"][1]["latest"]["state"],
+        "given_up"
+    );
+
+    let shown = async |arguments: &[&str]| {
+        let output = run(at, &[("RELIEF_SOCKET", "s")], arguments).await;
+        let of = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        (output.status.code(), of(&output.stdout), of(&output.stderr))
+    };
+    let (code, out, _) = shown(&["webhooks", "test", "lab"]).await;
+    assert_eq!((code, out.as_str()), (Some(0), "lab: taken (204)\n"));
+    let (code, out, told) = shown(&["webhooks", "test", "bad"]).await;
+    assert_eq!((code, out.as_str()), (Some(1), ""));
+    assert!(told.starts_with("relief: bad was not told: "), "{told}");
+    assert!(told.ends_with("it said: who are?\n"), "{told}");
+    let (code, _, told) = shown(&["webhooks", "test", "lob"]).await;
+    assert_eq!(code, Some(1));
+    assert!(
+        told.contains("there is no webhook lob; there are lab, bad"),
+        "{told}"
+    );
+    let (_, out, _) = shown(&["webhooks"]).await;
+    assert!(out.contains("scan-ended job-done job-failed"), "{out}");
+    assert!(out.contains("test not taken: "), "{out}");
+    let (_, out, _) = shown(&["webhooks", "log", "lab"]).await;
+    assert!(
+        out.contains("test") && out.contains("ms): taken (204)"),
+        "{out}"
+    );
     daemon.shutdown().await;
 }

@@ -159,14 +159,22 @@ impl<'a> Keeper<'a> {
             Some(_) => (ScanState::Paused, ScannerLink::Trouble),
             None => (ScanState::Scanning, ScannerLink::Scanning),
         };
-        self.station.note(link, reason.clone());
+        self.service
+            .note_scanner(self.station, link, reason.clone());
         let scan = self.station.update_active(|scan| {
             scan.state = state;
             scan.reason = reason;
             scan.needs_person = needs_person;
         });
         // The record of a pause is for those who look; the columns do not hang on it.
-        if let Some(Err(error)) = scan.map(|scan| self.service.keep_scan(&scan)) {
+        let kept = scan.map(|scan| {
+            if needs_person {
+                self.service.keep_scan_telling(&scan)
+            } else {
+                self.service.keep_scan(&scan)
+            }
+        });
+        if let Some(Err(error)) = kept {
             tracing::error!(scan = self.id, %error, "cannot keep the record of a scan");
         }
     }

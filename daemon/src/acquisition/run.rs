@@ -172,7 +172,7 @@ fn take_all(
         columns = info.columns,
         "scan begins"
     );
-    station.note(ScannerLink::Scanning, None);
+    service.note_scanner(station, ScannerLink::Scanning, None);
     let scan = station.update_active(|scan| {
         scan.columns_planned = info.columns;
         scan.state = ScanState::Scanning;

@@ -18,7 +18,7 @@ pub(crate) fn watch(service: &Arc<Service>, station: &Station) {
     loop {
         if !station.is_scanning() {
             pulse.work(station.longest_wait);
-            look(station);
+            look(service, station);
             pulse.rest();
         }
         if service.wait_for_stop(INTERVAL) {
@@ -27,7 +27,7 @@ pub(crate) fn watch(service: &Arc<Service>, station: &Station) {
     }
 }
 
-fn look(station: &Station) {
+fn look(service: &Service, station: &Station) {
     let known = station.status().model.is_some();
     let result = if known {
         station.scanner.status().map(|status| {
@@ -47,11 +47,12 @@ fn look(station: &Station) {
     if station.is_scanning() {
         return;
     }
-    match result {
-        Ok(Ok(())) => station.note(ScannerLink::Ready, None),
-        Ok(Err(fault)) => station.note(ScannerLink::Trouble, Some(fault)),
-        Err(error) => station.note(ScannerLink::Trouble, Some(error.to_string())),
-    }
+    let (link, problem) = match result {
+        Ok(Ok(())) => (ScannerLink::Ready, None),
+        Ok(Err(fault)) => (ScannerLink::Trouble, Some(fault)),
+        Err(error) => (ScannerLink::Trouble, Some(error.to_string())),
+    };
+    service.note_scanner(station, link, problem);
 }
 
 /// One line on what is wrong, for the log; `None` when nothing is.

@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::{Config, scanners};
+use super::{Config, scanners, webhooks};
 use crate::error::bounded;
 
 /// A hundred times what every key with its comment takes.
@@ -60,24 +60,26 @@ impl Config {
     /// # Errors
     /// Any [`ConfigError`].
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        let failed = |source| ConfigError::Read {
-            path: path.to_owned(),
-            source,
-        };
-        let mut bytes = Vec::new();
-        File::open(path)
-            .and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes))
-            .map_err(failed)?;
-        if bytes.len() as u64 > MOST_BYTES {
-            return Err(ConfigError::Long {
-                path: path.to_owned(),
-            });
-        }
-        let text = String::from_utf8(bytes)
-            .map_err(|error| failed(std::io::Error::new(std::io::ErrorKind::InvalidData, error)))?;
+        Self::parse_file(&read(path)?, path)
+    }
+
+    /// Reads a configuration file, and looks at the files that it names: those with secrets are
+    /// for the service alone, and others need not be able to read them.
+    ///
+    /// # Errors
+    /// Any [`ConfigError`].
+    pub fn load_with_files(path: &Path) -> Result<Self, ConfigError> {
+        let text = read(path)?;
+        let config = Self::parse_file(&text, path)?;
+        webhooks::check_all_files(&text, &config)
+            .map_err(|(start, message)| wrong(&text, path, start, message))?;
+        Ok(config)
+    }
+
+    fn parse_file(text: &str, path: &Path) -> Result<Self, ConfigError> {
         // Two names may lead to one port; one that is not there is what it is called.
         let port = |port: &Path| fs::canonicalize(port).unwrap_or_else(|_| port.to_owned());
-        Self::parse_with(&text, path, &port)
+        Self::parse_with(text, path, &port)
     }
 
     /// Reads a configuration from text; `path` is for the messages.
@@ -93,15 +95,7 @@ impl Config {
         path: &Path,
         port: &dyn Fn(&Path) -> PathBuf,
     ) -> Result<Self, ConfigError> {
-        let wrong = |start: usize, message: String| {
-            let (line, column) = line_and_column(text, start);
-            ConfigError::Wrong {
-                path: path.to_owned(),
-                line,
-                column,
-                message: bounded(message),
-            }
-        };
+        let wrong = |start: usize, message: String| wrong(text, path, start, message);
         let config: Self = toml::from_str(text).map_err(|error| {
             let start = error.span().map_or(0, |span| span.start).min(text.len());
             let before = text.get(..start).unwrap_or_default();
@@ -114,7 +108,9 @@ impl Config {
             }
             wrong(start, message)
         })?;
-        scanners::check(text, &config, port).map_err(|(start, message)| wrong(start, message))?;
+        scanners::check(text, &config, port)
+            .and_then(|()| webhooks::check(text, &config))
+            .map_err(|(start, message)| wrong(start, message))?;
         config
             .processing()
             .check()
@@ -124,6 +120,35 @@ impl Config {
                 message: bounded(message),
             })?;
         Ok(config)
+    }
+}
+
+/// The text of a file.
+fn read(path: &Path) -> Result<String, ConfigError> {
+    let failed = |source| ConfigError::Read {
+        path: path.to_owned(),
+        source,
+    };
+    let mut bytes = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes))
+        .map_err(failed)?;
+    if bytes.len() as u64 > MOST_BYTES {
+        return Err(ConfigError::Long {
+            path: path.to_owned(),
+        });
+    }
+    String::from_utf8(bytes)
+        .map_err(|error| failed(std::io::Error::new(std::io::ErrorKind::InvalidData, error)))
+}
+
+fn wrong(text: &str, path: &Path, start: usize, message: String) -> ConfigError {
+    let (line, column) = line_and_column(text, start);
+    ConfigError::Wrong {
+        path: path.to_owned(),
+        line,
+        column,
+        message: bounded(message),
     }
 }
 
@@ -147,11 +172,16 @@ fn section_of(before: &str) -> Option<&str> {
         .lines()
         .rev()
         .find_map(|line| line.trim().strip_prefix('[')?.split_once(']'))
-        .map(|(name, _)| name.trim())
+        // One of several sections of the same name has its brackets doubled.
+        .map(|(name, _)| name.trim_start_matches('[').trim())
 }
 
-/// Serde's message about an unknown name, with the nearest known one put forward.
+/// Serde's message about an unknown name, with the nearest known one put forward, or about one
+/// that is missing.
 pub(super) fn with_nearest_name(message: &str) -> String {
+    if let Some(key) = message.strip_prefix("missing field ") {
+        return format!("the key {key} is missing");
+    }
     for (kind, ours) in [("unknown field", "key"), ("unknown variant", "value")] {
         let Some(rest) = message.strip_prefix(kind) else {
             continue;

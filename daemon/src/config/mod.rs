@@ -11,6 +11,7 @@ mod scanner;
 mod scanners;
 mod storage;
 mod value;
+mod webhooks;
 
 use std::collections::BTreeMap;
 use std::net::{IpAddr, SocketAddr};
@@ -29,6 +30,7 @@ pub use processing::{
 pub use reload::Reloaded;
 pub use scanner::{ScannerConfig, Transport};
 pub use storage::{Limits, StorageConfig};
+pub use webhooks::{Retry, WebhookConfig};
 
 /// The whole configuration.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
@@ -58,6 +60,8 @@ pub struct Config {
     pub deliverables: DeliverablesConfig,
     /// How jobs are run.
     pub queue: QueueConfig,
+    /// Who is told when something is done.
+    pub webhooks: Vec<WebhookConfig>,
     /// What is logged.
     pub log: LogConfig,
 }

@@ -5,7 +5,7 @@ use super::{Config, ScannerConfig};
 /// What became of a reload.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Reloaded {
-    /// Sections that changed and hold from now on: for scans and reruns begun later.
+    /// Sections that changed and hold from now on: for what begins later.
     pub applied: Vec<String>,
     /// Sections that changed but only hold after a restart.
     pub needs_restart: Vec<String>,
@@ -39,7 +39,8 @@ impl Config {
             regrid,
             segment,
             reconstruct,
-            deliverables
+            deliverables,
+            webhooks
         );
         leave!(service, http, queue);
         merged.scanner = reloaded_scanner("scanner", &self.scanner, &new.scanner, &mut outcome);

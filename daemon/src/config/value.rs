@@ -2,6 +2,8 @@
 
 use std::net::SocketAddr;
 
+use axum::http::Uri;
+use relief_api::WebhookEvent;
 use serde::{Deserialize, Deserializer, de::Error};
 
 /// A whole number within bounds; the text names what is counted.
@@ -31,13 +33,17 @@ const MOST_NAME_CHARS: usize = 32;
 
 /// Names of scanners stand in names of files, in paths of the API and on command lines.
 pub(super) fn check_scanner_name(name: &str) -> Result<(), String> {
+    check_name(name, "scanner")
+}
+
+fn check_name(name: &str, of_what: &str) -> Result<(), String> {
     let of_file = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
     let begins = name.starts_with(|c: char| c.is_ascii_alphanumeric());
     if begins && name.len() <= MOST_NAME_CHARS && name.chars().all(of_file) {
         return Ok(());
     }
     Err(format!(
-        "{name:?} is no name for a scanner: 1 to {MOST_NAME_CHARS} letters (a to z, A to Z), \
+        "{name:?} is no name for a {of_what}: 1 to {MOST_NAME_CHARS} letters (a to z, A to Z), \
          digits, `-` and `_` are possible, a letter or digit first"
     ))
 }
@@ -48,6 +54,72 @@ pub(super) fn scanner_name<'de, D: Deserializer<'de>>(
     let name = String::deserialize(deserializer)?;
     check_scanner_name(&name).map_err(D::Error::custom)?;
     Ok(Some(name))
+}
+
+pub(super) fn webhook_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    let name = String::deserialize(deserializer)?;
+    check_name(&name, "webhook").map_err(D::Error::custom)?;
+    Ok(name)
+}
+
+/// Where to post to. Nothing in it is secret: it is shown to whoever may use the API.
+pub(super) fn webhook_url<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    let refused = |why: &str| {
+        Err(D::Error::custom(format!(
+            "\"{text}\" {why}: a URL such as \"https://lab.example/relief\" is needed"
+        )))
+    };
+    let Ok(uri) = text.parse::<Uri>() else {
+        return refused("is no URL");
+    };
+    if !matches!(uri.scheme_str(), Some("http" | "https")) {
+        return refused("begins with neither http:// nor https://");
+    }
+    match uri.authority() {
+        Some(authority) if authority.as_str().contains('@') => {
+            refused("holds a name or password, which the receiver is not told and others would see")
+        }
+        Some(authority) if !authority.host().is_empty() => Ok(text),
+        _ => refused("names no host"),
+    }
+}
+
+pub(super) fn webhook_milliseconds<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<u32, D::Error> {
+    // Shorter than the command line waits for the answer to a test.
+    bounded(deserializer, 100, 25_000, " ms")
+}
+
+/// What a webhook is told of: at least something, and nothing twice.
+pub(super) fn webhook_events<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Vec<WebhookEvent>, D::Error> {
+    let names = Vec::<String>::deserialize(deserializer)?;
+    let known = || WebhookEvent::CHOICES.map(WebhookEvent::as_str).join(", ");
+    if names.is_empty() {
+        return Err(D::Error::custom(format!(
+            "a webhook without events is told of nothing: choose from {}, or remove it",
+            known()
+        )));
+    }
+    let mut events = Vec::new();
+    for name in names {
+        let found = WebhookEvent::CHOICES
+            .into_iter()
+            .find(|event| event.as_str() == name);
+        let Some(event) = found else {
+            return Err(D::Error::custom(format!(
+                "there is no event `{name}`; known are: {}",
+                known()
+            )));
+        };
+        if !events.contains(&event) {
+            events.push(event);
+        }
+    }
+    Ok(events)
 }
 
 /// A serial number as USB devices have them; an empty one would mean any device, by mistake.

@@ -15,6 +15,7 @@ mod scans;
 mod serve;
 mod stall;
 mod tokens;
+mod webhooks;
 
 use std::sync::Arc;
 
@@ -90,6 +91,9 @@ fn complete(tokens: Router<Context>, context: &Context) -> Router {
         .route(path::JOB_CANCEL, post(jobs::cancel))
         .route(path::SPOOL, get(files::entry))
         .route(path::SPOOL_FILE, get(files::file))
+        .route(path::WEBHOOKS, get(webhooks::list))
+        .route(path::WEBHOOK_DELIVERIES, get(webhooks::deliveries))
+        .route(path::WEBHOOK_TEST, post(webhooks::test))
         .route(path::EVENTS, get(events::stream))
         .fallback(problem::no_such_path)
         .method_not_allowed_fallback(problem::no_such_method)

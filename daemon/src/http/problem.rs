@@ -126,6 +126,16 @@ impl From<ServiceError> for Refusal {
                 Some("`relief jobs` lists the jobs there are".into()),
             ),
             ServiceError::WrongJobState { .. } => (S::CONFLICT, "wrong-job-state", None),
+            ServiceError::NoSuchWebhook { .. } => (
+                S::NOT_FOUND,
+                "no-such-webhook",
+                Some("each has a section [[webhooks]] in the configuration".into()),
+            ),
+            ServiceError::WebhookBusy { .. } => (
+                S::CONFLICT,
+                "webhook-busy",
+                Some("try again in a moment".into()),
+            ),
             ServiceError::NotInSpool { .. } => (S::NOT_FOUND, "not-in-spool", None),
             ServiceError::NoRoom { .. } => (
                 S::INSUFFICIENT_STORAGE,

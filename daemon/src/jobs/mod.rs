@@ -15,6 +15,7 @@ use crate::config::Processing;
 use crate::error::ServiceError;
 use crate::ids::{now, shown_name};
 use crate::service::Service;
+use crate::store::Outgoing;
 
 pub(crate) use queue::Queue;
 pub(crate) use worker::work;
@@ -24,10 +25,15 @@ pub(crate) use worker::work;
 const MOST_CUT_SHORT: u32 = 3;
 
 impl Service {
-    /// Queues the job of a scan that has just been completed, and keeps the scan with it.
-    pub(crate) fn queue_first_job(&self, scan: &mut Scan) -> Result<Job, ServiceError> {
+    /// Queues the job of a scan that has just been completed, and keeps the scan with it, and
+    /// what `tell` makes of it for the webhooks.
+    pub(crate) fn queue_first_job(
+        &self,
+        scan: &mut Scan,
+        tell: impl FnOnce(&Scan) -> Vec<Outgoing>,
+    ) -> Result<Job, ServiceError> {
         let job = new_job(scan, scan.id.clone(), scan.name.clone());
-        self.add_job(job, scan)
+        self.add_job(job, scan, tell)
     }
 
     /// Queues a kept scan to be processed again.
@@ -71,11 +77,17 @@ impl Service {
         });
         let mut job = new_job(&scan, result, name);
         job.settings.clone_from(&request.settings);
-        self.add_job(job, &mut scan)
+        self.add_job(job, &mut scan, |_| Vec::new())
     }
 
-    fn add_job(&self, job: Job, scan: &mut Scan) -> Result<Job, ServiceError> {
-        let job = self.store.add_job(job, scan)?;
+    fn add_job(
+        &self,
+        job: Job,
+        scan: &mut Scan,
+        tell: impl FnOnce(&Scan) -> Vec<Outgoing>,
+    ) -> Result<Job, ServiceError> {
+        let (job, added) = self.store.add_job(job, scan, tell)?;
+        self.webhooks.added(added);
         self.hub.tell(Event::Job(job.clone()));
         self.queue.add(job.id);
         Ok(job)
@@ -141,7 +153,7 @@ impl Service {
              `relief retry {}`",
             job.id
         ));
-        Ok(self.store.put_job(job)?)
+        Ok(self.put_job(job)?)
     }
 
     /// Cancels a job: at once if it waits, at its next opportunity if it runs.
@@ -166,7 +178,7 @@ impl Service {
 
     /// Keeps a job's record and tells of it.
     pub(crate) fn keep_job(&self, job: &Job) -> Result<(), ServiceError> {
-        self.store.put_job(job)?;
+        self.put_job(job)?;
         self.hub.tell(Event::Job(job.clone()));
         Ok(())
     }

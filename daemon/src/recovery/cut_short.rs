@@ -10,7 +10,7 @@ use scanner_driver::ScannerError;
 use super::Found;
 use crate::acquisition::{AbortRequest, Rest, TakeUp, Task, Ticket, not_taken_up, run};
 use crate::error::ServiceError;
-use crate::ids::{now, rfc3339};
+use crate::ids::{at, now};
 use crate::service::Service;
 
 /// After so many ends of the service in a row without a new column a person is asked: the scan
@@ -59,7 +59,7 @@ impl Service {
             })
         };
         scan.interruption = Some(Interruption {
-            since: rfc3339(since),
+            since: at(since),
             columns: found.columns,
             times,
         });

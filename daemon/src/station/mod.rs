@@ -274,28 +274,31 @@ impl Station {
 
     /// Notes who the scanner is.
     pub(crate) fn note_identity(&self, identity: &Identity) {
-        self.change(|status| {
+        let changed = self.change(|status| {
             status.model = Some(identity.model.as_str().to_owned());
             status.serial = Some(identity.serial.as_str().to_owned());
             status.firmware = Some(identity.firmware.as_str().to_owned());
         });
+        if let Some(status) = changed {
+            self.hub.tell(Event::Scanner(status));
+        }
     }
 
-    /// Notes how the scanner does.
-    pub(crate) fn note(&self, link: ScannerLink, problem: Option<String>) {
+    /// Notes how the scanner does. Gives what is to be told, if that has changed.
+    pub(crate) fn note(&self, link: ScannerLink, problem: Option<String>) -> Option<ScannerStatus> {
         self.change(|status| {
             status.link = link;
             status.problem = problem;
-        });
+        })
     }
 
-    fn change(&self, change: impl FnOnce(&mut ScannerStatus)) {
+    fn change(&self, change: impl FnOnce(&mut ScannerStatus)) -> Option<ScannerStatus> {
         let status = {
             let mut status = lock(&self.status);
             let before = status.clone();
             change(&mut status);
             if *status == before {
-                return;
+                return None;
             }
             status.clone()
         };
@@ -307,7 +310,7 @@ impl Station {
                 "scanner in trouble"
             );
         }
-        self.hub.tell(Event::Scanner(status));
+        Some(status)
     }
 }
 

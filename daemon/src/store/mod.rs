@@ -1,4 +1,5 @@
-//! What must survive a restart: the scans' records and the job queue, in one redb file.
+//! What must survive a restart: the scans' records, the job queue and the messages to webhooks, in
+//! one redb file.
 //!
 //! Records are JSON in a versioned envelope, so that a later version of the service can
 //! tell what it reads. redb locks the file, which keeps a second service out. A file that is
@@ -7,6 +8,7 @@
 
 mod backend;
 mod error;
+mod messages;
 mod record;
 mod salvage;
 
@@ -22,10 +24,12 @@ use serde::de::DeserializeOwned;
 use storage::{Disk, remove_file_if_there};
 
 pub use error::StoreError;
+pub(crate) use messages::{Added, Message, Outgoing};
 
 use backend::RecordsFile;
 use error::is_trouble_of_the_disk;
-use record::{decode, encode};
+use messages::{LOG, WAITING};
+use record::decode;
 
 const SCANS: TableDefinition<'_, &str, &[u8]> = TableDefinition::new("scans");
 const JOBS: TableDefinition<'_, JobId, &[u8]> = TableDefinition::new("jobs");
@@ -172,14 +176,7 @@ impl Store {
 
     /// Keeps a scan's record in place of any earlier one.
     pub(crate) fn put_scan(&self, scan: &Scan) -> Result<(), StoreError> {
-        let bytes = encode(scan);
-        self.with(|database| {
-            let transaction = database.begin_write()?;
-            transaction
-                .open_table(SCANS)?
-                .insert(scan.id.as_str(), bytes.as_slice())?;
-            Ok(transaction.commit()?)
-        })
+        self.put_scan_telling(scan, &[]).map(drop)
     }
 
     /// All jobs, oldest first.
@@ -206,36 +203,7 @@ impl Store {
 
     /// Keeps a job's record in place of any earlier one.
     pub(crate) fn put_job(&self, job: &Job) -> Result<(), StoreError> {
-        let bytes = encode(job);
-        self.with(|database| {
-            let transaction = database.begin_write()?;
-            transaction
-                .open_table(JOBS)?
-                .insert(job.id, bytes.as_slice())?;
-            Ok(transaction.commit()?)
-        })
-    }
-
-    /// Keeps a new job under the next number, and notes it on its scan, both or neither.
-    pub(crate) fn add_job(&self, mut job: Job, scan: &mut Scan) -> Result<Job, StoreError> {
-        let mut noted = scan.clone();
-        let kept = self.with(|database| {
-            let transaction = database.begin_write()?;
-            {
-                let mut jobs = transaction.open_table(JOBS)?;
-                job.id = jobs.last()?.map_or(1, |(id, _)| id.value() + 1);
-                jobs.insert(job.id, encode(&job).as_slice())?;
-                noted.jobs.push(job.id);
-                transaction
-                    .open_table(SCANS)?
-                    .insert(noted.id.as_str(), encode(&noted).as_slice())?;
-            }
-            transaction.commit()?;
-            Ok((job, noted))
-        });
-        let (job, noted) = kept?;
-        *scan = noted;
-        Ok(job)
+        self.put_job_telling(job, &[]).map(drop)
     }
 
     fn decode_all<T: DeserializeOwned>(&self, rows: Vec<Vec<u8>>) -> Result<Vec<T>, StoreError> {
@@ -254,6 +222,8 @@ fn open_database(disk: &dyn Disk, path: &Path) -> Result<Database, redb::Error> 
     let transaction = database.begin_write()?;
     transaction.open_table(SCANS)?;
     transaction.open_table(JOBS)?;
+    transaction.open_table(WAITING)?;
+    transaction.open_table(LOG)?;
     transaction.commit()?;
     Ok(database)
 }

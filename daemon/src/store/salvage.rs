@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 
 use jiff::Timestamp;
 use redb::{Database, Key, ReadableDatabase, ReadableTable, TableDefinition, TableHandle};
-use relief_api::{Job, JobId, Scan};
+use relief_api::{Delivery, Job, JobId, Scan};
 use storage::{Disk, remove_file_if_there};
 
 use super::error::{StoreError, is_damage};
+use super::messages::{LOG, Message, WAITING};
 use super::record::decode;
 use super::{CACHE_BYTES, JOBS, SCANS, open_database, sync_folder};
 use crate::error::panic_text;
@@ -29,6 +30,8 @@ pub(super) struct Damage(String);
 struct Rows {
     scans: Vec<(String, Vec<u8>)>,
     jobs: Vec<(JobId, Vec<u8>)>,
+    waiting: Vec<((String, u64), Vec<u8>)>,
+    log: Vec<((String, u64), Vec<u8>)>,
     /// What could not be read.
     lost: Vec<String>,
 }
@@ -60,13 +63,18 @@ fn read_table<K: Key, T: Ord>(
     };
     for backwards in [false, true] {
         let what = match catch_unwind(AssertUnwindSafe(|| read(backwards))) {
-            Ok(Ok(())) => break,
+            // Of a version that had no such table.
+            Ok(Ok(()) | Err(redb::Error::TableDoesNotExist(_))) => break,
             Ok(Err(error)) => error.to_string(),
             Err(panic) => panic_text(&*panic).to_owned(),
         };
         lost.push(format!("{}: {what}", definition.name()));
     }
     found.into_iter().collect()
+}
+
+fn owned((webhook, number): (&str, u64)) -> (String, u64) {
+    (webhook.to_owned(), number)
 }
 
 impl Rows {
@@ -76,6 +84,8 @@ impl Rows {
         Self {
             scans: read_table(database, SCANS, str::to_owned, &mut lost),
             jobs: read_table(database, JOBS, |id| id, &mut lost),
+            waiting: read_table(database, WAITING, owned, &mut lost),
+            log: read_table(database, LOG, owned, &mut lost),
             lost,
         }
     }
@@ -102,6 +112,20 @@ impl Rows {
         self.jobs.retain(|(id, bytes)| {
             let error = decode::<Job>(path, bytes).err();
             sound(format!("the job {id}"), error)
+        });
+        self.waiting.retain(|((webhook, number), bytes)| {
+            let error = decode::<Message>(path, bytes).err();
+            sound(
+                format!("the message {number} to the webhook {webhook}"),
+                error,
+            )
+        });
+        self.log.retain(|((webhook, number), bytes)| {
+            let error = decode::<Delivery>(path, bytes).err();
+            sound(
+                format!("the entry {number} of the log of the webhook {webhook}"),
+                error,
+            )
         });
         newer.map_or(Ok(()), Err)
     }
@@ -152,6 +176,12 @@ pub(super) fn replace(disk: &dyn Disk, path: &Path, damage: &Damage) -> Result<(
             let mut jobs = transaction.open_table(JOBS)?;
             for (id, bytes) in &rows.jobs {
                 jobs.insert(id, bytes.as_slice())?;
+            }
+            for (definition, rows) in [(WAITING, &rows.waiting), (LOG, &rows.log)] {
+                let mut table = transaction.open_table(definition)?;
+                for ((webhook, number), bytes) in rows {
+                    table.insert((webhook.as_str(), *number), bytes.as_slice())?;
+                }
             }
         }
         transaction.commit()?;

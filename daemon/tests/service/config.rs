@@ -1,6 +1,8 @@
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use reliefd::Config;
+use reliefd::config::WebhookConfig;
 
 fn refused(text: &str) -> String {
     Config::parse(text, Path::new("relief.toml"))
@@ -100,6 +102,83 @@ fn faults_are_told_with_their_line_and_a_way_out() {
     ] {
         assert_eq!(refused(text), message);
     }
+    let webhook = |keys: &str| format!("[[webhooks]]\nname = \"lab\"\n{keys}");
+    let whole = "url = \"https://lab.example/\"\nsecret_file = \"s\"\n";
+    for (keys, message) in [
+        (
+            "url = \"https://lab.example/\"\n".to_owned(),
+            "relief.toml, line 1, column 1: the key `secret_file` is missing",
+        ),
+        (
+            whole.replace("https:", "ftp:"),
+            "relief.toml, line 3, column 7: \"ftp://lab.example/\" begins with neither http:// \
+             nor https://: a URL such as \"https://lab.example/relief\" is needed",
+        ),
+        (
+            whole.replace("lab.example", "a:b@lab.example"),
+            "relief.toml, line 3, column 7: \"https://a:b@lab.example/\" holds a name or \
+             password, which the receiver is not told and others would see: a URL such as \
+             \"https://lab.example/relief\" is needed",
+        ),
+        (
+            whole.replace("lab.example", "lab example"),
+            "relief.toml, line 3, column 7: \"https://lab example/\" is no URL: a URL such as \
+             \"https://lab.example/relief\" is needed",
+        ),
+        (
+            whole.replace("https://lab.example/", "/relief"),
+            "relief.toml, line 3, column 7: \"/relief\" begins with neither http:// nor \
+             https://: a URL such as \"https://lab.example/relief\" is needed",
+        ),
+        (
+            format!("{whole}event = []\n"),
+            "relief.toml, line 5, column 1: in [webhooks] unknown key `event`; did you mean \
+             `events`?",
+        ),
+        (
+            format!("{whole}events = []\n"),
+            "relief.toml, line 5, column 10: a webhook without events is told of nothing: choose \
+             from scan-ended, scan-paused, job-done, job-failed, scanner-trouble, or remove it",
+        ),
+        (
+            format!("{whole}events = [\"job-done\", \"scan\"]\n"),
+            "relief.toml, line 5, column 10: there is no event `scan`; known are: scan-ended, \
+             scan-paused, job-done, job-failed, scanner-trouble",
+        ),
+        (
+            format!("{whole}events = [\"test\"]\n"),
+            "relief.toml, line 5, column 10: there is no event `test`; known are: scan-ended, \
+             scan-paused, job-done, job-failed, scanner-trouble",
+        ),
+        (
+            format!("{whole}timeout_ms = 30000\n"),
+            "relief.toml, line 5, column 14: 30000 is out of range: 100 to 25000 ms are possible",
+        ),
+        (
+            format!("{}ca_file = \"c\"\n", whole.replace("https:", "http:")),
+            "relief.toml, line 5, column 11: `ca_file` is for https, but `url` is not: remove it, \
+             or change the url",
+        ),
+        (
+            format!("{whole}[[webhooks]]\nname = \"lab\"\n{whole}"),
+            "relief.toml, line 6, column 8: there is a webhook lab in line 2 already: each has \
+             its own name",
+        ),
+        (
+            format!("{whole}[[webhooks]]\nname = \"a b\"\n{whole}"),
+            "relief.toml, line 6, column 8: \"a b\" is no name for a webhook: 1 to 32 letters \
+             (a to z, A to Z), digits, `-` and `_` are possible, a letter or digit first",
+        ),
+    ] {
+        assert_eq!(refused(&webhook(&keys)), message);
+    }
+    let many: String = (1..=17)
+        .map(|number| format!("[[webhooks]]\nname = \"lab-{number}\"\n{whole}"))
+        .collect();
+    assert_eq!(
+        refused(&many),
+        "relief.toml, line 66, column 8: more than 16 webhooks are not possible"
+    );
     let kind = refused("[queue]\nworkers = \"two\"\n");
     assert!(
         kind.starts_with("relief.toml, line 2, column 11: invalid type"),
@@ -112,6 +191,51 @@ fn faults_are_told_with_their_line_and_a_way_out() {
         missing.to_string(),
         "cannot read the configuration no/such.toml: No such file or directory (os error 2)"
     );
+}
+
+#[test]
+fn files_of_webhooks_are_looked_at_where_asked_for_and_told_with_their_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    let file = place("relief.toml");
+    let write = |name: &str, text: &str, mode: u32| {
+        std::fs::write(place(name), text).unwrap();
+        std::fs::set_permissions(place(name), std::fs::Permissions::from_mode(mode)).unwrap();
+    };
+    let text = format!(
+        "[[webhooks]]\nname = \"lab\"\nurl = \"https://lab.example/\"\nsecret_file = {:?}\n\
+         ca_file = {:?}\n",
+        place("secret"),
+        place("ca.pem"),
+    );
+    write("relief.toml", &text, 0o644);
+    let refused = || Config::load_with_files(&file).unwrap_err().to_string();
+    // Whoever is not the service need not be able to read its secrets.
+    assert_eq!(Config::load(&file).unwrap().webhooks[0].name, "lab");
+    let line =
+        |line: usize, column: usize| format!("{}, line {line}, column {column}: ", file.display());
+    let told = refused();
+    assert!(told.starts_with(&line(4, 15)), "{told}");
+    assert!(
+        told.contains("install -m 600 -o relief -g relief"),
+        "{told}"
+    );
+    let secret = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw\n";
+    write("secret", secret, 0o644);
+    let told = refused();
+    assert!(told.starts_with(&line(4, 15)), "{told}");
+    assert!(
+        told.contains("may be used by others (mode 0644): chmod 600"),
+        "{told}"
+    );
+    write("secret", secret, 0o600);
+    let told = refused();
+    assert!(told.starts_with(&line(5, 11)), "{told}");
+    assert!(told.contains("cannot read the certificates in"), "{told}");
+    let own = rcgen::generate_simple_self_signed(["lab.example".to_owned()]).unwrap();
+    write("ca.pem", &own.cert.pem(), 0o644);
+    let config = Config::load_with_files(&file).unwrap();
+    assert_eq!(config.webhooks, Config::load(&file).unwrap().webhooks);
 }
 
 #[test]
@@ -146,6 +270,7 @@ fn in_force(path: &Path) -> Config {
     let all: String = text
         .lines()
         .map(|line| match line.strip_prefix("# ") {
+            Some(section) if section.starts_with("[[") => section,
             Some(key) if key.split_once(" = ").is_some_and(|(k, _)| !k.contains(' ')) => key,
             _ => line,
         })
@@ -202,6 +327,13 @@ fn the_examples_are_sound_and_show_the_defaults() {
         Config::default().service.socket_mode
     );
     assert_eq!(all.log, Config::default().log);
+    let mut webhook = WebhookConfig::new(
+        "lab",
+        "https://lab.example/relief",
+        "/etc/relief/lab.secret",
+    );
+    webhook.ca_file = Some("/etc/relief/lab-ca.pem".into());
+    assert_eq!(all.webhooks, [webhook]);
     let defaults = Config::default().processing().pipeline_settings(0.5, 0.5);
     let mut shown = all.processing().pipeline_settings(0.5, 0.5);
     shown.regrid.roi = defaults.regrid.roi;

@@ -37,8 +37,9 @@ struct State {
     laser_on: bool,
     /// Nothing that is asked for comes back.
     hung: bool,
-    /// A person has said that the scan may go on.
-    resumed: bool,
+    /// A pause after this many columns of a scan, until somebody lets it go on.
+    pause_after: Option<(u32, Pause)>,
+    is_paused: bool,
 }
 
 /// The scanner, and the test's hand on it.
@@ -81,6 +82,26 @@ impl FakeScanner {
 
     pub(crate) fn fault_after(&self, columns: u32) {
         self.change(|state| state.fault_after = Some(columns));
+    }
+
+    /// The next scan stands still after this many columns.
+    pub(crate) fn pause_after(&self, columns: u32, pause: Pause) {
+        self.change(|state| state.pause_after = Some((columns, pause)));
+    }
+
+    /// What is to be told before this column, if the scan stands still there.
+    fn pause_before(&self, index: u32) -> Option<Pause> {
+        let mut state = self.state.lock().unwrap();
+        let (_, pause) = state.pause_after.take_if(|(at, _)| *at == index)?;
+        state.is_paused = true;
+        Some(pause)
+    }
+
+    /// Waits until somebody lets the scan go on, or ends it.
+    fn wait_for_resume(&self) {
+        let state = self.state.lock().unwrap();
+        let waiting = |state: &mut State| state.is_paused && !state.aborted;
+        drop(self.changed.wait_while(state, waiting).unwrap());
     }
 
     /// Nothing comes back, not even an error, until what this gives is dropped.
@@ -130,10 +151,17 @@ impl FakeScanner {
                     columns: first,
                 };
                 let _ = sender.send(StreamItem::Paused(pause));
-                scanner.wait_for_a_word(needs_person);
+                scanner.change(|state| state.is_paused = needs_person);
+                scanner.wait_for_resume();
                 let _ = sender.send(StreamItem::Resumed);
             }
             let end = (first..plan.columns).try_for_each(|index| {
+                if let Some(pause) = scanner.pause_before(index) {
+                    let tell = |item| sender.send(item).map_err(|_| ScannerError::Closed);
+                    tell(StreamItem::Paused(pause))?;
+                    scanner.wait_for_resume();
+                    tell(StreamItem::Resumed)?;
+                }
                 scanner.wait_for_leave(index)?;
                 sender
                     .send(StreamItem::Column(column(&plan, index)))
@@ -161,13 +189,6 @@ impl FakeScanner {
     fn answering(&self) -> MutexGuard<'_, State> {
         let state = self.state.lock().unwrap();
         self.changed.wait_while(state, |state| state.hung).unwrap()
-    }
-
-    /// Waits for a person, if need be.
-    fn wait_for_a_word(&self, needed: bool) {
-        let state = self.state.lock().unwrap();
-        let silent = |state: &mut State| needed && !state.resumed && !state.aborted;
-        drop(self.changed.wait_while(state, silent).unwrap());
     }
 
     /// Waits for leave to deliver column `index`.
@@ -307,7 +328,7 @@ impl Scanner for FakeScanner {
     }
 
     fn resume_scan(&self) -> Result<(), ScannerError> {
-        self.change(|state| state.resumed = true);
+        self.change(|state| state.is_paused = false);
         Ok(())
     }
 

@@ -23,3 +23,4 @@ mod refusals;
 mod rig;
 mod scanners;
 mod scans;
+mod webhooks;

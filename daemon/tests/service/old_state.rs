@@ -4,15 +4,19 @@
 use std::fs;
 use std::io::Read as _;
 use std::path::Path;
+use std::time::Duration;
 
 use flate2::read::GzDecoder;
 use relief_api::{
-    Job, JobList, JobState, LaserLog, LaserState, Rerun, ScanList, ScanState, TokenList, path,
+    DeliveryList, DeliveryState, Job, JobList, JobState, LaserLog, LaserState, Rerun, ScanList,
+    ScanState, TokenList, path,
 };
 use tokio::net::TcpStream;
 
 use crate::client::exchange;
 use crate::rig::{Rig, job_over};
+use crate::webhooks::receiver::Receiver;
+use crate::webhooks::webhook;
 
 /// Unpacks a state folder.
 fn unpack(golden: &Path, state: &Path) {
@@ -92,6 +96,42 @@ async fn version_1_journals_alone_give_the_same_scans() {
             (&kept.settings, &kept.started_at)
         );
     }
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn messages_of_version_1_are_delivered_and_their_log_shown() {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/webhooks-1");
+    let read = |name: &str| fs::read(golden.join(name)).unwrap();
+    let kept: DeliveryList = serde_json::from_slice(&read("deliveries.json")).unwrap();
+    let waits = kept
+        .deliveries
+        .iter()
+        .position(|delivery| delivery.state == DeliveryState::Waiting)
+        .unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    unpack(&golden, &folder.path().join("state"));
+    let receiver = Receiver::new([]);
+    let lab = webhook(folder.path(), "lab", &receiver.url());
+    let rig = Rig::start(folder, |config| config.webhooks = vec![lab]).await;
+    let got = receiver.next();
+    assert_eq!(got.id(), kept.deliveries[waits].id);
+    assert_eq!(got.body.as_bytes(), read("waiting.json"));
+    let log = loop {
+        let log: DeliveryList = rig.client.get(&path::webhook_deliveries("lab")).await;
+        if log.deliveries[waits].state == DeliveryState::Delivered {
+            break log;
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    };
+    for (index, (now, kept)) in log.deliveries.iter().zip(&kept.deliveries).enumerate() {
+        if index == waits {
+            assert_eq!((now.attempts, &now.tried[0]), (2, &kept.tried[0]));
+        } else {
+            assert_eq!(now, kept);
+        }
+    }
+    assert_eq!(log.deliveries.len(), 3);
     rig.daemon.shutdown().await;
 }
 

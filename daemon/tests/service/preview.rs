@@ -79,7 +79,9 @@ async fn a_preview_says_what_stands_in_the_way_and_what_may_surprise() {
     let preview: ScanPreview = rig.client.post(path::SCAN_PREVIEW, &request).await;
     assert!(preview.notes[0].contains("coarser"), "{:?}", preview.notes);
     request.settings.clear();
-    request.settings.insert("regrid.neighbours".into(), 6.into());
+    request
+        .settings
+        .insert("regrid.neighbours".into(), 6.into());
     let preview: ScanPreview = rig.client.post(path::SCAN_PREVIEW, &request).await;
     assert!(preview.notes[0].contains("hardly"), "{:?}", preview.notes);
 

@@ -19,6 +19,7 @@ mod setting;
 pub(crate) mod status;
 pub(crate) mod token;
 pub(crate) mod watch;
+pub(crate) mod webhooks;
 
 use std::future::Future;
 
@@ -45,6 +46,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Fetch(args) => block_on(fetch::run(args, json)),
         Command::Laser(args) => block_on(laser::run(args, json)),
         Command::Token(args) => block_on(token::run(args, json)),
+        Command::Webhooks(args) => block_on(webhooks::run(args, json)),
         Command::Manual(args) => manual::run(&args, json),
     }
 }

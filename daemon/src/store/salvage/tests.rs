@@ -10,6 +10,7 @@ use crate::store::record::encode;
 
 const SCANS_KEPT: usize = 300;
 const JOBS_KEPT: usize = 90;
+const MESSAGES_KEPT: u64 = 20;
 const TIME: &str = "2026-11-21T11:08:30.123Z";
 
 /// Records that no journal could tell: columns that are gone, jobs that were cancelled or failed,
@@ -46,6 +47,21 @@ fn job(number: usize) -> Job {
     serde_json::from_value(job).unwrap()
 }
 
+fn message(number: u64) -> Message {
+    let message = json!({
+        "delivery": {
+            "id": format!("msg_{number}"),
+            "event": "job-done",
+            "state": "waiting",
+            "created_at": TIME,
+            "attempts": 0,
+            "tried": [],
+        },
+        "body": format!("{number}"),
+    });
+    serde_json::from_value(message).unwrap()
+}
+
 /// Makes the records, and closes them in good order; the file's bytes.
 fn make(path: &Path) -> Vec<u8> {
     let database = open_database(&LocalDisk, path).unwrap();
@@ -60,6 +76,14 @@ fn make(path: &Path) -> Vec<u8> {
         for number in 0..JOBS_KEPT {
             let job = job(number);
             jobs.insert(job.id, &*encode(&job)).unwrap();
+        }
+        let mut waiting = transaction.open_table(WAITING).unwrap();
+        let mut log = transaction.open_table(LOG).unwrap();
+        for number in 0..MESSAGES_KEPT {
+            let message = message(number);
+            waiting.insert(("lab", number), &*encode(&message)).unwrap();
+            log.insert(("lab", number), &*encode(&message.delivery))
+                .unwrap();
         }
     }
     transaction.commit().unwrap();
@@ -108,6 +132,44 @@ fn one_damaged_record_costs_no_other() {
     let expected: Vec<usize> = (0..SCANS_KEPT).filter(|&number| number != 150).collect();
     assert_eq!(kept_scans(&store), expected);
     assert_eq!(store.jobs().unwrap(), all_jobs());
+    let numbers: Vec<u64> = (0..MESSAGES_KEPT).collect();
+    assert_eq!(store.waiting("lab").unwrap(), numbers);
+    for number in numbers {
+        let kept = store.message("lab", number).unwrap();
+        assert_eq!(kept, Some(message(number)));
+    }
+    assert_eq!(
+        store.deliveries("lab").unwrap().len(),
+        2 * MESSAGES_KEPT as usize
+    );
+}
+
+#[test]
+fn a_damaged_message_costs_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("reliefd.redb");
+    let mut bytes = make(&path);
+    for at in places(&bytes, r#""id":"msg_7""#) {
+        bytes[at] = b'x';
+    }
+    fs::write(&path, bytes).unwrap();
+    let store = open(&path).unwrap();
+    let numbers: Vec<u64> = (0..MESSAGES_KEPT).filter(|&number| number != 7).collect();
+    assert_eq!(store.waiting("lab").unwrap(), numbers);
+    assert_eq!(store.jobs().unwrap(), all_jobs());
+    assert_eq!(kept_scans(&store).len(), SCANS_KEPT);
+}
+
+#[test]
+fn damaged_records_of_a_version_without_webhooks_lose_nothing_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("reliefd.redb");
+    let file = Database::create(&path).unwrap();
+    let transaction = file.begin_write().unwrap();
+    transaction.open_table(SCANS).unwrap();
+    transaction.open_table(JOBS).unwrap();
+    transaction.commit().unwrap();
+    assert_eq!(Rows::read(&file).lost, [] as [&str; 0]);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The power fails at every sync, and between them, of a scan and its jobs.
 //!
-//! A service takes a scan and processes it twice, on a disk that notes every step. From the
+//! A service takes a scan and processes it twice, on a disk that notes every step, with a webhook
+//! whose receiver is away. From the
 //! notes what a medium would hold is made anew for each moment: with nothing that was not
 //! synced, with all of it, and with chance parts of it. A fresh service is started on each, and
 //! for some of them the power fails once more while that one takes up what it found.
@@ -17,14 +18,17 @@ use std::sync::Arc;
 use deliverables::Manifest;
 use relief_api::{
     Event, Job, JobState, LaserLog, LaserState, PlanRequest, Rerun, Scan, ScanState, StartScan,
-    path,
+    WebhookEvent, WebhookMessage, path,
 };
-use reliefd::Daemon;
+use reliefd::config::{Retry, WebhookConfig};
+use reliefd::{Config, Daemon};
 use scan_record::{JournalReader, RawColumn};
 
 use crate::client::Client;
 use crate::fake::FakeScanner;
 use crate::rig::{Rig, config, ended, job_over};
+use crate::webhooks::receiver::Receiver;
+use crate::webhooks::webhook;
 use dice::Dice;
 use medium::{Loss, Medium};
 use recorder::{Recorder, Step, Told};
@@ -39,6 +43,29 @@ struct Story {
     scan: String,
     columns: Vec<RawColumn>,
     results: Results,
+}
+
+/// What a webhook was told: the event, and the scan or job.
+type Heard = BTreeSet<(WebhookEvent, String)>;
+
+/// A webhook whose receiver is away, in a folder of its own.
+fn telling_nobody(folder: &Path) -> WebhookConfig {
+    let mut webhook = webhook(folder, "lab", "http://127.0.0.1:9/");
+    // Nobody waits for that here.
+    webhook.retry = Retry::default();
+    webhook
+}
+
+/// Listens until the webhook was told all that is wanted.
+fn listen(receiver: &Receiver, wanted: &Heard, heard: &mut Heard) {
+    while !wanted.is_subset(heard) {
+        let WebhookMessage { event, data, .. } = receiver.next().message();
+        let what = match data.job {
+            Some(job) => job.id.to_string(),
+            None => data.scan.unwrap().id,
+        };
+        heard.insert((event, what));
+    }
 }
 
 /// Files by name of each published result.
@@ -82,7 +109,9 @@ async fn story() -> Story {
     let told = recorder.clone();
     scanner.on_acknowledge(move |column| told.tell(Told::Acknowledged(column)));
     let disk = Arc::new(recorder.clone());
-    let daemon = Daemon::start_on(config(folder.path()), scanner.clone(), disk)
+    let mut config = config(folder.path());
+    config.webhooks = vec![telling_nobody(folder.path())];
+    let daemon = Daemon::start_on(config, scanner.clone(), disk)
         .await
         .unwrap();
     let client = Client::new(daemon.socket());
@@ -148,6 +177,7 @@ async fn story() -> Story {
 async fn retire(folder: &Path, result: &str, recorder: &Recorder) {
     let mut config = config(folder);
     config.storage.results_mb = Some(1);
+    config.webhooks = vec![telling_nobody(folder)];
     let place = config.service.spool_dir.join(result);
     fs::write(place.join("padding"), vec![1; 2_000_000]).unwrap();
     recorder.tell(Told::Retired(result.to_owned()));
@@ -206,18 +236,23 @@ fn place(steps: usize, loss: Loss) -> String {
     format!("{loss:?} of what was not synced lost after {steps} steps")
 }
 
-/// A service on a disk that waits for no medium.
-async fn start(folder: tempfile::TempDir) -> Rig {
-    Rig::start_on(folder, Arc::new(Recorder::default()), |_| {}).await
+/// A service that tells this receiver.
+async fn start(folder: tempfile::TempDir, recorder: Recorder, receiver: &Receiver) -> Rig {
+    let webhook = webhook(folder.path(), "lab", &receiver.url());
+    let change = |config: &mut Config| config.webhooks = vec![webhook];
+    Rig::start_on(folder, Arc::new(recorder), change).await
 }
 
 /// Starts a service on what is left after so many steps, and holds it to every promise.
 async fn revive(story: &Story, steps: usize, loss: Loss) {
     let happened = &story.steps[..steps];
     let folder = survivors(Medium::new(story.folder.path()), happened, loss);
-    let rig = start(folder).await;
+    let receiver = Receiver::new([]);
+    // On a disk that waits for no medium.
+    let rig = start(folder, Recorder::default(), &receiver).await;
     let promised = Promised::by(happened);
-    hold(story, &story.results, &rig, &promised, &place(steps, loss)).await;
+    let (_, wanted) = hold(story, &story.results, &rig, &promised, &place(steps, loss)).await;
+    listen(&receiver, &wanted, &mut Heard::new());
     rig.daemon.shutdown().await;
 }
 
@@ -230,9 +265,12 @@ async fn revive_again(story: &Story, steps: usize, loss: Loss) -> usize {
     let found = folder.path().to_owned();
     let medium = Medium::of(&found);
     let recorder = Recorder::default();
-    let rig = Rig::start_on(folder, Arc::new(recorder.clone()), |_| {}).await;
+    let receiver = Receiver::new([]);
+    let rig = start(folder, recorder.clone(), &receiver).await;
     let promised = Promised::by(happened);
-    let results = hold(story, &story.results, &rig, &promised, &place_of_first).await;
+    let (results, wanted) = hold(story, &story.results, &rig, &promised, &place_of_first).await;
+    let mut heard = Heard::new();
+    listen(&receiver, &wanted, &mut heard);
     for result in results.keys() {
         recorder.tell(Told::Published(result.clone()));
     }
@@ -244,10 +282,13 @@ async fn revive_again(story: &Story, steps: usize, loss: Loss) -> usize {
         for (steps, loss) in [(at, Loss::Some(at as u64)), (at + 1, Loss::All)] {
             let again = &recovery[..steps];
             let folder = survivors(medium.clone(), again, loss);
-            let rig = start(folder).await;
+            let receiver = Receiver::new([]);
+            let rig = start(folder, Recorder::default(), &receiver).await;
             let promised = Promised::by(happened.iter().chain(again));
             let place = format!("{place_of_first}, then {}", place(steps, loss));
-            hold(story, &results, &rig, &promised, &place).await;
+            let (_, wanted) = hold(story, &results, &rig, &promised, &place).await;
+            // What was heard before the power failed need not be told again.
+            listen(&receiver, &wanted, &mut heard.clone());
             rig.daemon.shutdown().await;
             media += 1;
         }
@@ -261,14 +302,14 @@ fn syncs(steps: &[Step]) -> Vec<usize> {
 }
 
 /// Holds a service to what was promised before the power failed, results as they were `seen`;
-/// gives those that it has once all is done.
+/// gives those that it has once all is done, and what the webhook is to be told in all.
 async fn hold(
     story: &Story,
     seen: &Results,
     rig: &Rig,
     promised: &Promised,
     place: &str,
-) -> Results {
+) -> (Results, Heard) {
     // Jobs are numbered from 1; whoever comes after hears only of what is done again.
     let mut events = rig.client.events().await;
     let scans: relief_api::ScanList = rig.client.get(path::SCANS).await;
@@ -323,8 +364,13 @@ async fn hold(
         assert!(jobs.jobs.iter().any(|j| j.id == job), "{place}: {jobs:?}");
     }
 
+    let mut wanted = Heard::new();
+    for scan in &scans.scans {
+        wanted.insert((WebhookEvent::ScanEnded, scan.id.clone()));
+    }
     let mut results = Results::new();
     for job in &jobs.jobs {
+        wanted.insert((WebhookEvent::JobDone, job.id.to_string()));
         let is_promised = promised.published.contains(&job.result);
         if is_promised {
             assert_eq!(job.state, JobState::Done, "{place}: published twice");
@@ -351,7 +397,7 @@ async fn hold(
         .collect();
     spooled.sort();
     assert!(spooled.iter().eq(results.keys()), "{place}: {spooled:?}");
-    results
+    (results, wanted)
 }
 
 /// Every file that the manifest names is there, as long and with the bytes that it names.
