@@ -47,7 +47,7 @@ pub enum ScannerError {
         why: String,
     },
     /// A driver or another program has the scanner's interface.
-    #[error("the USB scanner {device} is in use by {}", .holder.as_deref().unwrap_or("another program"))]
+    #[error("the USB scanner {device} is in use by {}", .holder.as_deref().unwrap_or(SOME_PROGRAM))]
     UsbBusy {
         /// The device.
         device: String,
@@ -70,7 +70,7 @@ pub enum ScannerError {
         group: String,
     },
     /// Another program has the port.
-    #[error("the port {port} is in use by {}", .holder.as_deref().unwrap_or("another program"))]
+    #[error("the port {port} is in use by {}", .holder.as_deref().unwrap_or(SOME_PROGRAM))]
     PortBusy {
         /// The port's path.
         port: String,
@@ -278,6 +278,9 @@ impl ScannerError {
         )
     }
 }
+
+/// A program that this one may not see, as systemd's sandbox has it.
+const SOME_PROGRAM: &str = "another program, which `sudo relief doctor` can name";
 
 /// How [`ScannerError::ProgramEnded`] reads.
 const PROGRAM_ENDED: &str = "the service ended in mid-scan and has been started again";

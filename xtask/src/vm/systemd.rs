@@ -1,6 +1,5 @@
 //! The Debian package where systemd is PID 1.
 
-use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Result;
@@ -89,11 +88,12 @@ pub(super) fn run(options: &Options) -> Result<()> {
     );
     archive.file("inject/packages/relief.deb", &package)?;
     archive.file("inject/packages/later.deb", &later)?;
-    let drop_in = Path::new("systemd/loopback.conf");
-    archive.file(
-        "inject/packages/loopback.conf",
-        &shell::root().join(drop_in),
-    )?;
+    for drop_in in ["loopback.conf", "network.conf"] {
+        archive.file(
+            &format!("inject/packages/{drop_in}"),
+            &shell::root().join("systemd").join(drop_in),
+        )?;
+    }
     let initramfs = home.join("systemd.cpio");
     archive.write(&initramfs)?;
     let said = Machine {

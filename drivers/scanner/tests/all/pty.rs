@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{ControlModes, OptionalActions};
 use scanner_driver::transport::serial::{SerialConnector, SerialSettings, list_ports, port_holder};
 use scanner_driver::transport::{Connector, Transport};
 use scanner_driver::{Scanner, ScannerError, SerialScanner};
@@ -221,4 +222,25 @@ fn ports_can_be_listed() {
     let ports = list_ports().unwrap();
     assert!(ports.iter().all(|port| port.path.starts_with('/')));
     assert!(ports.windows(2).all(|pair| pair[0].path < pair[1].path));
+}
+
+/// Boards that restart when their DTR drops would forget where their table is.
+#[test]
+fn closing_the_port_does_not_drop_the_modem_lines() {
+    let _turn = turn();
+    let (master, path) = pty();
+    let hangs_up = |master: &Master| {
+        let modes = rustix::termios::tcgetattr(&master.0).unwrap();
+        modes.control_modes.contains(ControlModes::HUPCL)
+    };
+    // As the kernel has it for a port of hardware.
+    let mut modes = rustix::termios::tcgetattr(&master.0).unwrap();
+    modes.control_modes.insert(ControlModes::HUPCL);
+    rustix::termios::tcsetattr(&master.0, OptionalActions::Now, &modes).unwrap();
+    assert!(hangs_up(&master));
+    let settings = SerialSettings::new(&path);
+    let open = SerialConnector::new(&settings).connect().unwrap();
+    assert!(!hangs_up(&master));
+    drop(open);
+    assert!(!hangs_up(&master));
 }

@@ -3,6 +3,7 @@
 mod life;
 mod package;
 mod service;
+mod webhooks;
 
 use anyhow::Result;
 
@@ -30,7 +31,7 @@ const fn long(name: &'static str, run: fn(&mut Bench) -> Result<()>) -> Check {
     }
 }
 
-pub(crate) fn all() -> [Check; 18] {
+pub(crate) fn all() -> [Check; 19] {
     [
         check("package: installed, enabled, started", package::install),
         check("service: in its sandbox", service::sandbox),
@@ -61,6 +62,10 @@ pub(crate) fn all() -> [Check; 18] {
         long(
             "socket: a loopback address, and no network",
             service::loopback,
+        ),
+        long(
+            "webhooks: a closed network is told of, network.conf opens it",
+            webhooks::drop_in,
         ),
         long(
             "configuration: read again; unsound, not tried again",

@@ -168,7 +168,7 @@ pub(super) fn devices(_: &mut Bench) -> Result<()> {
 }
 
 /// With the units as they are now.
-fn anew() -> Result<()> {
+pub(super) fn anew() -> Result<()> {
     systemctl(&["daemon-reload"])?;
     systemctl(&["stop", SOCKET, SERVICE])?;
     systemctl(&["start", SERVICE])?;
