@@ -259,16 +259,9 @@ impl Session {
                     "it no longer knows the running scan".to_owned(),
                 )));
             }
-        } else if fresh
-            && self.scan.is_none()
-            && self.requests.is_idle()
-            && status.scan_id != 0
-            && matches!(
-                status.activity,
-                Activity::Scanning | Activity::Waiting | Activity::Moving
-            )
-        {
-            // A request that came late, or twice: nobody wants this scan.
+        } else if fresh && self.scan.is_none() && self.requests.is_idle() && status.scan_id != 0 {
+            // A request that came late, or twice: nobody wants this scan, nor to be told of its
+            // end again and again.
             tracing::warn!(scan = status.scan_id, "closing a scan nobody asked for");
             let unwanted = CloseScan {
                 scan_id: status.scan_id,

@@ -190,6 +190,21 @@ impl Rig {
         }
     }
 
+    /// The same, but what the device says is kept on the line until the computer wakes.
+    fn sleep_while_the_line_keeps(&mut self, time: Duration) {
+        let until = self.now + time;
+        let mut kept = Vec::new();
+        while self.now < until {
+            self.now += STEP;
+            for frame in self.device.poll(self.now) {
+                kept.extend_from_slice(frame.as_bytes());
+            }
+        }
+        if let Some(session) = &mut self.session {
+            session.receive(&kept, self.now);
+        }
+    }
+
     fn until_a_person_is_asked(&mut self) -> ScannerError {
         self.run_until("question", Self::asks);
         self.last_told().cause.clone()
@@ -283,6 +298,19 @@ fn a_computer_that_was_suspended_for_long_asks_a_person_first() {
     rig.plugged = true;
     rig.run_until("homing", |rig| rig.device.homings == 1);
     rig.stays_dark();
+}
+
+#[test]
+fn columns_that_a_sleeping_computer_finds_in_its_buffers_are_no_news() {
+    let mut rig = Rig::new();
+    rig.run_until("columns", |rig| rig.columns > 20);
+    let before = rig.columns;
+    rig.sleep_while_the_line_keeps(60 * MINUTE);
+    rig.step();
+    assert!(rig.columns > before, "the line kept none");
+    rig.stays_dark();
+    rig.resume();
+    rig.run_to_its_end();
 }
 
 #[test]
