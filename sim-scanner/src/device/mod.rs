@@ -334,8 +334,9 @@ impl Device {
     fn status(&self, now: Duration) -> Status {
         Status {
             boot_id: self.boot_id(),
-            uptime_ms: (now.saturating_sub(self.booted) + self.mischief.clock_off()).as_millis()
-                as u32,
+            // The counter of a device, which begins anew after 49 days.
+            uptime_ms: (now.saturating_sub(self.booted).as_millis() as u32)
+                .wrapping_add(self.mischief.clock_off_ms()),
             activity: self.activity(now),
             homed: self.homed,
             laser_on: self.laser_on,
