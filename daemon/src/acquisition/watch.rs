@@ -28,28 +28,21 @@ pub(crate) fn watch(service: &Arc<Service>, station: &Station) {
 }
 
 fn look(station: &Station) {
-    let known = station.status().model.is_some();
-    let result = if known {
-        station.scanner.status().map(|status| {
-            if status.faults.is_empty() {
-                Ok(())
-            } else {
-                Err(ScannerError::Fault(status.faults).to_string())
-            }
-        })
-    } else {
-        station.identify().map(|identity| {
-            station.note_identity(&identity);
-            Ok(())
-        })
-    };
+    // Each time, since cables are swapped; the driver knows it from when it connected.
+    let result = station.identify().and_then(|identity| {
+        station.note_identity(&identity);
+        station.scanner.status()
+    });
     // A scan may have begun while this waited for its answer; then the scan knows better.
     if station.is_scanning() {
         return;
     }
     match result {
-        Ok(Ok(())) => station.note(ScannerLink::Ready, None),
-        Ok(Err(fault)) => station.note(ScannerLink::Trouble, Some(fault)),
+        Ok(status) if status.faults.is_empty() => station.note(ScannerLink::Ready, None),
+        Ok(status) => {
+            let fault = ScannerError::Fault(status.faults).to_string();
+            station.note(ScannerLink::Trouble, Some(fault));
+        }
         Err(error) => station.note(ScannerLink::Trouble, Some(error.to_string())),
     }
 }
