@@ -184,6 +184,7 @@ mod tests {
         Event::Progress {
             job: number,
             scan: "x".repeat(bytes),
+            scanner: String::new(),
             stage: String::new(),
             fraction: 0.0,
             seconds: None,

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use scanner_driver::LinkSettings;
 use scanner_driver::session::{Answer, Command, Event, Session, Ticket};
-use scanner_protocol::{Decoder, DeviceMessage, Frame, HostMessage, Packet};
+use scanner_protocol::{Decoder, DeviceMessage, Faults, Frame, HostMessage, Packet};
 use sim_scanner::config::SimConfig;
 use sim_scanner::device::DeviceSettings;
 use sim_scanner::endpoint::memory::MemoryLink;
@@ -205,7 +205,7 @@ pub fn session(data: &[u8]) {
             }
             10 => line.command(match next() % 4 {
                 0 => Command::Abort,
-                1 => Command::ClearFaults,
+                1 => Command::ClearFaults(Faults(u32::MAX)),
                 2 => Command::Laser(true),
                 _ => Command::Laser(false),
             }),

@@ -30,7 +30,7 @@
 //! | `laser` | the laser does not light |
 //! | `interlock` | the safety interlock opens, and closes again |
 //! | `move-part` | somebody moves the object by `move-mm` (1 if left out) |
-//! | `clock-jump` | the device's clock jumps |
+//! | `clock-jump` | the device's clock jumps forward, back, or to just before its end |
 //! | `unplug` | the cable is pulled, and put back |
 //! | `wrong-serial` | the same, and first another device is plugged in |
 //! | `babble` | rate per start of the firmware: random bytes come before the banner |
@@ -38,10 +38,14 @@
 //!
 //! Example: `flip=1e-5,reset=0.001,seed=7`.
 
+mod strikes;
+
 use core::str::FromStr;
 use core::time::Duration;
 
 use thiserror::Error;
+
+pub use strikes::Strikes;
 
 use crate::device::Mishaps;
 use crate::line::LineFaults;

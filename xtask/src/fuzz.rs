@@ -1,7 +1,7 @@
 //! Fuzzers for everything that comes from outside.
 
 use std::collections::VecDeque;
-use std::fs::File;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
@@ -41,6 +41,8 @@ const WATCHED: [&str; 8] = [
     "-Cllvm-args=-simplifycfg-branch-fold-threshold=0",
     "--cfg=fuzzing",
 ];
+/// Most bytes that are kept of a target's corpus: a repository grows by them at each change.
+const KEPT_BYTES: u64 = 100_000;
 /// What libFuzzer says at the end of a run, and what it is.
 const STATISTICS: [(&str, &str); 4] = [
     ("stat::number_of_executed_units:", "inputs"),
@@ -58,6 +60,9 @@ pub(crate) struct Options {
     /// Targets at work at the same time
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) jobs: usize,
+    /// Afterwards leave a small choice of what has been found in fuzz/kept, for the repository
+    #[arg(long)]
+    pub(crate) keep: bool,
     /// Targets; all unless named
     #[arg(value_name = "TARGET", value_parser = TARGETS)]
     pub(crate) targets: Vec<String>,
@@ -81,7 +86,11 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         for _ in 0..options.jobs {
             scope.spawn(|| {
                 while let Some(target) = take(&queue) {
-                    if let Err(error) = fuzz(&programs, target, options.seconds) {
+                    let mut done = fuzz(&programs, target, options.seconds);
+                    if options.keep {
+                        done = done.and_then(|()| keep(&programs, target));
+                    }
+                    if let Err(error) = done {
                         eprintln!("{target}: {error:#}");
                         if let Ok(mut failed) = failed.lock() {
                             failed.push(target);
@@ -132,12 +141,11 @@ fn build() -> Result<PathBuf> {
 fn fuzz(programs: &Path, target: &str, seconds: u32) -> Result<()> {
     let root = shell::root();
     let place = |kind: &str| root.join("fuzz").join(kind).join(target);
-    let folders = ["corpus", "seeds", "finds", "artifacts"].map(place);
+    let folders = ["corpus", "seeds", "kept", "finds", "artifacts"].map(place);
     for folder in &folders {
-        std::fs::create_dir_all(folder)
-            .with_context(|| format!("cannot make {}", folder.display()))?;
+        fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
     }
-    let [corpus, seeds, finds, artifacts] = folders;
+    let [corpus, seeds, kept, finds, artifacts] = folders;
     let log = artifacts.with_extension("log");
     let words = File::create(&log).with_context(|| format!("cannot write {}", log.display()))?;
     eprintln!(
@@ -145,7 +153,7 @@ fn fuzz(programs: &Path, target: &str, seconds: u32) -> Result<()> {
         log.display()
     );
     let status = Command::new(programs.join(target))
-        .args([corpus, seeds, finds])
+        .args([corpus, seeds, kept, finds])
         .arg(format!("-artifact_prefix={}/", artifacts.display()))
         .arg(format!("-max_total_time={seconds}"))
         .arg(format!("-max_len={LONGEST_BYTES}"))
@@ -157,12 +165,89 @@ fn fuzz(programs: &Path, target: &str, seconds: u32) -> Result<()> {
         .stderr(words)
         .status()
         .with_context(|| format!("cannot start the fuzzer of {target}"))?;
-    let said = String::from_utf8_lossy(&std::fs::read(&log)?).into_owned();
+    let said = String::from_utf8_lossy(&fs::read(&log)?).into_owned();
     if !status.success() {
         bail!("{status}\n{}", last_lines(&said, 40));
     }
     println!("{target}: {}", told(&said)?);
     Ok(())
+}
+
+/// Leaves the fewest inputs that reach all that the corpus reaches, the shortest first, as far as
+/// there is room for them.
+fn keep(programs: &Path, target: &str) -> Result<()> {
+    let place = |kind: &str| shell::root().join("fuzz").join(kind).join(target);
+    let chosen = shell::target().join("fuzz-chosen").join(target);
+    if chosen.exists() {
+        fs::remove_dir_all(&chosen)?;
+    }
+    fs::create_dir_all(&chosen)?;
+    let output = Command::new(programs.join(target))
+        .arg("-set_cover_merge=1")
+        .arg(format!("-max_len={LONGEST_BYTES}"))
+        .arg(format!("-rss_limit_mb={MEMORY_MB}"))
+        .arg(format!("-timeout={LONGEST_S}"))
+        .arg(&chosen)
+        .args(["seeds", "finds", "kept", "corpus"].map(place))
+        .current_dir(&chosen)
+        .output()
+        .with_context(|| format!("cannot start the fuzzer of {target}"))?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr);
+        bail!("{}\n{}", output.status, last_lines(&said, 40));
+    }
+    let known: Vec<Vec<u8>> = ["seeds", "finds"]
+        .into_iter()
+        .map(|kind| contents(&place(kind)))
+        .collect::<Result<Vec<_>>>()?
+        .concat()
+        .into_iter()
+        .map(|(_, bytes)| bytes)
+        .collect();
+    let mut inputs = contents(&chosen)?;
+    inputs.retain(|(_, bytes)| !known.contains(bytes));
+    let all = inputs.len();
+    let inputs = that_fit(inputs, KEPT_BYTES);
+    let kept = place("kept");
+    fs::remove_dir_all(&kept)?;
+    fs::create_dir_all(&kept)?;
+    let mut bytes = 0;
+    for (name, input) in &inputs {
+        fs::write(kept.join(name), input)?;
+        bytes += input.len();
+    }
+    println!(
+        "{target}: {} of {all} inputs kept, {bytes} bytes",
+        inputs.len()
+    );
+    Ok(())
+}
+
+/// Name and content of each file in a folder.
+fn contents(folder: &Path) -> Result<Vec<(String, Vec<u8>)>> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).with_context(|| folder.display().to_string())? {
+        let entry = entry?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        files.push((name, fs::read(entry.path())?));
+    }
+    Ok(files)
+}
+
+/// The shortest inputs that together have at most so many bytes.
+fn that_fit(mut inputs: Vec<(String, Vec<u8>)>, most_bytes: u64) -> Vec<(String, Vec<u8>)> {
+    inputs.sort_by(|(a, x), (b, y)| (x.len(), a).cmp(&(y.len(), b)));
+    let mut left = most_bytes;
+    inputs
+        .into_iter()
+        .take_while(|(_, input)| match left.checked_sub(input.len() as u64) {
+            Some(rest) => {
+                left = rest;
+                true
+            }
+            None => false,
+        })
+        .collect()
 }
 
 /// A line of figures from what a fuzzer said.
@@ -191,6 +276,24 @@ fn last_lines(text: &str, count: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_shortest_inputs_that_fit_are_kept() {
+        let input = |name: &str, bytes: usize| (name.to_owned(), vec![0; bytes]);
+        let inputs = vec![
+            input("long", 60),
+            input("b", 20),
+            input("a", 20),
+            input("mid", 50),
+        ];
+        let names = |most| -> Vec<String> {
+            let kept = that_fit(inputs.clone(), most);
+            kept.into_iter().map(|(name, _)| name).collect()
+        };
+        assert_eq!(names(100), ["a", "b", "mid"]);
+        assert_eq!(names(89), ["a", "b"]);
+        assert!(names(19).is_empty());
+    }
 
     #[test]
     fn figures_are_found_in_what_a_fuzzer_says() {

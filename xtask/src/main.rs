@@ -111,6 +111,7 @@ fn full() -> anyhow::Result<()> {
     fuzz::run(&fuzz::Options {
         seconds: 600,
         jobs: 2,
+        keep: false,
         targets: Vec::new(),
     })?;
     vm::run(&vm::Vm::Systemd(vm::SystemdOptions::default()))?;

@@ -44,6 +44,9 @@ pub enum Event {
         job: JobId,
         /// The scan it processes.
         scan: String,
+        /// Name of the scanner; empty from services that did not tell it.
+        #[serde(default, skip_serializing_if = "String::is_empty")]
+        scanner: String,
         /// What it is at.
         stage: String,
         /// Share of the stage that is done, 0 to 1.
@@ -58,6 +61,9 @@ pub enum Event {
         job: JobId,
         /// The scan it processed.
         scan: String,
+        /// Name of the scanner; empty from services that did not tell it.
+        #[serde(default, skip_serializing_if = "String::is_empty")]
+        scanner: String,
         /// Name of the folder.
         result: String,
         /// The folder on the service's machine.
@@ -151,6 +157,7 @@ mod tests {
         let event = Event::Progress {
             job: 3,
             scan: "s".into(),
+            scanner: "left".into(),
             stage: "segment".into(),
             fraction: 0.5,
             seconds: None,
@@ -158,9 +165,17 @@ mod tests {
         let text = serde_json::to_string(&event).unwrap();
         assert_eq!(
             text,
-            r#"{"kind":"progress","job":3,"scan":"s","stage":"segment","fraction":0.5}"#
+            r#"{"kind":"progress","job":3,"scan":"s","scanner":"left","stage":"segment","fraction":0.5}"#
         );
         assert_eq!(serde_json::from_str::<Event>(&text).unwrap(), event);
         assert!(text.contains(&format!(r#""kind":"{}""#, event.kind())));
+    }
+
+    #[test]
+    fn events_of_services_that_did_not_tell_the_scanner_are_read() {
+        let text = r#"{"kind":"progress","job":3,"scan":"s","stage":"segment","fraction":0.5}"#;
+        let event: Event = serde_json::from_str(text).unwrap();
+        assert!(matches!(&event, Event::Progress { scanner, .. } if scanner.is_empty()));
+        assert_eq!(serde_json::to_string(&event).unwrap(), text);
     }
 }

@@ -50,6 +50,9 @@ pub struct Job {
     pub id: JobId,
     /// The scan it processes.
     pub scan: String,
+    /// Name of the scanner that took it; empty in jobs kept by services that did not note it.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub scanner: String,
     /// The folder in the spool it publishes; the scan's id, or an own one for a rerun.
     pub result: String,
     /// Names the deliverables.

@@ -93,6 +93,14 @@ pub(crate) fn scanner(name: &str) -> String {
     }
 }
 
+/// " on" a scanner, behind what it did; nothing where nobody has given the only one a name.
+pub(crate) fn on_scanner(name: &str) -> String {
+    match name {
+        "" | THE_SCANNER => String::new(),
+        name => format!(" on {name}"),
+    }
+}
+
 /// "1 job", "3 jobs".
 pub(crate) fn counted(number: usize, noun: &str) -> String {
     let ending = if number == 1 { "" } else { "s" };

@@ -28,28 +28,21 @@ pub(crate) fn watch(service: &Arc<Service>, station: &Station) {
 }
 
 fn look(service: &Service, station: &Station) {
-    let known = station.status().model.is_some();
-    let result = if known {
-        station.scanner.status().map(|status| {
-            if status.faults.is_empty() {
-                Ok(())
-            } else {
-                Err(ScannerError::Fault(status.faults).to_string())
-            }
-        })
-    } else {
-        station.identify().map(|identity| {
-            station.note_identity(&identity);
-            Ok(())
-        })
-    };
+    // Each time, since cables are swapped; the driver knows it from when it connected.
+    let result = station.identify().and_then(|identity| {
+        station.note_identity(&identity);
+        station.scanner.status()
+    });
     // A scan may have begun while this waited for its answer; then the scan knows better.
     if station.is_scanning() {
         return;
     }
     let (link, problem) = match result {
-        Ok(Ok(())) => (ScannerLink::Ready, None),
-        Ok(Err(fault)) => (ScannerLink::Trouble, Some(fault)),
+        Ok(status) if status.faults.is_empty() => (ScannerLink::Ready, None),
+        Ok(status) => {
+            let fault = ScannerError::Fault(status.faults).to_string();
+            (ScannerLink::Trouble, Some(fault))
+        }
         Err(error) => (ScannerLink::Trouble, Some(error.to_string())),
     };
     service.note_scanner(station, link, problem);

@@ -189,6 +189,7 @@ fn new_job(scan: &Scan, result: String, name: String) -> Job {
     Job {
         id: 0,
         scan: scan.id.clone(),
+        scanner: scan.scanner.clone(),
         result,
         name,
         state: JobState::Queued,

@@ -81,6 +81,7 @@ impl<'a> Progress<'a> {
         self.hub.tell(Event::Progress {
             job: self.job.id,
             scan: self.job.scan.clone(),
+            scanner: self.job.scanner.clone(),
             stage: stage.to_owned(),
             fraction,
             seconds,

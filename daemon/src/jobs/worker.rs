@@ -154,6 +154,7 @@ fn published_event(service: &Service, job: &Job) -> Event {
     Event::Published {
         job: job.id,
         scan: job.scan.clone(),
+        scanner: job.scanner.clone(),
         result: job.result.clone(),
         directory: job.directory.clone().unwrap_or_default(),
         files: entry.map_or_else(Vec::new, |entry| {

@@ -7,6 +7,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use relief_api::LaserEntry;
+use serde::{Deserialize, Serialize};
 use storage::{Disk, DiskFile};
 
 use super::MOST_SHOWN;
@@ -17,6 +18,31 @@ const TAIL_BYTES: u64 = 512 * 1024;
 const FILE_MODE: u32 = 0o640;
 /// Lines that a disk refuses are kept up to this size: those of some hundred scans.
 const MOST_REFUSED_BYTES: usize = 64 * 1024;
+
+/// Version of the lines. Those of version 1 do not say so, and may lack the scanner's name. A
+/// change that an older reader would misread makes a new one.
+const VERSION: u32 = 2;
+
+/// A line as it is written.
+#[derive(Serialize)]
+struct Written<'a> {
+    version: u32,
+    #[serde(flatten)]
+    entry: &'a LaserEntry,
+}
+
+/// A line as it is read.
+#[derive(Deserialize)]
+struct Kept {
+    #[serde(default = "unsaid")]
+    version: u32,
+    #[serde(flatten)]
+    entry: LaserEntry,
+}
+
+fn unsaid() -> u32 {
+    1
+}
 
 /// The log's file.
 #[derive(Debug)]
@@ -53,7 +79,8 @@ impl Log {
     /// Appends an entry, which is on disk when this returns. One that the disk refuses is
     /// appended with the next.
     pub(super) fn append(&mut self, entry: &LaserEntry) -> io::Result<()> {
-        let mut line = serde_json::to_vec(entry)?;
+        let version = VERSION;
+        let mut line = serde_json::to_vec(&Written { version, entry })?;
         line.push(b'\n');
         let appended = self.append_behind_refused(&line);
         if appended.is_err() && self.refused.len() + line.len() <= MOST_REFUSED_BYTES {
@@ -81,7 +108,8 @@ impl Log {
 }
 
 /// The last entries of the log, and the bytes up to the end of its last whole line. A line that
-/// was cut short is passed over; one that was written again, since the disk had not said that
+/// was cut short is passed over, as is one of a later version, whose meaning is not known; one
+/// that was written again, since the disk had not said that
 /// it was safe, counts once.
 fn read_tail(path: &Path) -> io::Result<(VecDeque<LaserEntry>, u64)> {
     let mut file = File::open(path)?;
@@ -90,10 +118,19 @@ fn read_tail(path: &Path) -> io::Result<(VecDeque<LaserEntry>, u64)> {
     let mut tail = Vec::new();
     file.take(TAIL_BYTES).read_to_end(&mut tail)?;
     let cut_short = tail.iter().rev().take_while(|&&byte| byte != b'\n').count();
-    let mut entries: Vec<LaserEntry> = tail
+    let (known, later): (Vec<Kept>, Vec<Kept>) = tail
         .split(|&byte| byte == b'\n')
         .filter_map(|line| serde_json::from_slice(line).ok())
-        .collect();
+        .partition(|kept: &Kept| kept.version <= VERSION);
+    if let Some(kept) = later.last() {
+        tracing::warn!(
+            log = %path.display(),
+            lines = later.len(),
+            version = kept.version,
+            "lines of the laser's log are of a later version of Relief, and are not shown"
+        );
+    }
+    let mut entries: Vec<LaserEntry> = known.into_iter().map(|kept| kept.entry).collect();
     entries.dedup();
     entries.drain(..entries.len().saturating_sub(MOST_SHOWN));
     Ok((entries.into(), bytes - cut_short as u64))
@@ -143,6 +180,48 @@ mod tests {
             cause: "c".into(),
             scan: None,
         }
+    }
+
+    fn golden(state: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("tests/golden")
+            .join(state)
+            .join("laser.jsonl")
+    }
+
+    #[test]
+    fn lines_of_each_version_open_and_are_written_as_the_newest() {
+        let folder = tempfile::tempdir().unwrap();
+        let (old, new) = (folder.path().join("old"), folder.path().join("new"));
+        fs::copy(golden("state-1"), &old).unwrap();
+        let (mut log, entries) = Log::open(&LocalDisk, &old).unwrap();
+        assert_eq!(entries.len(), 5);
+        let (mut copy, none) = Log::open(&LocalDisk, &new).unwrap();
+        assert!(none.is_empty());
+        for entry in &entries {
+            copy.append(entry).unwrap();
+        }
+        let newest = fs::read(golden("state-2")).unwrap();
+        assert_eq!(fs::read(&new).unwrap(), newest);
+        assert_eq!(Log::open(&LocalDisk, &new).unwrap().1, entries);
+        // Lines of both in one file.
+        log.append(&entry(1)).unwrap();
+        let grown = Log::open(&LocalDisk, &old).unwrap().1;
+        assert_eq!(grown.len(), 6);
+        assert_eq!(grown[5], entry(1));
+    }
+
+    #[test]
+    fn a_line_of_a_later_version_is_passed_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("laser.jsonl");
+        let later = r#"{"version":3,"at":"1","laser":"on","cause":"c"}"#;
+        fs::write(&path, format!("{later}\n")).unwrap();
+        let (mut log, entries) = Log::open(&LocalDisk, &path).unwrap();
+        assert!(entries.is_empty(), "{entries:?}");
+        log.append(&entry(2)).unwrap();
+        assert!(fs::read_to_string(&path).unwrap().starts_with(later));
+        assert_eq!(Log::open(&LocalDisk, &path).unwrap().1, [entry(2)]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
-use relief_api::{Event, ScanState};
+use relief_api::{Event, PlanRequest, Scan, ScanState, StartScan, path};
 
 use crate::fake::{COLUMNS, SAMPLES};
-use crate::rig::Rig;
+use crate::rig::{Rig, ended};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_stream_tells_the_whole_story_in_order() {
@@ -88,6 +88,11 @@ async fn the_stream_tells_the_whole_story_in_order() {
     while events.next().await.is_some() {}
 }
 
+/// Scans whose words are more than the service keeps for readers that are behind (8 MiB) and all
+/// buffers of a socket together: each is told of three times at least, with its note.
+const WORDY_SCANS: usize = 16;
+const NOTE_BYTES: usize = 250_000;
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_reader_that_does_not_read_holds_up_nobody() {
     let rig = Rig::new().await;
@@ -95,8 +100,36 @@ async fn a_reader_that_does_not_read_holds_up_nobody() {
     for _ in 0..4 {
         idle.push(rig.client.events().await);
     }
-    for name in ["a", "b"] {
-        rig.scan_to_result(name).await;
+    let mut reading = rig.client.events().await;
+    for number in 0..WORDY_SCANS {
+        let request = StartScan {
+            name: format!("wordy-{number}"),
+            note: "n".repeat(NOTE_BYTES),
+            plan: PlanRequest {
+                columns: Some(2),
+                ..PlanRequest::default()
+            },
+            ..StartScan::default()
+        };
+        let scan: Scan = rig.client.post(path::SCANS, &request).await;
+        let scan = ended(&mut reading, &scan.id).await;
+        assert_eq!(scan.state, ScanState::Complete, "{:?}", scan.reason);
+    }
+    let (last, _) = rig.scan_to_result("last").await;
+    for events in &mut idle {
+        let lost = |event: &Event| match event {
+            Event::Lagged { missed } => Some(*missed),
+            Event::Published { scan, .. } if *scan == last.id => Some(0),
+            _ => None,
+        };
+        // It is told that it has lost something, and then hears the rest.
+        let (before, missed) = events.until(lost).await;
+        assert!(missed > 0, "it heard all of {} events", before.len());
+        let published = |event: &Event| match event {
+            Event::Published { scan, .. } if *scan == last.id => Some(()),
+            _ => None,
+        };
+        events.until(published).await;
     }
     rig.daemon.shutdown().await;
 }

@@ -35,6 +35,8 @@ struct State {
     /// A fault after this many columns of a scan.
     fault_after: Option<u32>,
     laser_on: bool,
+    /// The serial number of another scanner that has been plugged in.
+    other: Option<&'static str>,
     /// Nothing that is asked for comes back.
     hung: bool,
     /// A pause after this many columns of a scan, until somebody lets it go on.
@@ -108,6 +110,11 @@ impl FakeScanner {
     pub(crate) fn hang(self: &Arc<Self>) -> Hung {
         self.change(|state| state.hung = true);
         Hung(Arc::clone(self))
+    }
+
+    /// Another scanner is plugged in.
+    pub(crate) fn swap(&self, serial: &'static str) {
+        self.change(|state| state.other = Some(serial));
     }
 
     /// By hand, as for adjustment.
@@ -247,7 +254,7 @@ impl Scanner for FakeScanner {
         self.check()?;
         Ok(Identity {
             model: text("Fake"),
-            serial: text("F-1"),
+            serial: text(self.state.lock().unwrap().other.unwrap_or("F-1")),
             firmware: text("0.1"),
             calibration: Calibration {
                 table_count_pm: COUNT_UM * 1_000_000,

@@ -139,13 +139,19 @@ async fn messages_of_version_1_are_delivered_and_their_log_shown() {
 const TOKEN: &str = "relief_8ef486a7e56fa6a8bf16a534bdfa4cfdadbba743b6e3a652315301f3237ff12a";
 
 #[tokio::test(flavor = "multi_thread")]
-async fn tokens_and_laser_log_of_version_1_hold() {
-    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/state-1");
+async fn tokens_and_laser_logs_of_all_versions_hold() {
+    for state in ["state-1", "state-2"] {
+        tokens_and_laser_log_hold(state).await;
+    }
+}
+
+async fn tokens_and_laser_log_hold(laser: &str) {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden");
     let folder = tempfile::tempdir().unwrap();
     let state = folder.path().join("state");
     fs::create_dir_all(&state).unwrap();
-    for name in ["tokens.json", "laser.jsonl"] {
-        fs::copy(golden.join(name), state.join(name)).unwrap();
+    for (of, name) in [("state-1", "tokens.json"), (laser, "laser.jsonl")] {
+        fs::copy(golden.join(of).join(name), state.join(name)).unwrap();
     }
     let rig = Rig::start(folder, |config| {
         config.service.listen = Some("127.0.0.1:0".parse().unwrap());

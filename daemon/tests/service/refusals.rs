@@ -1,4 +1,4 @@
-use relief_api::{Problem, Scan, ScannerLink, StartScan, Status, path};
+use relief_api::{Event, Problem, Scan, ScannerLink, StartScan, Status, path};
 use reliefd::Daemon;
 use scanner_driver::ScannerError;
 use serde_json::json;
@@ -305,6 +305,58 @@ async fn another_scanner_on_the_port_is_not_used() {
     assert_eq!(status.scanner.problem, Some(problem.detail));
     let rig = rig.restart_with(serial("F-1")).await;
     rig.scan_to_result("a").await;
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_scanner_swapped_while_nothing_is_scanned_is_told_of_at_once() {
+    let rig = Rig::start(tempfile::tempdir().unwrap(), |config| {
+        config.scanner.serial_number = Some("F-1".into());
+    })
+    .await;
+    let mut events = rig.client.events().await;
+    let status: Status = rig.client.get(path::STATUS).await;
+    let is_ready = |event: &Event| match event {
+        Event::Scanner(scanner) if scanner.link == ScannerLink::Ready => Some(()),
+        _ => None,
+    };
+    if status.scanner.link != ScannerLink::Ready {
+        events.until(is_ready).await;
+    }
+    rig.scanner.swap("F-9");
+    let trouble = |event: &Event| match event {
+        Event::Scanner(scanner) => scanner.problem.clone(),
+        _ => None,
+    };
+    let (_, problem) = events.until(trouble).await;
+    assert_eq!(
+        problem,
+        "the scanner on /dev/ttyUSB0 has the serial number F-9, and not F-1"
+    );
+    let status: Status = rig.client.get(path::STATUS).await;
+    assert_eq!(status.scanner.problem, Some(problem));
+    assert_eq!(status.scanner.link, ScannerLink::Trouble);
+    rig.scanner.swap("F-1");
+    events.until(is_ready).await;
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn another_scanner_is_shown_where_any_will_do() {
+    let rig = Rig::new().await;
+    let mut events = rig.client.events().await;
+    let shows = |serial: &'static str| {
+        move |event: &Event| match event {
+            Event::Scanner(scanner) => (scanner.serial.as_deref() == Some(serial)).then_some(()),
+            Event::Status(status) => {
+                (status.scanner.serial.as_deref() == Some(serial)).then_some(())
+            }
+            _ => None,
+        }
+    };
+    events.until(shows("F-1")).await;
+    rig.scanner.swap("F-9");
+    events.until(shows("F-9")).await;
     rig.daemon.shutdown().await;
 }
 

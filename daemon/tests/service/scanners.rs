@@ -6,8 +6,8 @@ use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use relief_api::{
-    Aborted, Event, Job, JobState, LaserEntry, LaserLog, LaserState, Problem, Scan, ScanList,
-    ScanState, ScannerLink, ScannerList, ScannerSummary, StartScan, Status, path,
+    Aborted, Event, Job, JobState, LaserEntry, LaserLog, LaserState, Problem, Rerun, Scan,
+    ScanList, ScanState, ScannerLink, ScannerList, ScannerSummary, StartScan, Status, path,
 };
 use reliefd::Config;
 use reliefd::config::ScannerConfig;
@@ -161,10 +161,33 @@ async fn two_scanners_scan_at_once_and_each_result_names_its_own() {
         live.len() == 2 && live.values().all(|&n| n > 0),
         "each grids while it scans: {live:?}"
     );
+    let mut jobs = rig.client.events().await;
+    for name in ["left", "right"] {
+        let scan = over.iter().find(|scan| scan.scanner == name).unwrap();
+        let rerun: Job = rig
+            .client
+            .post(&path::scan_rerun(&scan.id), &Rerun::default())
+            .await;
+        assert_eq!(rerun.scanner, name);
+        let told = |event: &Event| {
+            let (job, scanner) = match event {
+                Event::Progress { job, scanner, .. } => (*job, scanner),
+                Event::Published { job, scanner, .. } => (*job, scanner),
+                Event::Job(job) => (job.id, &job.scanner),
+                _ => return None,
+            };
+            if job == rerun.id {
+                assert_eq!(scanner, name, "{event:?}");
+            }
+            (job == rerun.id && matches!(event, Event::Published { .. })).then_some(())
+        };
+        jobs.until(told).await;
+    }
     for scan in over {
         assert_eq!((scan.state, scan.columns), (ScanState::Complete, COLUMNS));
         let job: Job = job_over(&mut events, &rig, scan.jobs[0]).await;
         assert_eq!(job.state, JobState::Done, "{:?}", job.error);
+        assert_eq!(job.scanner, scan.scanner);
         let result = rig.daemon.spool_dir().join(&scan.id);
         let report = json(&result.join("report.json"));
         assert_eq!(report["scan"]["scanner"], scan.scanner.as_str());

@@ -41,6 +41,9 @@ impl Faults {
     pub const ATTENDED: Self =
         Self(Self::LASER.0 | Self::LIMIT_SWITCH.0 | Self::INTERLOCK.0 | Self::EMERGENCY_STOP.0);
 
+    /// Those that keep the device from nothing: they tell of something that is over.
+    pub const REPORTED_ONLY: Self = Self(Self::DEAD_MAN.0 | Self::OVERRUN.0);
+
     /// Each named bit with what it tells the user.
     pub const NAMED: [(Self, &'static str); 12] = [
         (Self::LASER, "laser fault"),

@@ -49,7 +49,7 @@ pub use wire::{MAX_TEXT, MessageError, Reader, Text, Wire, Writer, text};
 pub const MIN_VERSION: u8 = 1;
 
 /// The newest version of the messages this crate speaks.
-pub const MAX_VERSION: u8 = 1;
+pub const MAX_VERSION: u8 = 2;
 
 /// Most samples in a column.
 ///

@@ -99,6 +99,7 @@ direction! {
         Abort,
         ClearFaults,
         Continue,
+        ClearNamed,
         Grant,
         Resend,
     }
@@ -120,6 +121,7 @@ direction! {
         Aborted,
         FaultsCleared,
         ScanContinued,
+        NamedCleared,
         Rejected,
         Banner,
         StatusChanged,

@@ -6,6 +6,7 @@ use scanner_protocol::{Faults, ResetCause};
 
 use super::Device;
 use crate::Vec3;
+use crate::fault::Strikes;
 use crate::random::{Draws, Purpose};
 
 /// Rates of mishaps, per measured column; 0 for none. See [`crate::fault`].
@@ -27,7 +28,7 @@ pub struct Mishaps {
     pub move_part: f64,
     /// How far elsewhere, millimetres.
     pub move_mm: f64,
-    /// The device's clock jumps.
+    /// The device's clock jumps, forward or back.
     pub clock_jump: f64,
     /// The cable is pulled, and put back.
     pub unplug: f64,
@@ -68,6 +69,10 @@ const OTHER_SERIAL: &str = "SIM-OTHER";
 /// Most bytes of babble.
 const BABBLE_MAX: u64 = 200;
 
+/// A clock jumps by less than this, and to less than that from its end.
+const LONGEST_JUMP_MS: u64 = 7_200_000;
+const SOON_MS: u32 = 1_000;
+
 /// The mishaps of one device, and what is still to come of them.
 #[derive(Debug)]
 pub(super) struct Mischief {
@@ -78,7 +83,9 @@ pub(super) struct Mischief {
     unplugged: bool,
     /// The device on the cable is another one.
     other: bool,
-    clock_off: Duration,
+    /// How far the device's clock is ahead; what is behind is ahead by nearly all of its range.
+    clock_off_ms: u32,
+    strikes: Strikes,
 }
 
 /// What happens some time after a mishap.
@@ -98,7 +105,8 @@ impl Mischief {
             later: Vec::new(),
             unplugged: false,
             other: false,
-            clock_off: Duration::ZERO,
+            clock_off_ms: 0,
+            strikes: Strikes::default(),
         }
     }
 
@@ -107,6 +115,7 @@ impl Mischief {
         if self.draws.uniform() >= self.rates.babble {
             return Vec::new();
         }
+        self.strikes.note("babble");
         let length = 1 + self.draws.bits() % BABBLE_MAX;
         (0..length).map(|_| self.draws.bits() as u8).collect()
     }
@@ -116,13 +125,28 @@ impl Mischief {
     }
 
     /// How far the device's clock is ahead.
-    pub(super) fn clock_off(&self) -> Duration {
-        self.clock_off
+    pub(super) fn clock_off_ms(&self) -> u32 {
+        self.clock_off_ms
     }
 
-    fn strikes(&mut self, rate: f64) -> bool {
+    fn jump_the_clock(&mut self, uptime_ms: u32) {
+        let way = self.draws.bits();
+        let by_ms = ((way >> 8) % LONGEST_JUMP_MS) as u32;
+        self.clock_off_ms = match way % 3 {
+            0 => self.clock_off_ms.wrapping_add(by_ms),
+            1 => self.clock_off_ms.wrapping_sub(by_ms),
+            // It begins anew soon.
+            _ => (u32::MAX - by_ms % SOON_MS).wrapping_sub(uptime_ms),
+        };
+    }
+
+    fn strikes(&mut self, key: &'static str, rate: f64) -> bool {
         // Drawn at any rate, so that one class added leaves the others where they were.
-        self.draws.uniform() < rate
+        let strikes = self.draws.uniform() < rate;
+        if strikes {
+            self.strikes.note(key);
+        }
+        strikes
     }
 }
 
@@ -131,6 +155,12 @@ impl Device {
     #[must_use]
     pub fn is_unplugged(&self) -> bool {
         self.mischief.unplugged
+    }
+
+    /// How often which mishap has struck so far.
+    #[must_use]
+    pub fn strikes(&self) -> &Strikes {
+        &self.mischief.strikes
     }
 
     /// Shifts the object on the table, unknown to the device.
@@ -197,18 +227,22 @@ impl Device {
     pub(super) fn risk_mishaps(&mut self, now: Duration) {
         let rates = self.mischief.rates;
         let later = now + rates.hold;
-        if self.mischief.strikes(rates.clock_jump) {
-            let ms = self.mischief.draws.bits() % 7_200_000;
-            self.mischief.clock_off += Duration::from_millis(ms);
+        if self.mischief.strikes("clock-jump", rates.clock_jump) {
+            let uptime_ms = now.saturating_sub(self.booted).as_millis() as u32;
+            self.mischief.jump_the_clock(uptime_ms);
         }
         let lasting = [
-            (rates.laser, Faults::LASER),
-            (rates.over_temperature, Faults::OVER_TEMPERATURE),
-            (rates.interlock, Faults::INTERLOCK),
-            (rates.limit_switch, Faults::LIMIT_SWITCH),
+            ("laser", rates.laser, Faults::LASER),
+            (
+                "over-temperature",
+                rates.over_temperature,
+                Faults::OVER_TEMPERATURE,
+            ),
+            ("interlock", rates.interlock, Faults::INTERLOCK),
+            ("limit-switch", rates.limit_switch, Faults::LIMIT_SWITCH),
         ];
-        for (rate, faults) in lasting {
-            if self.mischief.strikes(rate) {
+        for (key, rate, faults) in lasting {
+            if self.mischief.strikes(key, rate) {
                 if faults == Faults::LIMIT_SWITCH {
                     self.lose_place();
                 }
@@ -216,20 +250,20 @@ impl Device {
                 self.mischief.later.push((later, Later::Mend(faults)));
             }
         }
-        let moved = self.mischief.strikes(rates.move_part);
+        let moved = self.mischief.strikes("move-part", rates.move_part);
         if moved {
             self.move_part(Vec3::new(0.0, rates.move_mm / 2.0, rates.move_mm));
         }
-        if self.mischief.strikes(rates.table_stall) || moved {
+        if self.mischief.strikes("table-stall", rates.table_stall) || moved {
             self.lose_place();
             self.raise_faults(Faults::TABLE_STALL, now);
             self.mend(Faults::TABLE_STALL);
         }
-        if self.mischief.strikes(rates.reset) {
+        if self.mischief.strikes("reset", rates.reset) {
             self.reset(ResetCause::Watchdog, now);
         }
-        let swapped = self.mischief.strikes(rates.wrong_serial);
-        if (self.mischief.strikes(rates.unplug) || swapped) && !self.mischief.unplugged {
+        let swapped = self.mischief.strikes("wrong-serial", rates.wrong_serial);
+        if (self.mischief.strikes("unplug", rates.unplug) || swapped) && !self.mischief.unplugged {
             self.pull(now);
             let plan = &mut self.mischief.later;
             if swapped {

@@ -18,8 +18,8 @@ use core::time::Duration;
 
 use scanner_protocol::commands::Rejected;
 use scanner_protocol::{
-    Activity, Decoder, DecoderCounts, Faults, Frame, HostMessage, MAX_VERSION, MIN_VERSION,
-    Message, MessageError, OnceOnly, Packet, RejectReason, ResetCause, ScanEndReason, Status,
+    Activity, Decoder, DecoderCounts, Faults, Frame, HostMessage, MIN_VERSION, Message,
+    MessageError, OnceOnly, Packet, RejectReason, ResetCause, ScanEndReason, Status,
     events::{Banner, StatusChanged},
 };
 
@@ -51,9 +51,6 @@ const DEVICE_KINDS: u8 = 0x80;
 /// abort is heard soon.
 const POLL_BYTES: usize = 4096;
 
-/// Faults that do not keep the device from working: they tell of something that is over.
-const REPORTED_ONLY: Faults = Faults::DEAD_MAN.union(Faults::OVERRUN);
-
 /// Temperature of the head at work, and when it is too hot, hundredths of a degree Celsius.
 const WARM_CDEGC: i16 = 3_150;
 const TOO_HOT_CDEGC: i16 = 7_200;
@@ -76,6 +73,8 @@ pub struct Device {
     once: OnceOnly,
     /// The dead-man time of the open session.
     session: Option<Duration>,
+    /// Its version of the protocol.
+    version: u8,
     heard: Duration,
     booted: Duration,
     boots: u64,
@@ -114,6 +113,7 @@ impl Device {
             decoder: Decoder::new(),
             once: OnceOnly::default(),
             session: None,
+            version: MIN_VERSION,
             heard: now,
             booted: now,
             boots: 0,
@@ -233,7 +233,7 @@ impl Device {
         self.out.extend(babble);
         let banner = Banner {
             min_version: MIN_VERSION,
-            max_version: MAX_VERSION,
+            max_version: self.settings.max_version,
             boot_id: self.boot_id(),
             cause,
         };
@@ -324,7 +324,7 @@ impl Device {
     }
 
     fn blocking_faults(&self) -> Faults {
-        self.faults.without(REPORTED_ONLY)
+        self.faults.without(Faults::REPORTED_ONLY)
     }
 
     fn table_counts(&self, now: Duration) -> i32 {
@@ -334,8 +334,9 @@ impl Device {
     fn status(&self, now: Duration) -> Status {
         Status {
             boot_id: self.boot_id(),
-            uptime_ms: (now.saturating_sub(self.booted) + self.mischief.clock_off()).as_millis()
-                as u32,
+            // The counter of a device, which begins anew after 49 days.
+            uptime_ms: (now.saturating_sub(self.booted).as_millis() as u32)
+                .wrapping_add(self.mischief.clock_off_ms()),
             activity: self.activity(now),
             homed: self.homed,
             laser_on: self.laser_on,

@@ -3,11 +3,12 @@
 use core::time::Duration;
 
 use scanner_protocol::commands::{
-    Aborted, Continue, FaultsCleared, Hello, HelloReply, HomeStarted, LaserSet, Move, MoveStarted,
-    Nameplate, Scan as ScanRequest, ScanAccepted, ScanClosed, ScanContinued,
+    Aborted, ClearNamed, Continue, FaultsCleared, Hello, HelloReply, HomeStarted, LaserSet, Move,
+    MoveStarted, NamedCleared, Nameplate, Scan as ScanRequest, ScanAccepted, ScanClosed,
+    ScanContinued,
 };
 use scanner_protocol::{
-    Faults, Frame, HostMessage, MAX_VERSION, MIN_VERSION, Message, Packet, RejectReason,
+    Faults, Frame, HostMessage, MIN_VERSION, Message, OnceOnly, Packet, RejectReason,
     ScanEndReason, text,
 };
 
@@ -41,6 +42,10 @@ impl Device {
         }
         if let Some(reply) = self.once.recall(&packet).cloned() {
             return self.send(&reply);
+        }
+        // Whoever made it has had an answer to a later one.
+        if self.once.is_late(&packet) {
+            return;
         }
         match self.request(&packet, message, now) {
             Ok(reply) => {
@@ -120,16 +125,15 @@ impl Device {
                 )
             }
             HostMessage::ClearFaults(_) => {
-                if self.faults != self.causes {
-                    self.faults = self.causes;
-                    self.log.push(Event::Faults(self.faults));
-                }
-                reply(
-                    tag,
-                    &FaultsCleared {
-                        remaining: self.faults,
-                    },
-                )
+                let remaining = self.clear(self.faults);
+                reply(tag, &FaultsCleared { remaining })
+            }
+            HostMessage::ClearNamed(_) if self.version < ClearNamed::SINCE_VERSION => {
+                Err((RejectReason::UnknownCommand, 0))
+            }
+            HostMessage::ClearNamed(clear) => {
+                let remaining = self.clear(clear.faults);
+                reply(tag, &NamedCleared { remaining })
             }
             // Handled before: they are not remembered.
             HostMessage::Hello(_)
@@ -140,14 +144,26 @@ impl Device {
         }
     }
 
+    /// Clears those of these faults whose cause is gone; gives all that remain.
+    fn clear(&mut self, faults: Faults) -> Faults {
+        let remaining = self.faults.without(faults).union(self.causes);
+        if self.faults != remaining {
+            self.faults = remaining;
+            self.log.push(Event::Faults(remaining));
+        }
+        remaining
+    }
+
     fn hello(&mut self, packet: &Packet, hello: &Hello, now: Duration) {
-        if hello.min_version > MAX_VERSION || hello.max_version < MIN_VERSION {
-            let detail = u32::from(MIN_VERSION) | u32::from(MAX_VERSION) << 8;
+        let newest = self.settings.max_version;
+        if hello.min_version > newest || hello.max_version < MIN_VERSION {
+            let detail = u32::from(MIN_VERSION) | u32::from(newest) << 8;
             return self.reject(packet, RejectReason::Version, detail);
         }
         self.halt(ScanEndReason::Closed, now);
         self.scan = None;
-        self.once.forget();
+        self.version = newest.min(hello.max_version);
+        self.once = OnceOnly::opened(packet.tag, self.version);
         // What a silent host brought about is over once there is a new session. What needs a
         // person's eye stays until somebody has said so.
         self.faults = self
@@ -161,7 +177,7 @@ impl Device {
         self.session = Some(dead_man);
         self.log.push(Event::SessionOpened);
         let hello_reply = HelloReply {
-            version: MAX_VERSION.min(hello.max_version),
+            version: self.version,
             boot_id: self.boot_id(),
             dead_man_ms: milliseconds(dead_man),
         };

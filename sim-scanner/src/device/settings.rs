@@ -2,6 +2,8 @@
 
 use core::time::Duration;
 
+use scanner_protocol::MAX_VERSION;
+
 use super::mishap::Mishaps;
 
 /// Names and pace of a device.
@@ -13,6 +15,8 @@ pub struct DeviceSettings {
     pub serial: String,
     /// Version of the firmware.
     pub firmware: String,
+    /// The newest version of the protocol it speaks.
+    pub max_version: u8,
     /// Columns per second; `None` for as fast as credits allow.
     pub line_rate_hz: Option<f64>,
     /// Speed of the table on its way, millimetres per second; infinite for at once.
@@ -42,6 +46,7 @@ impl Default for DeviceSettings {
             model: "SimScanner".into(),
             serial: "SIM-0001".into(),
             firmware: env!("CARGO_PKG_VERSION").into(),
+            max_version: MAX_VERSION,
             line_rate_hz: None,
             table_speed_mm_s: 200.0,
             parked_counts: 4_000,

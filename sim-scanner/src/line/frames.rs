@@ -4,6 +4,7 @@
 use core::time::Duration;
 
 use super::{Direction, LineFaults, gap};
+use crate::fault::Strikes;
 use crate::random::{Draws, Purpose};
 
 /// Bytes without a delimiter that are no frame, and pass as they are.
@@ -32,6 +33,7 @@ pub(super) struct BadFrames {
     /// The frame that is not yet at its end.
     begun: Vec<u8>,
     held: Vec<Held>,
+    pub(super) strikes: Strikes,
 }
 
 #[derive(Debug, Clone)]
@@ -59,6 +61,7 @@ impl BadFrames {
             draws,
             begun: Vec::new(),
             held: Vec::new(),
+            strikes: Strikes::default(),
         }
     }
 
@@ -103,18 +106,26 @@ impl BadFrames {
     }
 
     fn frame(&mut self, mut frame: Vec<u8>, now: Duration, out: &mut Vec<u8>) {
-        if self.happens(|frames| &mut frames.until_cut, self.faults.cut) {
+        if self.happens("cut", |frames| &mut frames.until_cut, self.faults.cut) {
             let length = self.draws.bits() % frame.len().max(1) as u64;
             frame.truncate(length as usize);
         }
-        if self.happens(|frames| &mut frames.until_replay, self.faults.replay) {
+        if self.happens(
+            "replay",
+            |frames| &mut frames.until_replay,
+            self.faults.replay,
+        ) {
             let later = 1 + self.draws.bits() % REPLAY_AFTER;
             self.hold(frame.clone(), Until::Frames(later));
         }
-        let late = if self.happens(|frames| &mut frames.until_delay, self.faults.delay) {
+        let late = if self.happens("delay", |frames| &mut frames.until_delay, self.faults.delay) {
             let wait = self.faults.delay_time.mul_f64(self.draws.uniform());
             Some(Until::Time(now + wait))
-        } else if self.happens(|frames| &mut frames.until_reorder, self.faults.reorder) {
+        } else if self.happens(
+            "reorder",
+            |frames| &mut frames.until_reorder,
+            self.faults.reorder,
+        ) {
             Some(Until::Frames(1 + self.draws.bits() % OVERTAKERS))
         } else {
             None
@@ -147,12 +158,18 @@ impl BadFrames {
         });
     }
 
-    fn happens(&mut self, until: impl Fn(&mut Self) -> &mut u64, rate: f64) -> bool {
+    fn happens(
+        &mut self,
+        key: &'static str,
+        until: impl Fn(&mut Self) -> &mut u64,
+        rate: f64,
+    ) -> bool {
         let left = *until(self);
         if left > 0 {
             *until(self) = left - 1;
             return false;
         }
+        self.strikes.note(key);
         let next = gap(rate, &mut self.draws);
         *until(self) = next;
         true

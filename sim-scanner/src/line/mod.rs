@@ -6,6 +6,7 @@ mod frames;
 
 use core::time::Duration;
 
+use crate::fault::Strikes;
 use crate::random::{Draws, Purpose};
 use frames::BadFrames;
 
@@ -87,6 +88,7 @@ pub struct BadLine {
     until_flood: u64,
     until_stall: u64,
     stalls: u32,
+    strikes: Strikes,
 }
 
 /// A direction of the line.
@@ -120,6 +122,7 @@ impl BadLine {
             until_flood: gap(faults.flood, &mut draws),
             until_stall: gap(faults.stall, &mut draws),
             stalls: 0,
+            strikes: Strikes::default(),
             frames: BadFrames::new(&faults, direction),
             faults,
             draws,
@@ -142,6 +145,14 @@ impl BadLine {
         self.frames.due()
     }
 
+    /// How often which fault has struck so far.
+    #[must_use]
+    pub fn strikes(&self) -> Strikes {
+        let mut strikes = self.strikes.clone();
+        strikes.add(&self.frames.strikes);
+        strikes
+    }
+
     /// Loses all that is under way, as when the cable is pulled.
     pub fn cut_off(&mut self) {
         self.frames.forget();
@@ -153,6 +164,7 @@ impl BadLine {
         for &byte in bytes {
             let mut byte = byte;
             while self.until_flip < 8 {
+                self.strikes.note("flip");
                 byte ^= 1 << self.until_flip;
                 self.until_flip = self
                     .until_flip
@@ -160,21 +172,25 @@ impl BadLine {
                     .saturating_add(gap(self.faults.flip, &mut self.draws));
             }
             self.until_flip -= 8;
-            if self.due_now(|line| &mut line.until_garbage, self.faults.garbage) {
+            if self.strikes_now(
+                "garbage",
+                |line| &mut line.until_garbage,
+                self.faults.garbage,
+            ) {
                 let length = 1 + self.draws.bits() % GARBAGE_MAX;
                 self.noise(length, &mut out);
             }
-            if self.due_now(|line| &mut line.until_flood, self.faults.flood) {
+            if self.strikes_now("flood", |line| &mut line.until_flood, self.faults.flood) {
                 let length = FLOOD.0 + self.draws.bits() % (FLOOD.1 - FLOOD.0);
                 self.noise(length, &mut out);
             }
-            if self.due_now(|line| &mut line.until_stall, self.faults.stall) {
+            if self.strikes_now("stall", |line| &mut line.until_stall, self.faults.stall) {
                 self.stalls += 1;
             }
-            if !self.due_now(|line| &mut line.until_lose, self.faults.lose) {
+            if !self.strikes_now("lose", |line| &mut line.until_lose, self.faults.lose) {
                 out.push(byte);
             }
-            if self.due_now(|line| &mut line.until_double, self.faults.double) {
+            if self.strikes_now("double", |line| &mut line.until_double, self.faults.double) {
                 out.push(byte);
             }
         }
@@ -191,12 +207,18 @@ impl BadLine {
         (stalls > 0).then(|| self.faults.stall_time * stalls)
     }
 
-    fn due_now(&mut self, until: impl Fn(&mut Self) -> &mut u64, rate: f64) -> bool {
+    fn strikes_now(
+        &mut self,
+        key: &'static str,
+        until: impl Fn(&mut Self) -> &mut u64,
+        rate: f64,
+    ) -> bool {
         let left = *until(self);
         if left > 0 {
             *until(self) = left - 1;
             return false;
         }
+        self.strikes.note(key);
         let next = gap(rate, &mut self.draws);
         *until(self) = next;
         true
@@ -231,6 +253,11 @@ mod tests {
         assert!((900..1100).contains(&lost), "{lost}");
         let flipped: u32 = got.iter().map(|byte| byte.count_ones()).sum();
         assert!((1450..1750).contains(&flipped), "{flipped}");
+        let strikes = line.strikes();
+        assert_eq!(strikes.of("lose"), lost as u64);
+        // A byte that was lost may have been turned over before.
+        assert!((u64::from(flipped)..1750).contains(&strikes.of("flip")));
+        assert_eq!(strikes.total(), strikes.of("lose") + strikes.of("flip"));
         // The same whatever the portions.
         let mut again = BadLine::new(&faults, Direction::ToHost);
         let pieces: Vec<u8> = sent
@@ -248,6 +275,7 @@ mod tests {
         let sent: Vec<u8> = (0..=255).collect();
         assert_eq!(line.carry(&sent, Duration::ZERO), sent);
         assert_eq!(line.take_stall(), None);
+        assert_eq!(line.strikes().total(), 0);
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! The classes of faults, at rates that a device can recover from.
 
-use sim_scanner::fault::FaultSpec;
+use sim_scanner::fault::{FaultSpec, Strikes};
 
+use crate::conditions::{CLOCK_JUMP, Conditions, HOST_SLEEP, HostFaults, LONG_SLEEP};
 use crate::scene::Dice;
-use crate::simulation::Conditions;
 
 /// Who ends what a class of faults brings about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,33 +45,31 @@ const fn person(name: &'static str, rate: f64, words: &'static str) -> Class {
     }
 }
 
-/// The host does nothing for a while, as a computer that sleeps.
-pub const HOST_SLEEP: &str = "host-sleep";
-
 /// All classes.
-pub const CLASSES: [Class; 22] = [
+pub const CLASSES: [Class; 23] = [
     class("flip", 1e-4, "bit"),
     class("lose", 1e-3, "byte"),
     class("double", 1e-3, "byte"),
     class("garbage", 1e-3, "byte"),
-    class("flood", 2e-5, "byte"),
-    class("stall", 2e-5, "byte"),
+    class("flood", 4e-4, "byte"),
+    class("stall", 4e-4, "byte"),
     class("cut", 0.05, "frame"),
     class("replay", 0.05, "frame"),
     class("delay", 0.05, "frame"),
     class("reorder", 0.1, "frame"),
-    class("reset", 0.02, "column"),
+    class("reset", 0.06, "column"),
     class("babble", 1.0, "start"),
-    class("table-stall", 0.02, "column"),
-    class("over-temperature", 0.02, "column"),
-    class("clock-jump", 0.05, "column"),
-    class("unplug", 0.02, "column"),
-    class("wrong-serial", 0.01, "column"),
-    class(HOST_SLEEP, 0.02, "column"),
-    person("limit-switch", 0.02, "limit switch hit"),
-    person("laser", 0.02, "laser fault"),
-    person("interlock", 0.02, "interlock open"),
-    person("move-part", 0.02, "has moved"),
+    class("table-stall", 0.06, "column"),
+    class("over-temperature", 0.06, "column"),
+    class(CLOCK_JUMP, 0.06, "column"),
+    class("unplug", 0.06, "column"),
+    class("wrong-serial", 0.06, "column"),
+    class(HOST_SLEEP, 0.06, "column"),
+    person(LONG_SLEEP, 0.06, "did not hear from this computer"),
+    person("limit-switch", 0.06, "limit switch hit"),
+    person("laser", 0.06, "laser fault"),
+    person("interlock", 0.06, "interlock open"),
+    person("move-part", 0.06, "has moved"),
 ];
 
 impl Class {
@@ -79,6 +77,12 @@ impl Class {
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {
         CLASSES.iter().find(|class| class.name == name)
+    }
+
+    /// How often it struck.
+    #[must_use]
+    pub fn strikes(&self, strikes: &Strikes) -> u64 {
+        strikes.of(self.name)
     }
 
     /// A scan under this class alone.
@@ -110,7 +114,7 @@ pub fn mix(seed: u64) -> (Conditions, Vec<&'static Class>) {
 #[allow(clippy::panic)] // A class of the table above that does nothing is a defect.
 fn conditions(classes: &[(&Class, f64)], seed: u64) -> Conditions {
     let mut faults = FaultSpec::default();
-    let mut host_sleep = 0.0;
+    let mut host = HostFaults::default();
     for (class, rate) in classes {
         let (line, device) = (&mut faults.line, &mut faults.device);
         let place = match class.name {
@@ -132,14 +136,18 @@ fn conditions(classes: &[(&Class, f64)], seed: u64) -> Conditions {
             }
             "table-stall" => &mut device.table_stall,
             "over-temperature" => &mut device.over_temperature,
-            "clock-jump" => &mut device.clock_jump,
+            CLOCK_JUMP => {
+                device.clock_jump = *rate;
+                &mut host.clock_jump
+            }
             "unplug" => &mut device.unplug,
             "wrong-serial" => &mut device.wrong_serial,
             "limit-switch" => &mut device.limit_switch,
             "laser" => &mut device.laser,
             "interlock" => &mut device.interlock,
             "move-part" => &mut device.move_part,
-            HOST_SLEEP => &mut host_sleep,
+            HOST_SLEEP => &mut host.sleep,
+            LONG_SLEEP => &mut host.long_sleep,
             name => panic!("no fault is called {name}"),
         };
         *place = *rate;
@@ -149,7 +157,7 @@ fn conditions(classes: &[(&Class, f64)], seed: u64) -> Conditions {
     Conditions {
         seed,
         faults,
-        host_sleep,
+        host,
         careless: false,
         // Every other scan is on a line that nobody sees being pulled.
         feels_the_plug: seed.is_multiple_of(2),

@@ -8,9 +8,11 @@
 //! ```
 
 pub mod class;
+pub mod conditions;
 pub mod journal;
 pub mod scene;
 pub mod simulation;
 
 pub use class::{CLASSES, Class, Need};
-pub use simulation::{Conditions, Outcome, run};
+pub use conditions::{Conditions, HostFaults, Outcome};
+pub use simulation::run;

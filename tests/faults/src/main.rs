@@ -98,11 +98,13 @@ fn run(cli: &Cli) -> Result<bool> {
 
 fn report(tally: Tally) -> Tally {
     println!(
-        "{:16} {} scans, {} by themselves, {} with a person, {} failed",
+        "{:16} {} scans, {} struck, {} by themselves, {} with a person, {} excused, {} failed",
         tally.name,
         tally.scans,
+        tally.struck,
         tally.alone,
         tally.attended,
+        tally.excused,
         tally.failures.len()
     );
     for failure in tally.failures.iter().take(5) {

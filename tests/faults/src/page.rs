@@ -8,9 +8,9 @@ use crate::tally::Tally;
 
 pub(crate) fn table(tallies: &[Tally]) -> String {
     let mut text = String::from(
-        "| class | rate | scans | complete by themselves | complete with a person | failed | \
+        "| class | rate | scans | struck | times | complete by themselves | complete with a person | excused | failed | \
          pauses per scan | columns measured twice | longer by, s |\n\
-         | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
+         | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
     );
     for tally in tallies {
         let rate = tally.class.map_or("drawn".to_owned(), |class| {
@@ -21,12 +21,15 @@ pub(crate) fn table(tallies: &[Tally]) -> String {
         // Writing to a string does not fail.
         let _ = writeln!(
             text,
-            "| {}{} | {rate} | {} | {} | {} | {} | {:.2} | {:.1} % | {:.1} |",
+            "| {}{} | {rate} | {} | {} | {} | {} | {} | {} | {} | {:.2} | {:.1} % | {:.1} |",
             tally.name,
             if person { " (needs a person)" } else { "" },
             tally.scans,
+            tally.struck,
+            tally.strikes,
             tally.alone,
             tally.attended,
+            tally.excused,
             tally.failures.len(),
             tally.pauses as f64 / scans,
             100.0 * (tally.measured as f64 / tally.columns.max(1) as f64 - 1.0),
@@ -44,7 +47,10 @@ pub(crate) fn page(tallies: &[Tally], from: u64) -> String {
          simulated time: the driver's session and recovery against the simulated device, joined by \
          a line in memory. `--only CLASS --replay SEED` runs one of them again.\n\n\
          Of every scan is asked: it ends, without a panic; the laser is off at the end, and \
-         while a person is waited for; a complete scan is closed at the device; its journal is that of the same scan without faults, byte for byte. Of classes that need nobody, 99.9 % \
+         within the dead-man time while a person is waited for and while the host sleeps; once it \
+         has been off for a quarter of an hour it does not go on again without a person's word; a \
+         complete scan is closed at the device; its journal is that of the same scan without \
+         faults, byte for byte. Of classes that need nobody, 99.9 % \
          of the scans must end without a person; the others must stop for their cause, and go on \
          when a person, who comes after 30 s, tells them to. A tenth of the columns takes as long \
          as 2 s to the disk, the others 4 ms. A mix draws each class with \
@@ -52,9 +58,20 @@ pub(crate) fn page(tallies: &[Tally], from: u64) -> String {
          and all of it.\n\n\
          Every other scan is on a line that tells nobody when the cable is pulled. A class that \
          needs nobody may still stop for a person when nothing comes of ten attempts; a scan under \
-         one that needs a person ends by itself if the fault does not strike. An object that \
-         is moved before 16 samples of it were measured is measured where it stands then: too little \
-         to notice it by.\n\n\
+         one that needs a person ends by itself if the fault does not strike, or strikes when the \
+         last column is measured.\n\n\
+         `host-sleep`: the host does nothing for up to 20 s, while the device goes on and the line \
+         keeps what fits into 256 KiB. `long-sleep`: the same for 16 minutes to an hour. \
+         `clock-jump`: the clock that the device tells in its status jumps by up to two hours, \
+         forward or back, or to the last second before it begins anew; and, at the same rate, the \
+         host's clock leaps ahead by 1 to 400 s between two looks at the line, every other time \
+         that of the device with it, as where both are in one suspended machine. (The driver \
+         goes by a clock that counts from the computer's start and never runs back.)\n\n\
+         *Struck* are the scans in which the fault happened at least once, *times* is how often it \
+         did in all of them (of a mix: any of its faults). *Excused* are scans whose object was \
+         moved before 16 samples of it were measured, too little to notice it by: their journal \
+         holds it where it stood then (and counts as complete), or there is none, since it was \
+         measured in two places, cannot be put back, and the person gives up after 20 visits.\n\n\
          {}",
         table(tallies)
     )

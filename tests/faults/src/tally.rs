@@ -7,6 +7,7 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use faults::{Class, Conditions, Need, run};
 use rayon::prelude::*;
+use scanner_driver::ScannerError;
 
 /// Share of scans that must end by themselves, for classes that need nobody.
 const BY_THEMSELVES: f64 = 0.999;
@@ -25,6 +26,11 @@ pub(crate) struct Tally {
     pub(crate) measured: u64,
     pub(crate) columns: u64,
     pub(crate) took: Duration,
+    /// How often the faults struck, and in how many of the scans at least once.
+    pub(crate) strikes: u64,
+    pub(crate) struck: u64,
+    /// Of another journal or of none, since the object was moved before it was seen.
+    pub(crate) excused: u64,
     pub(crate) failures: Vec<String>,
 }
 
@@ -44,7 +50,12 @@ pub(crate) struct Judge {
 }
 
 enum Verdict {
-    Ended(faults::Outcome),
+    Ended {
+        outcome: faults::Outcome,
+        /// It is not the scan without faults, and need not be.
+        excused: bool,
+        complete: bool,
+    },
     Failed(String),
 }
 
@@ -55,10 +66,8 @@ impl Judge {
         for seed in 0..faults::scene::count() {
             let outcome = run(&Conditions {
                 seed,
-                faults: Default::default(),
-                host_sleep: 0.0,
-                careless: false,
                 feels_the_plug: true,
+                ..Conditions::default()
             })?;
             flawless = flawless.max(outcome.took);
             references.push(outcome.journal.context("a scan without faults failed")?);
@@ -96,11 +105,22 @@ impl Judge {
             tally.scans += 1;
             match verdict {
                 Verdict::Failed(why) => tally.failures.push(why),
-                Verdict::Ended(outcome) => {
-                    if outcome.attended.is_empty() {
-                        tally.alone += 1;
-                    } else {
-                        tally.attended += 1;
+                Verdict::Ended {
+                    outcome,
+                    excused,
+                    complete,
+                } => {
+                    let strikes = match class {
+                        Some(class) => class.strikes(&outcome.strikes),
+                        None => outcome.strikes.total(),
+                    };
+                    tally.strikes += strikes;
+                    tally.struck += u64::from(strikes > 0);
+                    tally.excused += u64::from(excused);
+                    match (complete, outcome.attended.is_empty()) {
+                        (true, true) => tally.alone += 1,
+                        (true, false) => tally.attended += 1,
+                        (false, _) => {}
                     }
                     tally.pauses += u64::from(outcome.pauses);
                     tally.measured += outcome.measured;
@@ -120,12 +140,21 @@ impl Judge {
             Err(error) => return Verdict::Failed(format!("{error:#}")),
         };
         let Some(journal) = outcome.journal.take() else {
+            // Measured in two places, it cannot be put where it was.
+            if outcome.moved_before_it_was_seen && outcome.error == Some(ScannerError::Aborted) {
+                return Verdict::Ended {
+                    outcome,
+                    excused: true,
+                    complete: false,
+                };
+            }
             return failed(format!("{:?}", outcome.error));
         };
         let reference = self
             .references
             .get((seed % faults::scene::count()) as usize);
-        if Some(&journal) != reference && !outcome.moved_before_it_was_seen {
+        let differs = Some(&journal) != reference;
+        if differs && !outcome.moved_before_it_was_seen {
             return failed("another journal".into());
         }
         if let Some(Need::Person(words)) = class.map(|class| class.need)
@@ -136,6 +165,10 @@ impl Judge {
         {
             return failed(format!("it stopped for another cause: {pause}"));
         }
-        Verdict::Ended(outcome)
+        Verdict::Ended {
+            outcome,
+            excused: differs,
+            complete: true,
+        }
     }
 }

@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use faults::{CLASSES, Conditions, Need, Outcome, run};
+use scanner_driver::ScannerError;
 
 /// Scans of each class.
 const EACH: u64 = 20;
@@ -16,10 +17,8 @@ const MIXES: u64 = 60;
 fn flawless(seed: u64) -> Vec<u8> {
     let conditions = Conditions {
         seed,
-        faults: Default::default(),
-        host_sleep: 0.0,
-        careless: false,
         feels_the_plug: true,
+        ..Conditions::default()
     };
     let outcome = run(&conditions).expect("nothing goes wrong");
     assert_eq!((outcome.pauses, outcome.measured), (0, 50));
@@ -33,26 +32,29 @@ fn references() -> BTreeMap<u64, Vec<u8>> {
         .collect()
 }
 
-fn check(name: &str, seed: u64, outcome: &Outcome, references: &BTreeMap<u64, Vec<u8>>) {
-    let journal = outcome
-        .journal
-        .as_ref()
-        .unwrap_or_else(|| panic!("{name}, seed {seed}: {outcome:?}"));
+/// Whether the scan is another than without faults and may be, since its object was moved before
+/// it was seen.
+fn check(name: &str, seed: u64, outcome: &Outcome, references: &BTreeMap<u64, Vec<u8>>) -> bool {
     let reference = &references[&(seed % faults::scene::count())];
+    let same = outcome.journal.as_ref() == Some(reference);
     if outcome.moved_before_it_was_seen {
-        return;
+        let told = outcome.journal.is_some() || outcome.error == Some(ScannerError::Aborted);
+        assert!(told, "{name}, seed {seed}: {outcome:?}");
+        return !same;
     }
-    assert!(journal == reference, "{name}, seed {seed}: another journal");
+    assert!(same, "{name}, seed {seed}: another journal: {outcome:?}");
+    false
 }
 
 #[test]
 fn every_class_is_survived_and_the_journal_is_the_same() {
     let references = references();
     for class in &CLASSES {
-        let mut attended = 0;
+        let (mut attended, mut struck, mut excused) = (0, 0, 0);
         for seed in 0..EACH {
             let outcome = run(&class.alone(seed)).unwrap();
-            check(class.name, seed, &outcome, &references);
+            excused += u64::from(check(class.name, seed, &outcome, &references));
+            struck += u64::from(class.strikes(&outcome.strikes) > 0);
             match class.need {
                 Need::Nobody => {
                     assert!(
@@ -72,6 +74,14 @@ fn every_class_is_survived_and_the_journal_is_the_same() {
             }
         }
         assert_eq!(class.need != Need::Nobody, attended > 0, "{}", class.name);
+        // A class that misses its scans proves nothing of them.
+        assert!(struck * 10 >= EACH * 8, "{}: {struck} struck", class.name);
+        let most_excused = if class.name == "move-part" {
+            EACH / 3
+        } else {
+            0
+        };
+        assert!(excused <= most_excused, "{}: {excused} excused", class.name);
     }
 }
 

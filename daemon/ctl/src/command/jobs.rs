@@ -3,7 +3,7 @@
 use relief_api::{Job, JobList, path};
 
 use crate::failure::Failure;
-use crate::output;
+use crate::output::of_scanners;
 use crate::service::EndpointArgs;
 
 /// List the jobs, newest first
@@ -22,15 +22,23 @@ fn told(list: &JobList) -> String {
         return "no jobs yet".into();
     }
     let lines = list.jobs.iter().map(|job| {
-        vec![
-            job.id.to_string(),
-            job.scan.clone(),
-            job.name.clone(),
-            seconds(job),
-            state(job),
-        ]
+        (
+            job.scanner.as_str(),
+            vec![
+                job.id.to_string(),
+                job.scan.clone(),
+                job.name.clone(),
+                seconds(job),
+                state(job),
+            ],
+        )
     });
-    output::table(&["JOB", "SCAN", "NAME", "SECONDS", "STATE"], &[0, 3], lines)
+    of_scanners(
+        &["JOB", "SCAN", "NAME", "SECONDS", "STATE"],
+        2,
+        &[0, 3],
+        lines,
+    )
 }
 
 fn seconds(job: &Job) -> String {

@@ -76,22 +76,26 @@ fn line(event: &Event) -> String {
                 .as_ref()
                 .map_or(String::new(), |reason| format!(": {reason}"));
             format!(
-                "scan {} ({}): {}{reason}",
+                "scan {} ({}){}: {}{reason}",
                 scan.id,
                 scan.name,
+                output::on_scanner(&scan.scanner),
                 scan.state.as_str()
             )
         }
         Event::Column {
             scan,
+            scanner,
             columns,
             columns_planned,
             samples,
             x_mm,
             ..
         } => {
+            let on = output::on_scanner(scanner);
             format!(
-                "scan {scan}: column {columns}/{columns_planned} at x {x_mm:.3} mm, {samples} samples"
+                "scan {scan}{on}: column {columns}/{columns_planned} at x {x_mm:.3} mm, \
+                 {samples} samples"
             )
         }
         Event::Job(job) => {
@@ -100,29 +104,39 @@ fn line(event: &Event) -> String {
                 .as_ref()
                 .map_or(String::new(), |error| format!(": {error}"));
             format!(
-                "job {} of scan {}: {}{error}",
+                "job {} of scan {}{}: {}{error}",
                 job.id,
                 job.scan,
+                output::on_scanner(&job.scanner),
                 job.state.as_str()
             )
         }
         Event::Progress {
             job,
+            scanner,
             stage,
             fraction,
             seconds,
             ..
-        } => match seconds {
-            Some(seconds) => format!("job {job}: {stage} done in {seconds:.3} s"),
-            None => format!("job {job}: {stage} {:.0} %", fraction * 100.0),
-        },
+        } => {
+            let on = output::on_scanner(scanner);
+            match seconds {
+                Some(seconds) => format!("job {job}{on}: {stage} done in {seconds:.3} s"),
+                None => format!("job {job}{on}: {stage} {:.0} %", fraction * 100.0),
+            }
+        }
         Event::Published {
             job,
+            scanner,
             directory,
             files,
             ..
         } => {
-            format!("job {job}: published {directory} ({})", files.join(", "))
+            let on = output::on_scanner(scanner);
+            format!(
+                "job {job}{on}: published {directory} ({})",
+                files.join(", ")
+            )
         }
         Event::Lagged { missed } => format!("({missed} events were lost: too slow a reader)"),
         Event::Scanner(scanner) => {
@@ -140,4 +154,29 @@ fn line(event: &Event) -> String {
 fn at(scanner: &ScannerStatus) -> String {
     let name = output::scanner(&scanner.name);
     format!("{name} at {}", scanner.endpoint)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_happens_is_told_with_the_scanner_where_it_has_a_name() {
+        let told = |scanner: &str| {
+            let progress = format!(
+                r#"{{"kind":"progress","job":3,"scan":"s","scanner":"{scanner}",
+                    "stage":"segment","fraction":0.5}}"#
+            );
+            line(&serde_json::from_str(&progress).unwrap())
+        };
+        assert_eq!(told("left"), "job 3 on left: segment 50 %");
+        assert_eq!(told("scanner"), "job 3: segment 50 %");
+        assert_eq!(told(""), "job 3: segment 50 %");
+        let job = r#"{"kind":"job","id":3,"scan":"s","scanner":"left","result":"s","name":"n",
+            "state":"queued","queued_at":"t"}"#;
+        assert_eq!(
+            line(&serde_json::from_str(job).unwrap()),
+            "job 3 of scan s on left: queued"
+        );
+    }
 }

@@ -18,7 +18,7 @@ mod scan;
 
 pub use abort::{Abort, Aborted};
 pub use calibration::{Calibration, GetCalibration, Head};
-pub use clear_faults::{ClearFaults, FaultsCleared};
+pub use clear_faults::{ClearFaults, ClearNamed, FaultsCleared, NamedCleared};
 pub use close_scan::{CloseScan, ScanClosed};
 pub use grant::Grant;
 pub use heartbeat::Heartbeat;

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
-use scanner_protocol::{Identity, ScanPlan};
+use scanner_protocol::{Faults, Identity, ScanPlan};
 
 use crate::error::ScannerError;
 use crate::recovery::InterruptedScan;
@@ -101,12 +101,13 @@ impl LinkScanner {
         self.run(Command::Laser(on)).map(|_| ())
     }
 
-    /// Clears the faults whose cause is gone.
+    /// Clears those of these faults whose cause is gone. A device of version 1 of the protocol
+    /// clears all such faults.
     ///
     /// # Errors
     /// [`ScannerError::Fault`] with those that remain.
-    pub fn clear_faults(&self) -> Result<(), ScannerError> {
-        self.run(Command::ClearFaults).map(|_| ())
+    pub fn clear_faults(&self, faults: Faults) -> Result<(), ScannerError> {
+        self.run(Command::ClearFaults(faults)).map(|_| ())
     }
 
     fn run(&self, command: Command) -> Result<Outcome, ScannerError> {

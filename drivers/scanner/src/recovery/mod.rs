@@ -30,12 +30,16 @@ pub use pause::Pause;
 use pause::{Class, class, for_a_person};
 
 use crate::error::ScannerError;
+use crate::limits::MAX_CREDITS;
 use crate::scanner::{RawColumn, ScanInfo};
 use crate::session::{Acknowledged, Answer, Command, Event, Session, Ticket};
 use crate::settings::ResumeSettings;
 
 /// Tickets from here on are a recovery's own.
 const OWN_TICKETS: u64 = 1 << 63;
+
+/// Longer than a scan that runs is ever left alone.
+const AWAY: Duration = Duration::from_secs(1);
 
 /// What a scan comes to, in order.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,8 +64,13 @@ pub struct Recovery {
     info: ScanInfo,
     state: State,
     progress: VecDeque<Progress>,
-    /// When the last column came, or else the scan was accepted: since then, at the latest,
-    /// nobody has seen the laser on.
+    /// When the scan was last looked after.
+    looked: Duration,
+    /// Columns below may have been measured before the computer slept: they may have waited in
+    /// buffers, or be sent again.
+    old_below: u32,
+    /// When the last column came that had just been measured, or else the scan was accepted:
+    /// for all that is known, nobody has seen the laser on since.
     measured: Duration,
     /// Every column below has been handed on.
     handed: u32,
@@ -125,6 +134,8 @@ impl Recovery {
             info,
             state: State::Running,
             progress: VecDeque::new(),
+            looked: now,
+            old_below: 0,
             measured: now,
             handed: 0,
             acknowledged: Acknowledged::default(),
@@ -165,6 +176,8 @@ impl Recovery {
                 State::Waiting(now)
             },
             progress: VecDeque::from([Progress::Paused(told.clone())]),
+            looked: now,
+            old_below: 0,
             measured: now,
             handed: scan.columns,
             acknowledged: Acknowledged::all_below(scan.columns),
@@ -246,6 +259,7 @@ impl Recovery {
 
     /// Takes what concerns the scan from an event of the session; the rest is given back.
     pub fn event(&mut self, event: Event, now: Duration) -> Option<Event> {
+        self.look(now);
         match event {
             Event::Column(column) => {
                 self.column(column, now);
@@ -275,6 +289,7 @@ impl Recovery {
 
     /// Does what is due; `session` is there while there is a connection.
     pub fn poll(&mut self, session: Option<&mut Session>, now: Duration) {
+        self.look(now);
         if self.settings.is_none() {
             return;
         }
@@ -315,6 +330,8 @@ impl Recovery {
                 self.state = State::Continuing(ticket);
                 self.attempts += 1;
                 let first_column = self.kept.first_index().unwrap_or(self.handed);
+                // What comes now is measured now.
+                self.old_below = 0;
                 session.go_on(
                     ticket,
                     self.plan,
@@ -326,6 +343,15 @@ impl Recovery {
             }
             _ => {}
         }
+    }
+
+    /// Notices that the computer has slept: a scanner that did not hear from it has stopped by
+    /// itself, and has measured no more columns than it had credit for.
+    fn look(&mut self, now: Duration) {
+        if now >= self.looked + AWAY {
+            self.old_below = self.handed.saturating_add(u32::from(MAX_CREDITS));
+        }
+        self.looked = now;
     }
 
     /// When [`Recovery::poll`] has something to do, events aside.
@@ -366,7 +392,9 @@ impl Recovery {
             return self.compare(column, now);
         }
         self.go_on();
-        self.measured = now;
+        if column.index >= self.old_below {
+            self.measured = now;
+        }
         self.handed = column.index + 1;
         self.attempts = 0;
         if let Some(settings) = &self.settings {

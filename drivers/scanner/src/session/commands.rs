@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use scanner_protocol::ScanPlan;
 use scanner_protocol::commands::{
-    Abort, ClearFaults, CloseScan, Continue, Heartbeat, Home, Move, Scan, SetLaser,
+    Abort, ClearFaults, ClearNamed, CloseScan, Continue, Heartbeat, Home, Move, Scan, SetLaser,
 };
+use scanner_protocol::{Faults, ScanPlan};
 
 use super::request::{GoOn, Purpose};
 use super::scan::{Acknowledged, Flow, Taken};
@@ -13,6 +13,16 @@ use super::{Command, Phase, Session, Ticket};
 use crate::error::ScannerError;
 
 impl Session {
+    /// Has faults cleared whose cause is gone. A device of version 1 knows no difference between
+    /// them.
+    pub(super) fn clear_faults(&mut self, faults: Faults, purpose: Purpose) {
+        if self.version >= ClearNamed::SINCE_VERSION {
+            self.requests.push(&ClearNamed { faults }, purpose);
+        } else {
+            self.requests.push(&ClearFaults {}, purpose);
+        }
+    }
+
     /// Has a command carried out. Its outcome comes as [`super::Event::Finished`] with the
     /// ticket. Commands given before the device is ready wait, except for an abort.
     pub fn command(&mut self, ticket: Ticket, command: Command, now: Duration) {
@@ -47,9 +57,9 @@ impl Session {
             (Phase::Ready, Command::Laser(on)) => {
                 self.requests.push(&SetLaser { on }, Purpose::Laser(ticket));
             }
-            (Phase::Ready, Command::ClearFaults) => self
-                .requests
-                .push(&ClearFaults {}, Purpose::ClearFaults(ticket)),
+            (Phase::Ready, Command::ClearFaults(faults)) => {
+                self.clear_faults(faults, Purpose::ClearFaults(ticket));
+            }
             (Phase::Ready, Command::Scan(plan)) => self.start_scan(ticket, plan),
         }
         self.poll(now);

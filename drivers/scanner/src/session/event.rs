@@ -26,8 +26,8 @@ pub enum Command {
     Move(i32),
     /// Switch the laser.
     Laser(bool),
-    /// Clear faults whose cause is gone.
-    ClearFaults,
+    /// Clear those of these faults whose cause is gone.
+    ClearFaults(Faults),
     /// Start a scan.
     Scan(ScanPlan),
     /// Stop everything.

@@ -41,6 +41,8 @@ pub struct Session {
     /// Commands given before the device was ready.
     waiting: VecDeque<(Ticket, Command)>,
     boot_id: u32,
+    /// The version agreed upon; 0 until then.
+    version: u8,
     /// The parts of the identity that have come while opening.
     nameplate: Option<Nameplate>,
     calibration: Option<Calibration>,
@@ -95,6 +97,7 @@ impl Session {
             requests: Requests::new(now),
             waiting: VecDeque::new(),
             boot_id: 0,
+            version: 0,
             nameplate: None,
             calibration: None,
             identity: None,

@@ -51,6 +51,7 @@ impl Session {
         self.settings.heartbeat_interval = self.settings.heartbeat_interval.min(interval);
         self.settings.request_timeout = self.settings.request_timeout.min(interval);
         self.boot_id = reply.boot_id;
+        self.version = reply.version;
         self.requests.push(&Identify {}, Purpose::Nameplate);
     }
 

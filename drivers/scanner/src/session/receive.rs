@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use scanner_protocol::commands::{
-    Abort, ClearFaults, CloseScan, Continue, GetCalibration, GetLimits, Heartbeat, Hello, Home,
-    Identify, Move, Scan, ScanAccepted, ScanContinued, SetLaser,
+    Abort, ClearFaults, ClearNamed, CloseScan, Continue, GetCalibration, GetLimits, Heartbeat,
+    Hello, Home, Identify, Move, Scan, ScanAccepted, ScanContinued, SetLaser,
 };
 use scanner_protocol::{
     Activity, DeviceMessage, Faults, HostMessage, Message, Packet, RejectReason, Rejected, Status,
@@ -83,7 +83,12 @@ impl Session {
                 }
             }
             DeviceMessage::LaserSet(_) => self.done(tag, SetLaser::KIND),
-            DeviceMessage::FaultsCleared(reply) => self.on_faults_cleared(reply.remaining, tag),
+            DeviceMessage::FaultsCleared(reply) => {
+                self.on_faults_cleared(reply.remaining, tag, ClearFaults::KIND);
+            }
+            DeviceMessage::NamedCleared(reply) => {
+                self.on_faults_cleared(reply.remaining, tag, ClearNamed::KIND);
+            }
             DeviceMessage::ScanClosed(_) => self.done(tag, CloseScan::KIND),
             DeviceMessage::Aborted(_) => self.done(tag, Abort::KIND),
             DeviceMessage::ScanAccepted(reply) => self.on_accepted(&reply, tag, now),
@@ -176,13 +181,13 @@ impl Session {
         self.finish(go_on.ticket, Ok(Answer::Scan(info)));
     }
 
-    fn on_faults_cleared(&mut self, remaining: Faults, tag: u16) {
+    fn on_faults_cleared(&mut self, remaining: Faults, tag: u16, kind: u8) {
         let left = if remaining.is_empty() {
             Ok(Answer::Done)
         } else {
             Err(ScannerError::Fault(remaining))
         };
-        match self.requests.answered(tag, ClearFaults::KIND) {
+        match self.requests.answered(tag, kind) {
             Some(Purpose::ClearFaults(ticket)) => self.finish(ticket, left),
             Some(Purpose::Recover(refused)) => match left {
                 Ok(_) => self.ask_again(*refused),
@@ -219,8 +224,9 @@ impl Session {
             && self.recovered != purpose.ticket()
         {
             self.recovered = purpose.ticket();
-            self.requests
-                .push(&ClearFaults {}, Purpose::Recover(Box::new(purpose)));
+            // Only what has been told of: what came up since then has been seen by nobody.
+            let seen = faults.union(Faults::REPORTED_ONLY);
+            self.clear_faults(seen, Purpose::Recover(Box::new(purpose)));
             return;
         }
         let error = ScannerError::Refused {
@@ -259,16 +265,9 @@ impl Session {
                     "it no longer knows the running scan".to_owned(),
                 )));
             }
-        } else if fresh
-            && self.scan.is_none()
-            && self.requests.is_idle()
-            && status.scan_id != 0
-            && matches!(
-                status.activity,
-                Activity::Scanning | Activity::Waiting | Activity::Moving
-            )
-        {
-            // A request that came late, or twice: nobody wants this scan.
+        } else if fresh && self.scan.is_none() && self.requests.is_idle() && status.scan_id != 0 {
+            // A request that came late, or twice: nobody wants this scan, nor to be told of its
+            // end again and again.
             tracing::warn!(scan = status.scan_id, "closing a scan nobody asked for");
             let unwanted = CloseScan {
                 scan_id: status.scan_id,

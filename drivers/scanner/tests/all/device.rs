@@ -19,6 +19,8 @@ pub(crate) struct Device {
     pub(crate) faults: Faults,
     /// Faults whose cause is there still.
     pub(crate) lasting: Faults,
+    /// Faults that come up just before the next clearing.
+    pub(crate) before_clearing: Faults,
     pub(crate) laser_on: bool,
     pub(crate) activity: Activity,
     pub(crate) table_counts: i32,
@@ -94,6 +96,7 @@ impl Device {
             homed: false,
             faults: Faults::NONE,
             lasting: Faults::NONE,
+            before_clearing: Faults::NONE,
             laser_on: false,
             activity: Activity::Idle,
             table_counts: 0,
@@ -284,7 +287,23 @@ impl Device {
                 self.laser_on = set.on;
                 Frame::new(tag, &LaserSet { on: set.on })
             }
+            HostMessage::ClearNamed(clear) => {
+                assert!(self.version >= 2, "a device of version 1 does not know it");
+                // What nobody has seen yet.
+                self.faults = self.faults.union(std::mem::take(&mut self.before_clearing));
+                self.faults = self.faults.without(clear.faults).union(self.lasting);
+                if self.faults.is_empty() {
+                    self.activity = Activity::Idle;
+                }
+                Frame::new(
+                    tag,
+                    &NamedCleared {
+                        remaining: self.faults,
+                    },
+                )
+            }
             HostMessage::ClearFaults(_) => {
+                assert!(self.version < 2, "it clears what nobody has seen");
                 self.faults = self.lasting;
                 self.activity = Activity::Idle;
                 Frame::new(

@@ -236,3 +236,36 @@ fn a_fault_that_lasts_is_told() {
     );
     assert_eq!(bench.device.scans, 1);
 }
+
+#[test]
+fn a_fault_that_comes_up_before_the_clearing_is_seen_first() {
+    let mut bench = Bench::ready(Device::new());
+    let now = bench.now;
+    bench.device.strike(Faults::TABLE_STALL, now);
+    // Between the refusal, which tells of the table alone, and the clearing.
+    bench.device.before_clearing = Faults::INTERLOCK;
+    assert_eq!(
+        bench.run(Command::Home),
+        Err(ScannerError::Fault(Faults::INTERLOCK))
+    );
+    assert_eq!(bench.device.faults, Faults::INTERLOCK);
+    assert_eq!(bench.device.homings, 0);
+    // Told of it, whoever homes again has seen it.
+    assert_eq!(bench.run(Command::Home), Ok(Answer::Done));
+    assert_eq!(bench.device.faults, Faults::NONE);
+}
+
+#[test]
+fn a_device_of_version_1_has_its_faults_cleared_as_ever() {
+    let mut device = Device::new();
+    device.version = 1;
+    let mut bench = Bench::ready(device);
+    let now = bench.now;
+    bench.device.strike(Faults::TABLE_STALL, now);
+    assert_eq!(bench.run(Command::Home), Ok(Answer::Done));
+    let now = bench.now;
+    bench.device.strike(Faults::LIMIT_SWITCH, now);
+    let named = Command::ClearFaults(Faults::LIMIT_SWITCH);
+    assert_eq!(bench.run(named), Ok(Answer::Done));
+    assert_eq!(bench.device.faults, Faults::NONE);
+}

@@ -89,7 +89,7 @@ fn another_version_is_named() {
             device_min: 9,
             device_max: 9,
             host_min: 1,
-            host_max: 1
+            host_max: 2
         })
     );
 }
@@ -211,5 +211,8 @@ fn a_fault_ends_a_homing_and_can_be_cleared() {
         bench.outcome(homing),
         Some(Err(ScannerError::Fault(Faults::TABLE_STALL)))
     );
-    assert_eq!(bench.run(Command::ClearFaults), Ok(Answer::Done));
+    assert_eq!(
+        bench.run(Command::ClearFaults(Faults::TABLE_STALL)),
+        Ok(Answer::Done)
+    );
 }

@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use scanner_driver::protocol::Faults;
+use scanner_driver::protocol::commands::Scan;
+use scanner_driver::protocol::{Faults, Frame};
 use scanner_driver::session::{Answer, Command};
 use scanner_driver::{LinkSettings, ScannerError};
 
@@ -201,4 +202,23 @@ fn closing_a_scan_early_turns_the_laser_off() {
     assert!(!bench.device.laser_on && !bench.device.has_scan());
     assert_eq!(bench.over, None);
     assert_eq!(bench.device.faults, Faults::NONE);
+}
+
+#[test]
+fn a_scan_that_a_late_request_began_and_ended_is_closed() {
+    let mut bench = Bench::ready(Device::homed());
+    assert_eq!(bench.scan(3), Ok(()));
+    bench.run_until("close", |bench| !bench.device.has_scan());
+    // The line brings another request of old; all its columns are sent before anybody looks.
+    let late = Scan {
+        scan_id: 4_321,
+        credits: 16,
+        plan: plan(3),
+    };
+    let now = bench.now;
+    bench.device.receive(Frame::new(999, &late).as_bytes(), now);
+    bench.run_until("end", |bench| !bench.device.is_measuring());
+    assert!(bench.device.has_scan());
+    bench.run_until("close", |bench| !bench.device.has_scan());
+    assert_eq!(bench.columns.len(), 3, "nobody has asked for those");
 }

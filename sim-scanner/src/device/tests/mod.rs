@@ -8,10 +8,10 @@ mod scans;
 use core::time::Duration;
 
 use scanner_protocol::commands::{
-    Abort, ClearFaults, CloseScan, GetLimits, Grant, Heartbeat, Hello, Home, Identify, Missing,
-    Move, Resend, Scan as ScanRequest, SetLaser,
+    Abort, ClearFaults, ClearNamed, CloseScan, GetLimits, Grant, Heartbeat, Hello, Home, Identify,
+    Missing, Move, Resend, Scan as ScanRequest, SetLaser,
 };
-use scanner_protocol::{ColumnFragment, Decoder, DeviceMessage, ScanEnd, ScanPlan};
+use scanner_protocol::{ColumnFragment, Decoder, DeviceMessage, MAX_VERSION, ScanEnd, ScanPlan};
 
 use super::*;
 use crate::endpoint::memory::MemoryLink;

@@ -163,3 +163,77 @@ fn a_reset_forgets_session_place_and_scan() {
     assert!(!status.homed && !status.laser_on);
     assert_ne!(status.boot_id, before);
 }
+
+#[test]
+fn a_fault_that_is_not_named_is_not_cleared() {
+    let mut host = Host::ready();
+    let now = host.link.now();
+    for faults in [Faults::TABLE_STALL, Faults::INTERLOCK] {
+        host.link.device().raise_faults(faults, now);
+        host.link.device().mend(faults);
+    }
+    let named = ClearNamed {
+        faults: Faults::TABLE_STALL | Faults::LASER,
+    };
+    let DeviceMessage::NamedCleared(cleared) = host.ask(&named) else {
+        panic!("faults are cleared")
+    };
+    assert_eq!(cleared.remaining, Faults::INTERLOCK);
+    assert_eq!(host.refusal(&Home {}), RejectReason::Faulted);
+    // One whose cause is there still stays, named or not.
+    host.link.device().raise_faults(Faults::INTERLOCK, now);
+    let faults = Faults::INTERLOCK;
+    let DeviceMessage::NamedCleared(cleared) = host.ask(&ClearNamed { faults }) else {
+        panic!("faults are cleared")
+    };
+    assert_eq!(cleared.remaining, Faults::INTERLOCK);
+    host.link.device().mend(Faults::INTERLOCK);
+    host.ask(&ClearNamed { faults });
+    assert_eq!(host.status().faults, Faults::NONE);
+}
+
+#[test]
+fn a_device_of_version_1_clears_all_and_knows_no_names() {
+    let mut host = Host::switched_on(DeviceSettings {
+        max_version: 1,
+        ..DeviceSettings::default()
+    });
+    let DeviceMessage::HelloReply(reply) = host.greet(2000) else {
+        panic!("a session")
+    };
+    assert_eq!(reply.version, 1);
+    let now = host.link.now();
+    host.link.device().raise_faults(Faults::TABLE_STALL, now);
+    host.link.device().mend(Faults::TABLE_STALL);
+    let named = ClearNamed {
+        faults: Faults::TABLE_STALL,
+    };
+    assert_eq!(host.refusal(&named), RejectReason::UnknownCommand);
+    host.ask(&ClearFaults {});
+    assert_eq!(host.status().faults, Faults::NONE);
+}
+
+#[test]
+fn a_request_that_the_line_brings_late_lights_no_laser() {
+    let mut host = Host::ready();
+    host.scan(64);
+    let scan_tag = host.tag;
+    host.ask(&CloseScan { scan_id: 9 });
+    let plan = host.plan();
+    let again = Frame::new(
+        scan_tag,
+        &ScanRequest {
+            scan_id: 9,
+            credits: 64,
+            plan,
+        },
+    );
+    host.told();
+    let log = host.link.device().events().len();
+    host.link.send(again.as_bytes());
+    host.link.pass(SECOND);
+    assert_eq!(host.told(), [], "nobody waits for an answer");
+    assert_eq!(host.link.device().events().len(), log);
+    // What comes next is heard.
+    assert!(matches!(host.ask(&Home {}), DeviceMessage::HomeStarted(_)));
+}

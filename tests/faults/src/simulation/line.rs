@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use sim_scanner::fault::Strikes;
 use sim_scanner::line::{BadLine, Direction, LineFaults};
 
 /// How long bytes are under way.
@@ -53,6 +54,13 @@ impl Line {
 
     pub(super) fn due_for_device(&self) -> Option<Duration> {
         self.to_device.due()
+    }
+
+    /// How often which fault has struck, either way.
+    pub(super) fn strikes(&self) -> Strikes {
+        let mut strikes = self.to_host.line.strikes();
+        strikes.add(&self.to_device.line.strikes());
+        strikes
     }
 
     /// The cable is out: all that is under way is lost.

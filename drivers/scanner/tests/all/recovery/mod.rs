@@ -47,6 +47,19 @@ fn a_computer_that_was_suspended_for_long_asks_a_person_first() {
 }
 
 #[test]
+fn columns_that_a_sleeping_computer_finds_in_its_buffers_are_no_news() {
+    let mut rig = Rig::new();
+    rig.run_until("columns", |rig| rig.columns > 20);
+    let before = rig.columns;
+    rig.sleep_while_the_line_keeps(60 * MINUTE);
+    rig.step();
+    assert!(rig.columns > before, "the line kept none");
+    rig.stays_dark();
+    rig.resume();
+    rig.run_to_its_end();
+}
+
+#[test]
 fn after_ten_attempts_a_person_is_asked() {
     let mut rig = Rig::new();
     rig.mishap = Mishap::StallsAlways;

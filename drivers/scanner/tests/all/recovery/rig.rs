@@ -102,7 +102,7 @@ impl Rig {
         }
     }
 
-    fn step(&mut self) {
+    pub(super) fn step(&mut self) {
         self.now += STEP;
         self.host();
         self.device_alone();
@@ -203,6 +203,21 @@ impl Rig {
         while self.now < until {
             self.now += STEP;
             self.device.poll(self.now);
+        }
+    }
+
+    /// The same, but what the device says is kept on the line until the computer wakes.
+    pub(super) fn sleep_while_the_line_keeps(&mut self, time: Duration) {
+        let until = self.now + time;
+        let mut kept = Vec::new();
+        while self.now < until {
+            self.now += STEP;
+            for frame in self.device.poll(self.now) {
+                kept.extend_from_slice(frame.as_bytes());
+            }
+        }
+        if let Some(session) = &mut self.session {
+            session.receive(&kept, self.now);
         }
     }
 
