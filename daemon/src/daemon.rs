@@ -195,8 +195,6 @@ impl Daemon {
         service.recover_jobs().map_err(StartError::Recover)?;
         service.sweep();
         service.measure_free();
-        let taken_up = service.take_up_scans(cut_short);
-        taken_up.map_err(StartError::Recover)?;
 
         let stop = CancellationToken::new();
         let context = Context {
@@ -214,6 +212,8 @@ impl Daemon {
             listen: offered.listen,
         };
         daemon.start_threads(workers).map_err(StartError::Thread)?;
+        // Nothing can fail any more that would end the service, and nobody can ask for a scan yet.
+        daemon.service.take_up_scans(cut_short);
         daemon.serve(offered.unix, on_socket(&context), limits);
         if let Some(tcp) = offered.tcp {
             daemon.serve(tcp, on_loopback(&context), limits);

@@ -120,6 +120,7 @@ impl Service {
             }
             self.keep_ended(&mut scan)?;
         }
+        self.forget_presences(&cut_short);
         Ok(cut_short)
     }
 

@@ -61,7 +61,7 @@ impl Service {
             removed_at: None,
             put_back_at: None,
         };
-        let abort = Arc::new(AbortRequest::default());
+        let abort = Arc::new(AbortRequest::none(self.presence(&scan.id)));
         let ticket = Ticket {
             station: Arc::clone(&station),
             scan: scan.clone(),
@@ -105,9 +105,7 @@ impl Service {
         let mut preview = preview(station.name(), &identity, &plan, &processing);
         let refused = self.check_running().and_then(|()| {
             station.refuse_if_busy()?;
-            // The room is given back at once.
-            let room = self.promise_room("preview", plan.plan.columns, plan.plan.samples);
-            room.map(drop)
+            self.look_for_room(plan.plan.columns, plan.plan.samples)
         });
         preview.refused = refused.err().map(|error| error.to_string());
         Ok(preview)
@@ -253,6 +251,7 @@ impl Service {
         let scan = station.update_active(|scan| {
             scan.state = state;
             scan.reason = reason;
+            scan.needs_person = false;
             scan.ended_at = Some(now());
         });
         let Some(mut scan) = scan.filter(|scan| scan.id == id) else {

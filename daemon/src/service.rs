@@ -9,6 +9,7 @@ use regrid::RegridSettings;
 use relief_api::{LaserEntry, Scan, ScannerList, Status};
 use storage::Disk;
 
+use crate::acquisition::presence::Presence;
 use crate::config::{Config, Reloaded};
 use crate::error::ServiceError;
 use crate::events::Hub;
@@ -189,6 +190,16 @@ impl Service {
     /// Where a scan's range image is put aside.
     pub(crate) fn grid_path(&self, scan: &str) -> PathBuf {
         self.scans_dir.join(format!("{scan}.grid"))
+    }
+
+    /// Where it stands that a scan goes on by itself.
+    pub(crate) fn presence_path(&self, scan: &str) -> PathBuf {
+        self.scans_dir.join(format!("{scan}.presence"))
+    }
+
+    /// That a scan goes on by itself.
+    pub(crate) fn presence(&self, scan: &str) -> Presence {
+        Presence::new(self.presence_path(scan))
     }
 
     /// The range image on disk is whole and made with these settings.

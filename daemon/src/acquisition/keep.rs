@@ -126,12 +126,19 @@ impl<'a> Keeper<'a> {
                     self.commit(&mut batch, acknowledge)?;
                     tracing::warn!(scan = self.id, %reason, "scan paused");
                     self.station.laser.scan_paused(&reason);
+                    if needs_person {
+                        self.abort.presence.withdraw();
+                    } else {
+                        // Somebody has been asked, and has said that it may go on.
+                        self.abort.presence.restore();
+                    }
                     self.note_pause(Some(reason), needs_person);
                 }
                 Ok(Fed::Resumed) => {
                     self.commit(&mut batch, acknowledge)?;
                     tracing::info!(scan = self.id, "scan goes on");
                     self.station.laser.scan_goes_on();
+                    self.abort.presence.restore();
                     self.note_pause(None, false);
                     // Of a scan that was taken up nobody has asked yet; the scanner has said it.
                     if self.station.status().model.is_none()
@@ -189,6 +196,7 @@ impl<'a> Keeper<'a> {
             return Ok(());
         }
         self.journal.sync().map_err(|e| e.to_string())?;
+        self.abort.presence.beat();
         for column in batch.iter() {
             acknowledge(column.index);
         }

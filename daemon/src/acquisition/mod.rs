@@ -7,6 +7,7 @@ mod heading;
 mod keep;
 mod live;
 mod plan;
+pub(crate) mod presence;
 mod preview;
 mod run;
 mod taken_up;
@@ -19,6 +20,7 @@ use range_image::{Calibration, calibration::Head};
 
 pub use plan::PlanError;
 pub(crate) use plan::resolve;
+use presence::Presence;
 pub(crate) use preview::preview;
 pub(crate) use run::{Task, Ticket, not_taken_up, run};
 pub(crate) use taken_up::{Rest, TakeUp};
@@ -53,12 +55,22 @@ pub(crate) fn calibration(wire: &scanner_protocol::Calibration) -> Calibration {
 }
 
 /// A request to end a scan early, and by whom.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct AbortRequest {
     reason: Mutex<Option<String>>,
+    /// Whether another start of the service may go on with the scan by itself.
+    pub(crate) presence: Presence,
 }
 
 impl AbortRequest {
+    /// None so far, of a scan with this presence.
+    pub(crate) fn none(presence: Presence) -> Self {
+        Self {
+            reason: Mutex::default(),
+            presence,
+        }
+    }
+
     /// Asks for the end; the first reason stays.
     pub(crate) fn ask(&self, reason: &str) {
         self.reason

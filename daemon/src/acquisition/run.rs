@@ -104,10 +104,11 @@ pub(crate) fn run(service: &Arc<Service>, ticket: Ticket) {
             tracing::warn!(scan = %id, state = state.as_str(), %reason, "scan ended early")
         }
     }
-    if state == ScanState::Interrupted {
-        // Its journal has no end, and keeps what was set aside for the rest.
+    if state != ScanState::Complete {
+        // Where its journal has got no end, it keeps what was set aside for the rest.
         service.give_back_room(&id);
     }
+    ticket.abort.presence.end();
     // What it did not take is free for the next scan, which may begin once this one has ended.
     drop(ticket.room);
     service.end_scan(&station, &id, state, reason);
@@ -165,6 +166,7 @@ fn take_all(
     // Once more: an abort that came just before the start found nothing to stop. Dropping
     // the stream turns the laser off.
     check_abort()?;
+    ticket.abort.presence.beat();
     let info = stream.info();
     tracing::info!(
         scan = %ticket.scan.id,

@@ -9,13 +9,14 @@ use scan_record::{EndCause, JournalReader, JournalWriter, RawColumn, most_bytes}
 use super::heading::interrupted;
 use super::keep::Keeper;
 use super::live::Live;
+use super::presence::since_boot;
 use super::run::{Failure, Ticket};
 use crate::liveness::Pulse;
 use crate::service::Service;
 
-/// Columns that may be behind the last sound record of a journal whose writing was cut short:
-/// more than are written between two syncs.
-const UNSYNCED_COLUMNS: u32 = 256;
+/// Columns that may be behind the last sound record of a journal whose writing was cut short: as
+/// many as may be written between two syncs.
+const UNSYNCED_COLUMNS: u32 = 1_024;
 
 /// What the journal of a scan that was cut short says about the rest.
 #[derive(Debug, Clone)]
@@ -39,7 +40,7 @@ impl Rest {
             .ok_or("its journal has not been read to its end")?;
         let bytes = std::fs::metadata(path).map_err(|e| e.to_string())?.len();
         let behind = bytes.saturating_sub(continuation.at_byte());
-        // Columns that were acknowledged are not cut off, even if they can no longer be read.
+        // A torn end is cut off, and what was in it measured again. More than that is no torn end.
         if behind > most_bytes(UNSYNCED_COLUMNS, plan.samples.into()) {
             return Err(format!(
                 "its journal is damaged long before its end, {behind} bytes of it"
@@ -55,10 +56,12 @@ impl Rest {
 /// How a scan is taken up.
 #[derive(Debug)]
 pub(crate) struct TakeUp {
-    /// How long, at most, nothing has been measured.
-    pub(crate) silent: Duration,
+    /// When it was last seen to go on by itself, by [`since_boot`], if nobody has to be asked.
+    pub(crate) seen: Option<Duration>,
     /// Why a person has to say that it may go on, however short the silence.
     pub(crate) waits_for: Option<String>,
+    /// With a live range image: not if that may be what ends the service.
+    pub(crate) live: bool,
 }
 
 /// Takes the rest of the scan.
@@ -78,10 +81,9 @@ pub(super) fn take_up(
     let mut live = Live::new(service, id, &ticket.processing, &header, &plan);
     while let Some(column) = reader.next_column().map_err(|error| not(&error))? {
         pulse.beat();
-        if let Some(reason) = ticket.abort.reason() {
-            return Err(Failure::from(reason));
+        if how.live && ticket.abort.reason().is_none() {
+            live.push(column.calibrated(&header.calibration));
         }
-        live.push(column.calibrated(&header.calibration));
         scan.add(measured(column)).map_err(|error| not(&error))?;
     }
     let continuation = reader
@@ -90,6 +92,10 @@ pub(super) fn take_up(
     drop(reader);
     let journal = JournalWriter::continue_on(&*service.disk, &path, continuation);
     let mut journal = journal.map_err(|error| not(&error))?;
+    let abort = || ticket.abort.reason();
+    if let Some(reason) = abort() {
+        return aborted(journal, live, reason);
+    }
     if scan.is_whole() {
         journal
             .finish(&EndCause::Complete)
@@ -110,12 +116,29 @@ pub(super) fn take_up(
         waits_for = how.waits_for,
         "a scan is taken up that was cut short when the service last ended"
     );
-    scan.silent = how.silent;
+    scan.silent = how
+        .seen
+        .map_or(Duration::MAX, |seen| since_boot().saturating_sub(seen));
     scan.waits_for.clone_from(&how.waits_for);
     let scanner = &ticket.station.scanner;
     let stream = scanner.take_up_scan(scan).map_err(|error| not(&error))?;
+    // An abort that came before there was a stream has found nothing to stop; one that comes from
+    // now on stops the scanner. Dropped, the stream turns the laser off.
+    if let Some(reason) = abort() {
+        drop(stream);
+        return aborted(journal, live, reason);
+    }
     let keeper = Keeper::new(service, ticket, &header, journal, live);
     Ok(keeper.keep_all(stream, pulse)?)
+}
+
+/// Ends a scan that nobody wants any more, before it has gone on.
+fn aborted(journal: JournalWriter, live: Live<'_>, reason: String) -> Result<(), Failure> {
+    live.finish(false);
+    match journal.finish(&EndCause::Aborted(reason.clone())) {
+        Ok(_) => Err(Failure::from(reason)),
+        Err(error) => Err(Failure::from(error.to_string())),
+    }
 }
 
 /// The journal's column as the driver gave it.

@@ -1,21 +1,27 @@
 //! Scans that the service was in when it last ended, and that can be gone on with.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use jiff::Timestamp;
 use relief_api::{Interruption, Scan, ScanState};
 use scanner_driver::ScannerError;
 
 use super::Found;
+use crate::acquisition::presence::last_seen;
 use crate::acquisition::{AbortRequest, Rest, TakeUp, Task, Ticket, not_taken_up, run};
 use crate::error::ServiceError;
 use crate::ids::{at, now};
-use crate::service::Service;
+use crate::service::{Service, lock, remove_if_there};
 
 /// After so many ends of the service in a row without a new column a person is asked: the scan
 /// itself may be what ends it.
 const MOST_IN_A_ROW: u32 = 3;
+
+/// After so many it is left alone.
+const FAR_TOO_MANY: u32 = 10;
+
+/// What a person is told to do.
+const ASKED: &str = "; see to it, then let the scan go on with `relief resume`";
 
 /// A scan that the service was in when it last ended, and that can be gone on with.
 #[derive(Debug)]
@@ -39,27 +45,35 @@ impl Service {
             return Err(format!("[{}] resume is false", station.section()));
         }
         let last = scan.interruption.as_ref();
-        let last = last.filter(|last| last.columns == found.columns);
-        // The journal was last written when its last column came, but for what taking it up
-        // does to it.
-        let since = last
-            .and_then(|last| last.since.parse().ok())
-            .or_else(|| self.journal_written(&scan.id))
-            .unwrap_or(Timestamp::UNIX_EPOCH);
+        // Fewer are there if the computer lost its power before those of another start were safe.
+        let last = last.filter(|last| last.columns >= found.columns);
         let times = last.map_or(0, |last| last.times) + 1;
+        if times > FAR_TOO_MANY {
+            return Err(format!(
+                "the service has ended {times} times in a row at this column"
+            ));
+        }
+        let since = last
+            .map(|last| last.since.clone())
+            .or_else(|| self.journal_written(&scan.id).map(at))
+            .unwrap_or_else(now);
+        let seen = last_seen(&self.presence_path(&scan.id));
         let mut scan = scan.clone();
         let waits_for = if scan.needs_person {
             scan.reason.take()
+        } else if times >= MOST_IN_A_ROW {
+            Some(format!(
+                "the service has ended {times} times in a row at this column{ASKED}"
+            ))
+        } else if seen.is_none() {
+            Some(format!(
+                "the computer was started anew, or somebody wanted the scan to end{ASKED}"
+            ))
         } else {
-            (times > MOST_IN_A_ROW).then(|| {
-                format!(
-                    "the service has ended {times} times in a row at this column; see to it, then \
-                     let the scan go on with `relief resume`"
-                )
-            })
+            None
         };
         scan.interruption = Some(Interruption {
-            since: at(since),
+            since,
             columns: found.columns,
             times,
         });
@@ -70,24 +84,20 @@ impl Service {
         scan.reason = Some(ScannerError::ProgramEnded { before }.to_string());
         scan.columns = found.columns;
         scan.columns_planned = rest.columns;
-        let silent = Timestamp::now().duration_since(since);
         Ok(CutShort {
             scan,
             rest,
             how: TakeUp {
-                // A clock that was put back says nothing about how long it has been.
-                silent: silent.try_into().unwrap_or(Duration::MAX),
+                seen,
                 waits_for,
+                live: times < MOST_IN_A_ROW,
             },
         })
     }
 
     /// Goes on with scans that were cut short. One that cannot be gone on with after all stays
     /// as it is, with all columns that are kept.
-    pub(crate) fn take_up_scans(
-        self: &Arc<Self>,
-        scans: Vec<CutShort>,
-    ) -> Result<(), ServiceError> {
+    pub(crate) fn take_up_scans(self: &Arc<Self>, scans: Vec<CutShort>) {
         for CutShort { scan, rest, how } in scans {
             let mut left = scan.clone();
             if let Err(error) = self.take_up_scan(scan, &rest, how) {
@@ -97,10 +107,13 @@ impl Service {
                 left.needs_person = false;
                 left.ended_at = Some(now());
                 self.give_back_room(&left.id);
-                self.keep_ended(&mut left)?;
+                self.presence(&left.id).end();
+                if let Err(error) = self.keep_ended(&mut left) {
+                    tracing::error!(scan = %left.id, %error, "cannot keep the record of a scan now");
+                    lock(&self.unkept).push(left);
+                }
             }
         }
-        Ok(())
     }
 
     fn take_up_scan(
@@ -113,7 +126,7 @@ impl Service {
         let processing = self.config().processing().with_overrides(&scan.settings)?;
         let reservation = station.reserve()?;
         let room = self.promise_room(&scan.id, rest.columns, rest.samples)?;
-        let abort = Arc::new(AbortRequest::default());
+        let abort = Arc::new(AbortRequest::none(self.presence(&scan.id)));
         let ticket = Ticket {
             station: Arc::clone(&station),
             scan: scan.clone(),
@@ -131,6 +144,22 @@ impl Service {
                 .spawn(move || run(&service, ticket))
                 .map_err(ServiceError::Thread)
         })
+    }
+
+    /// Of other scans nobody will ask.
+    pub(super) fn forget_presences(&self, cut_short: &[CutShort]) {
+        for entry in std::fs::read_dir(self.scans_dir())
+            .into_iter()
+            .flatten()
+            .flatten()
+        {
+            let path = entry.path();
+            let is_wanted = |cut: &CutShort| path == self.presence_path(&cut.scan.id);
+            if path.extension().is_some_and(|e| e == "presence") && !cut_short.iter().any(is_wanted)
+            {
+                remove_if_there(&path);
+            }
+        }
     }
 
     /// When the scan's journal was last written, as far as the disk says so.

@@ -66,35 +66,13 @@ impl Service {
         columns: u32,
         samples: u16,
     ) -> Result<Promise, ServiceError> {
-        let reserve_bytes = self.config().storage.reserve_bytes();
         let journal_bytes = scan_record::most_bytes(columns, samples.into());
         // Of a scan that is gone on with, some of it is there.
         let missing_bytes = journal_bytes.saturating_sub(taken_bytes(&self.journal_path(scan)));
-        let look = |promised_bytes| {
-            let folders = [
-                (self.scans_dir(), missing_bytes, promised_bytes),
-                (self.spool.root(), 0, 0),
-            ];
-            let mut folders = folders.into_iter();
-            folders.try_for_each(|(folder, scan_bytes, promised_bytes)| {
-                let needed = scan_bytes
-                    .saturating_add(promised_bytes)
-                    .saturating_add(reserve_bytes);
-                match self.disk.free_bytes(folder) {
-                    Ok(Some(free_bytes)) if free_bytes < needed => Err(ServiceError::NoRoom {
-                        folder: folder.display().to_string(),
-                        scan_bytes,
-                        reserve_bytes,
-                        free_bytes,
-                        promised_bytes,
-                    }),
-                    Ok(_) => Ok(()),
-                    Err(source) => Err(ServiceError::Io {
-                        what: format!("the free space of {}", folder.display()),
-                        source,
-                    }),
-                }
-            })
+        let look = |promised_bytes| match missing_bytes {
+            // All of it is set aside already.
+            0 => Ok(()),
+            missing_bytes => self.refuse_without_room(missing_bytes, promised_bytes),
         };
         let make = || {
             let journal = self.journal_path(scan);
@@ -106,6 +84,46 @@ impl Service {
         });
         self.measure_free();
         promise
+    }
+
+    /// Refuses a scan of so many columns for which there is no room at this moment; promises
+    /// none, and makes none.
+    pub(crate) fn look_for_room(&self, columns: u32, samples: u16) -> Result<(), ServiceError> {
+        let journal_bytes = scan_record::most_bytes(columns, samples.into());
+        self.refuse_without_room(journal_bytes, self.promises.outstanding())
+    }
+
+    /// Refuses where a scan that needs so much finds no room beside what was promised.
+    fn refuse_without_room(
+        &self,
+        scan_bytes: u64,
+        promised_bytes: u64,
+    ) -> Result<(), ServiceError> {
+        let reserve_bytes = self.config().storage.reserve_bytes();
+        let folders = [
+            (self.scans_dir(), scan_bytes, promised_bytes),
+            (self.spool.root(), 0, 0),
+        ];
+        let mut folders = folders.into_iter();
+        folders.try_for_each(|(folder, scan_bytes, promised_bytes)| {
+            let needed = scan_bytes
+                .saturating_add(promised_bytes)
+                .saturating_add(reserve_bytes);
+            match self.disk.free_bytes(folder) {
+                Ok(Some(free_bytes)) if free_bytes < needed => Err(ServiceError::NoRoom {
+                    folder: folder.display().to_string(),
+                    scan_bytes,
+                    reserve_bytes,
+                    free_bytes,
+                    promised_bytes,
+                }),
+                Ok(_) => Ok(()),
+                Err(source) => Err(ServiceError::Io {
+                    what: format!("the free space of {}", folder.display()),
+                    source,
+                }),
+            }
+        })
     }
 
     /// True when so little room is left that what can be done without is done without.

@@ -32,6 +32,11 @@ impl Drop for Promise {
 }
 
 impl Promises {
+    /// Bytes that scans under way may still take.
+    pub(crate) fn outstanding(&self) -> u64 {
+        outstanding(&lock(&self.0))
+    }
+
     /// Makes a promise, unless `check` refuses it; it is given the bytes that earlier ones may
     /// still take. One at a time, so that no two are given the same room; so `check` must not
     /// wait for anything whose holder may just let go of a promise, as a scan's slot.
@@ -42,16 +47,20 @@ impl Promises {
         check: impl FnOnce(u64) -> Result<(), ServiceError>,
     ) -> Result<Promise, ServiceError> {
         let mut promises = lock(&self.0);
-        let outstanding = promises
-            .iter()
-            .map(|(journal, bytes)| bytes.saturating_sub(taken_bytes(journal)));
-        check(outstanding.fold(0, u64::saturating_add))?;
+        check(outstanding(&promises))?;
         promises.push((journal.clone(), bytes));
         Ok(Promise {
             all: Arc::clone(self),
             journal,
         })
     }
+}
+
+fn outstanding(promises: &[(PathBuf, u64)]) -> u64 {
+    promises
+        .iter()
+        .map(|(journal, bytes)| bytes.saturating_sub(taken_bytes(journal)))
+        .fold(0, u64::saturating_add)
 }
 
 /// Bytes that a journal has taken of its disk, those set aside included.
@@ -63,16 +72,6 @@ pub(super) fn taken_bytes(journal: &Path) -> u64 {
 mod tests {
     use super::*;
 
-    fn promised(promises: &Arc<Promises>) -> u64 {
-        let mut found = 0;
-        let probe = promises.make("probe".into(), 0, |outstanding| {
-            found = outstanding;
-            Ok(())
-        });
-        drop(probe.unwrap());
-        found
-    }
-
     #[test]
     fn what_a_journal_has_taken_is_promised_no_more() {
         let folder = tempfile::tempdir().unwrap();
@@ -80,19 +79,19 @@ mod tests {
         let promises = Arc::new(Promises::default());
         let most = 10 << 20;
         let first = promises.make(journal.clone(), most, |_| Ok(())).unwrap();
-        assert_eq!(promised(&promises), most);
+        assert_eq!(promises.outstanding(), most);
         let second = promises.make("b".into(), 7, |before| {
             assert_eq!(before, most);
             Ok(())
         });
-        assert_eq!(promised(&promises), most + 7);
+        assert_eq!(promises.outstanding(), most + 7);
         drop(second);
         fs::write(&journal, vec![1; 1 << 20]).unwrap();
         fs::File::open(&journal).unwrap().sync_all().unwrap();
-        let left = promised(&promises);
+        let left = promises.outstanding();
         assert!(left <= most - (1 << 20) && left > 0, "{left}");
         drop(first);
-        assert_eq!(promised(&promises), 0);
+        assert_eq!(promises.outstanding(), 0);
     }
 
     #[test]
@@ -100,6 +99,6 @@ mod tests {
         let promises = Arc::new(Promises::default());
         let refused = promises.make("a".into(), 5, |_| Err(ServiceError::Stopping));
         assert!(refused.is_err());
-        assert_eq!(promised(&promises), 0);
+        assert_eq!(promises.outstanding(), 0);
     }
 }

@@ -210,6 +210,8 @@ impl Station {
         if let Err(error) = self.scanner.abort() {
             tracing::warn!(scanner = self.name, %error, "cannot tell the scanner to stop");
         }
+        // Before anybody is told, so that no other start of the service goes on with it.
+        abort.presence.end();
         Some(stopped)
     }
 

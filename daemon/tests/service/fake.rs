@@ -139,7 +139,7 @@ impl FakeScanner {
         *self.on_acknowledge.lock().unwrap() = Some(Box::new(hook));
     }
 
-    /// Called once, when the next scan is about to start.
+    /// Called once, when the next scan is about to start or to go on.
     pub(crate) fn on_start(&self, hook: impl Fn() + Send + 'static) {
         *self.on_start.lock().unwrap() = Some(Box::new(hook));
     }
@@ -325,6 +325,10 @@ impl Scanner for FakeScanner {
     }
 
     fn take_up_scan(&self, scan: InterruptedScan) -> Result<ScanStream, ScannerError> {
+        let hook = self.on_start.lock().unwrap().take();
+        if let Some(hook) = hook {
+            hook();
+        }
         self.change(|state| {
             state.homed = true;
             state.aborted = false;

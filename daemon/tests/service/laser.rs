@@ -283,14 +283,14 @@ async fn killed_in_any_way_the_service_leaves_the_laser_to_the_dead_man() {
         let client = up(&at).await;
         known_as(&client, LaserState::On).await;
         let logged = running.logged();
-        let [.., dead, taken_up, on] = logged.as_slice() else {
+        let unknown: Vec<&LaserEntry> = logged
+            .iter()
+            .filter(|entry| entry.laser == LaserState::Unknown)
+            .collect();
+        // In between the scanner may have been asked.
+        let ([.., dead, taken_up], Some(on)) = (unknown.as_slice(), logged.last()) else {
             panic!("{logged:?}");
         };
-        use LaserState::{On, Unknown};
-        assert_eq!(
-            (dead.laser, taken_up.laser, on.laser),
-            (Unknown, Unknown, On)
-        );
         assert!(dead.cause.contains("dead-man"), "{dead:?}");
         assert!(taken_up.cause.contains("taken up"), "{taken_up:?}");
         assert!(on.scan.is_some() && on.scan == taken_up.scan, "{logged:?}");

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 use relief_api::{Event, Job, JobId, JobState, Scan, ScanState, StartScan, path};
 use reliefd::config::NamedScanner;
@@ -129,6 +130,17 @@ pub(crate) async fn ended(events: &mut Events, id: &str) -> Scan {
         _ => None,
     };
     events.until(find).await.1
+}
+
+/// The scan once its state is no longer `starting`.
+pub(crate) async fn settled(client: &Client, id: &str) -> Scan {
+    loop {
+        let scan: Scan = client.get(&path::scan(id)).await;
+        if scan.state != ScanState::Starting {
+            return scan;
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
 }
 
 /// Waits for a job's end, which may be over already. The stream may still hold the end of

@@ -26,7 +26,7 @@ use scan_record::{JournalReader, RawColumn};
 
 use crate::client::Client;
 use crate::fake::FakeScanner;
-use crate::rig::{Rig, config, ended, job_over};
+use crate::rig::{Rig, config, ended, job_over, settled};
 use crate::webhooks::receiver::Receiver;
 use crate::webhooks::webhook;
 use dice::Dice;
@@ -315,6 +315,12 @@ async fn hold(
     let scans: relief_api::ScanList = rig.client.get(path::SCANS).await;
     // One that was cut short goes on.
     for scan in scans.scans.iter().filter(|scan| !scan.state.is_over()) {
+        // As after every failure of the power, once a person has said so.
+        let scan = settled(&rig.client, &scan.id).await;
+        if !scan.state.is_over() {
+            assert!(scan.needs_person, "{place}: {scan:?}");
+            let _: Scan = rig.client.post(&path::scan_resume(&scan.id), &()).await;
+        }
         ended(&mut events, &scan.id).await;
     }
     let scans: relief_api::ScanList = rig.client.get(path::SCANS).await;

@@ -69,9 +69,10 @@ pub struct Recovery {
     /// Columns below may have been measured before the computer slept: they may have waited in
     /// buffers, or be sent again.
     old_below: u32,
-    /// When the last column came that had just been measured, or else the scan was accepted:
-    /// for all that is known, nobody has seen the laser on since.
-    measured: Duration,
+    /// Until then the laser may come on again without a person's word: so long after the last
+    /// column came that had just been measured, or else after the scan was accepted, since for all
+    /// that is known nobody has seen the laser on since.
+    unattended_until: Duration,
     /// Every column below has been handed on.
     handed: u32,
     acknowledged: Acknowledged,
@@ -127,6 +128,8 @@ impl Recovery {
         info: ScanInfo,
         now: Duration,
     ) -> Self {
+        let unattended = settings.as_ref().map(|settings| settings.unattended);
+        let unattended_until = now + unattended.unwrap_or_default();
         Self {
             settings,
             source: ColumnSource::of(&identity),
@@ -136,7 +139,7 @@ impl Recovery {
             progress: VecDeque::new(),
             looked: now,
             old_below: 0,
-            measured: now,
+            unattended_until,
             handed: 0,
             acknowledged: Acknowledged::default(),
             kept: Kept::default(),
@@ -158,6 +161,7 @@ impl Recovery {
         }
         let unattended = settings.unattended;
         let needs_person = scan.waits_for.is_some() || scan.silent >= unattended;
+        let unattended_until = now + unattended.saturating_sub(scan.silent);
         let told = Pause {
             cause: ScannerError::ProgramEnded {
                 before: scan.waits_for,
@@ -178,14 +182,14 @@ impl Recovery {
             progress: VecDeque::from([Progress::Paused(told.clone())]),
             looked: now,
             old_below: 0,
-            measured: now,
+            unattended_until,
             handed: scan.columns,
             acknowledged: Acknowledged::all_below(scan.columns),
             kept,
             again: Vec::new(),
             pause: Some(Paused {
                 told,
-                unattended_until: now + unattended.saturating_sub(scan.silent),
+                unattended_until,
                 shown: Faults::NONE,
                 attended: Faults::NONE,
                 failures: 0,
@@ -227,6 +231,10 @@ impl Recovery {
         // The same trouble once more is news again.
         if std::mem::take(&mut pause.told.needs_person) {
             pause.attended = std::mem::replace(&mut pause.shown, Faults::NONE);
+            if let ScannerError::ProgramEnded { before } = &mut pause.told.cause {
+                // That has been seen to.
+                *before = None;
+            }
             self.progress
                 .push_back(Progress::Paused(pause.told.clone()));
         }
@@ -393,7 +401,7 @@ impl Recovery {
         }
         self.go_on();
         if column.index >= self.old_below {
-            self.measured = now;
+            self.unattended_until = now + self.unattended();
         }
         self.handed = column.index + 1;
         self.attempts = 0;
@@ -506,7 +514,7 @@ impl Recovery {
             needs_person,
             columns: self.handed,
         };
-        let unattended_until = self.measured + self.unattended();
+        let unattended_until = self.unattended_until;
         let pause = self.pause.get_or_insert_with(|| Paused {
             told: Pause {
                 columns: u32::MAX,

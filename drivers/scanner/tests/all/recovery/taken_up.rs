@@ -63,6 +63,14 @@ fn who_waited_for_a_person_before_waits_again() {
     rig.program_ends(MINUTE, Some(said));
     rig.run_for(MINUTE);
     assert_eq!(rig.last_told().to_string(), said);
+    rig.resume();
+    rig.step();
+    let told = rig.last_told().to_string();
+    assert!(
+        told.contains("by itself") && !told.contains("door"),
+        "{told}"
+    );
+    rig.program_ends(MINUTE, Some(said));
     rig.stays_dark();
     rig.resume();
     rig.run_to_its_end();
