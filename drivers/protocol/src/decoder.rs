@@ -1,6 +1,6 @@
 //! From bytes, as they trickle in, to packets.
 
-use crate::frame::{CRC_LEN, DELIMITER, HEADER_LEN, MAX_PAYLOAD, MAX_WIRE, crc32};
+use crate::frame::{CRC, CRC_LEN, DELIMITER, HEADER_LEN, MAX_PAYLOAD, MAX_WIRE, crc32};
 
 /// A frame whose checksum holds.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -11,6 +11,18 @@ pub struct Packet {
     pub tag: u16,
     /// The message's fields.
     pub payload: heapless::Vec<u8, MAX_PAYLOAD>,
+}
+
+impl Packet {
+    /// The checksum it came with.
+    #[must_use]
+    pub fn checksum(&self) -> u32 {
+        let mut digest = CRC.digest();
+        digest.update(&[self.kind]);
+        digest.update(&self.tag.to_le_bytes());
+        digest.update(&self.payload);
+        digest.finalize()
+    }
 }
 
 /// What a [`Decoder`] has seen since it was made.

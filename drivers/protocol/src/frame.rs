@@ -27,7 +27,7 @@ pub const MAX_PAYLOAD: usize = MAX_BODY - HEADER_LEN;
 /// The byte that stands between frames and nowhere else.
 pub(crate) const DELIMITER: u8 = 0;
 
-static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+pub(crate) static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// The checksum of a body: CRC-32 as in Ethernet and zip (`CRC-32/ISO-HDLC`).
 #[must_use]

@@ -1,12 +1,19 @@
-//! The device's memory of what it has answered, so that a retry is not carried out twice.
+//! The device's memory of what it has carried out, so that nothing is carried out twice.
 
+use heapless::Deque;
+
+use crate::commands::Home;
 use crate::decoder::Packet;
 use crate::frame::Frame;
+use crate::message::Message;
 
-/// The first version whose hosts number the requests of a session upwards.
-const ASCENDING_SINCE_VERSION: u8 = 2;
+/// Requests that are known again when they come late; see [`OnceOnly::is_late`].
+const KNOWN_REQUESTS: usize = 32;
 
-/// Remembers the last request and its reply.
+/// The first version in which late requests are passed over.
+const PASSES_OVER_SINCE_VERSION: u8 = 2;
+
+/// Remembers the last request and its reply, and which requests were before it.
 ///
 /// A host has one request open at a time and repeats it, byte for byte and with the same
 /// request id, until it is answered. A device that asks this memory first carries each
@@ -14,19 +21,17 @@ const ASCENDING_SINCE_VERSION: u8 = 2;
 #[derive(Debug, Clone, Default)]
 pub struct OnceOnly {
     last: Option<(Packet, Frame)>,
-    /// The id of the last request carried out, where ids ascend.
-    newest: Option<u16>,
+    /// Checksums of the requests carried out of late in this session.
+    known: Deque<u32, KNOWN_REQUESTS>,
+    passes_over: bool,
 }
 
 impl OnceOnly {
-    /// The memory at the start of a session that a greeting with this request id has opened, in
-    /// this version.
-    #[must_use]
-    pub fn opened(tag: u16, version: u8) -> Self {
-        Self {
-            last: None,
-            newest: (version >= ASCENDING_SINCE_VERSION).then_some(tag),
-        }
+    /// A session has been opened in this version: all is forgotten, since its host may number its
+    /// requests as an earlier one did.
+    pub fn opened(&mut self, version: u8) {
+        self.forget();
+        self.passes_over = version >= PASSES_OVER_SINCE_VERSION;
     }
 
     /// The reply given before, if this very request was the last one answered.
@@ -38,20 +43,22 @@ impl OnceOnly {
             .map(|(_, reply)| reply)
     }
 
-    /// Whether a request that is not the last one answered is from before it: a line with
-    /// buffers has brought it late, or once more, and nobody waits for it.
+    /// Whether a request that is not the last one answered has been carried out before: a line
+    /// with buffers has brought it once more, and nobody waits for it.
     #[must_use]
     pub fn is_late(&self, request: &Packet) -> bool {
-        self.newest.is_some_and(|newest| {
-            let ahead = request.tag.wrapping_sub(newest);
-            ahead == 0 || ahead > u16::MAX / 2
-        })
+        self.passes_over && self.known.iter().any(|known| *known == request.checksum())
     }
 
     /// Keeps the reply to a request that has been carried out.
     pub fn remember(&mut self, request: Packet, reply: Frame) {
-        if let Some(newest) = &mut self.newest {
-            *newest = request.tag;
+        // Those of lower kinds only ask.
+        if request.kind >= Home::KIND {
+            if self.known.is_full() {
+                self.known.pop_front();
+            }
+            // There is room now.
+            let _ = self.known.push_back(request.checksum());
         }
         self.last = Some((request, reply));
     }
@@ -66,29 +73,49 @@ impl OnceOnly {
 mod tests {
     use super::*;
     use crate::Decoder;
-    use crate::commands::{Home, HomeStarted};
+    use crate::commands::{HomeStarted, Identify};
 
-    fn request(tag: u16) -> Packet {
-        let frame = Frame::new(tag, &Home {});
+    fn packet<M: Message>(tag: u16, message: &M) -> Packet {
+        let frame = Frame::new(tag, message);
         Decoder::new().next(&mut frame.as_bytes()).expect("a frame")
     }
 
+    fn home(tag: u16) -> Packet {
+        packet(tag, &Home {})
+    }
+
+    /// As a device that is asked for this.
+    fn carry_out(once: &mut OnceOnly, tag: u16) {
+        assert!(!once.is_late(&home(tag)), "{tag}");
+        once.remember(home(tag), Frame::new(tag, &HomeStarted {}));
+    }
+
     #[test]
-    fn what_is_from_before_the_last_request_is_late_across_the_end_of_the_numbers() {
-        let mut once = OnceOnly::opened(u16::MAX - 1, 2);
-        assert!(once.is_late(&request(u16::MAX - 2)));
-        assert!(!once.is_late(&request(u16::MAX)));
-        once.remember(request(1), Frame::new(1, &HomeStarted {}));
-        for late in [u16::MAX - 1, u16::MAX, 0, 1] {
-            assert!(once.is_late(&request(late)), "{late}");
+    fn what_was_carried_out_before_is_known_again() {
+        let mut once = OnceOnly::default();
+        once.opened(2);
+        for tag in 0..40 {
+            carry_out(&mut once, tag);
         }
-        for new in [2, 3, 30_000] {
-            assert!(!once.is_late(&request(new)), "{new}");
-        }
-        assert!(once.recall(&request(1)).is_some());
-        // Nothing is said of the order in version 1.
-        let mut once = OnceOnly::opened(9, 1);
-        once.remember(request(10), Frame::new(10, &HomeStarted {}));
-        assert!(!once.is_late(&request(3)));
+        assert!(once.recall(&home(39)).is_some());
+        assert!(!once.is_late(&home(7)), "so much is not remembered");
+        assert!((8..40).all(|tag| once.is_late(&home(tag))));
+        // Another host begins to count where it likes.
+        once.opened(2);
+        assert!(once.recall(&home(39)).is_none());
+        carry_out(&mut once, 39);
+        carry_out(&mut once, 38);
+        // Nothing but an answer comes of a question.
+        once.remember(packet(9, &Identify {}), Frame::new(9, &HomeStarted {}));
+        assert!(!once.is_late(&packet(9, &Identify {})));
+    }
+
+    #[test]
+    fn in_version_1_nothing_is_passed_over() {
+        let mut once = OnceOnly::default();
+        once.opened(1);
+        carry_out(&mut once, 1);
+        carry_out(&mut once, 2);
+        assert!(!once.is_late(&home(1)));
     }
 }

@@ -73,6 +73,7 @@ fn every_example_is_what_the_encoder_makes() {
         let packet = only_packet(&frame);
         assert_eq!(read(&packet), *says);
         assert_eq!(hex(crc), crc32(&body).to_le_bytes(), "{says}");
+        assert_eq!(hex(crc), packet.checksum().to_le_bytes(), "{says}");
         assert_eq!(body[0], packet.kind, "{says}");
         let again = Frame::from_payload(packet.kind, packet.tag, &body[3..]);
         assert_eq!(again.as_bytes(), frame, "{says}");

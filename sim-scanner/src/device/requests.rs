@@ -8,8 +8,7 @@ use scanner_protocol::commands::{
     ScanContinued,
 };
 use scanner_protocol::{
-    Faults, Frame, HostMessage, MIN_VERSION, Message, OnceOnly, Packet, RejectReason,
-    ScanEndReason, text,
+    Faults, Frame, HostMessage, MIN_VERSION, Message, Packet, RejectReason, ScanEndReason, text,
 };
 
 use super::events::Event;
@@ -43,7 +42,7 @@ impl Device {
         if let Some(reply) = self.once.recall(&packet).cloned() {
             return self.send(&reply);
         }
-        // Whoever made it has had an answer to a later one.
+        // Whoever made it has asked for something else since.
         if self.once.is_late(&packet) {
             return;
         }
@@ -163,7 +162,7 @@ impl Device {
         self.halt(ScanEndReason::Closed, now);
         self.scan = None;
         self.version = newest.min(hello.max_version);
-        self.once = OnceOnly::opened(packet.tag, self.version);
+        self.once.opened(self.version);
         // What a silent host brought about is over once there is a new session. What needs a
         // person's eye stays until somebody has said so.
         self.faults = self
