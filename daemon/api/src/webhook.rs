@@ -89,7 +89,8 @@ pub struct WebhookData {
 pub struct Webhook {
     /// Its name.
     pub name: String,
-    /// Where messages are posted to, without its query.
+    /// Where messages are posted to: scheme, host and port, and `/...` for a path or query, which
+    /// may be secret.
     pub url: String,
     /// What it is told of.
     pub events: Vec<WebhookEvent>,
@@ -173,7 +174,8 @@ pub struct DeliveryAttempt {
     /// What went wrong, and what to do about it; nothing if it was taken.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// The beginning of what the receiver said to its refusal.
+    /// The beginning of what the receiver said to its refusal, with `...` for the path and query
+    /// of its url; nothing of a redirection.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub answer: Option<String>,
 }

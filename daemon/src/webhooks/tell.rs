@@ -1,5 +1,7 @@
 //! What webhooks are told: from what happens to messages, and to the answers of the API.
 
+use std::sync::{Mutex, MutexGuard, TryLockError};
+
 use deliverables::hexadecimal;
 use relief_api::{
     Delivery, DeliveryState, Event, Job, JobState, Scan, ScannerLink, Webhook, WebhookData,
@@ -8,7 +10,7 @@ use relief_api::{
 use sha2::{Digest, Sha256};
 
 use super::receiver::Verdict;
-use super::{Hook, Webhooks};
+use super::{Hook, Webhooks, shown_url};
 use crate::error::ServiceError;
 use crate::ids::now;
 use crate::service::{Service, lock};
@@ -49,9 +51,13 @@ fn message(
     }
 }
 
-/// The address as it is shown: a query may hold what is for the receiver alone.
-fn shown_url(url: &str) -> &str {
-    url.split('?').next().unwrap_or(url)
+/// Makes sure that only one at a time goes on. Whoever ended by a panic does not go on.
+fn alone(lock: &Mutex<()>) -> Option<MutexGuard<'_, ()>> {
+    match lock.try_lock() {
+        Ok(guard) => Some(guard),
+        Err(TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
+        Err(TryLockError::WouldBlock) => None,
+    }
 }
 
 impl Hook {
@@ -183,7 +189,7 @@ impl Service {
             let state = lock(&hook.state);
             list.push(Webhook {
                 name: hook.name.clone(),
-                url: shown_url(&config.url).to_owned(),
+                url: shown_url(&config.url),
                 events: config.events.clone(),
                 waiting: state.due.len(),
                 dropped: state.dropped,
@@ -203,7 +209,7 @@ impl Service {
     pub(crate) fn test_webhook(&self, name: &str) -> Result<Delivery, ServiceError> {
         self.check_running()?;
         let hook = self.webhooks.hook(name)?;
-        let Ok(_alone) = hook.testing.try_lock() else {
+        let Some(_alone) = alone(&hook.testing) else {
             return Err(ServiceError::WebhookBusy {
                 name: name.to_owned(),
             });
@@ -255,11 +261,22 @@ mod tests {
     }
 
     #[test]
-    fn a_query_is_not_shown() {
-        assert_eq!(
-            shown_url("https://a.example/b?key=c"),
-            "https://a.example/b"
-        );
-        assert_eq!(shown_url("https://a.example/b"), "https://a.example/b");
+    fn one_that_ended_by_a_panic_keeps_nobody_from_a_test() {
+        let lock = Mutex::new(());
+        let held = alone(&lock);
+        assert!(held.is_some() && alone(&lock).is_none());
+        drop(held);
+        std::thread::scope(|scope| {
+            let panicked = scope.spawn(|| {
+                let _held = alone(&lock);
+                std::panic::resume_unwind(Box::new("on purpose"));
+            });
+            assert!(panicked.join().is_err());
+        });
+        assert!(lock.is_poisoned());
+        for _ in 0..2 {
+            let held = alone(&lock);
+            assert!(held.is_some() && alone(&lock).is_none());
+        }
     }
 }
