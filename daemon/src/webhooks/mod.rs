@@ -272,7 +272,8 @@ impl Webhooks {
                 continue;
             };
             hook.change(|state| {
-                state.due.insert(added.number, Instant::now());
+                // One that was kept already may have to wait.
+                state.due.entry(added.number).or_insert_with(Instant::now);
                 for number in &added.dropped {
                     state.due.remove(number);
                     state.dropped += 1;
