@@ -58,7 +58,8 @@ pub struct WebhookMessage {
     /// What happened.
     #[serde(rename = "type")]
     pub event: WebhookEvent,
-    /// When, RFC 3339 in UTC.
+    /// When it happened, RFC 3339 in UTC: when the scan or job ended, when the pause or the
+    /// trouble was noted.
     pub timestamp: String,
     /// What it is about.
     pub data: WebhookData,
@@ -89,7 +90,8 @@ pub struct WebhookData {
 pub struct Webhook {
     /// Its name.
     pub name: String,
-    /// Where messages are posted to, without its query.
+    /// Where messages are posted to: scheme, host and port, and `/...` for a path or query, which
+    /// may be secret.
     pub url: String,
     /// What it is told of.
     pub events: Vec<WebhookEvent>,
@@ -140,7 +142,8 @@ impl DeliveryState {
 /// A message to a webhook, and what became of it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Delivery {
-    /// Its id, `webhook-id` of every attempt: whoever has got it twice sees it by that.
+    /// Its id, `webhook-id` of every attempt: whoever has got it twice sees it by that. It follows
+    /// from what it tells of, and when that happened.
     pub id: String,
     /// What it tells of.
     pub event: WebhookEvent,
@@ -149,7 +152,8 @@ pub struct Delivery {
     pub about: Option<String>,
     /// Where it stands.
     pub state: DeliveryState,
-    /// When it was made, RFC 3339 in UTC.
+    /// When it was made, RFC 3339 in UTC: later than what it tells of where the disk was in the
+    /// way.
     pub created_at: String,
     /// How often it was tried.
     pub attempts: u32,
@@ -173,7 +177,8 @@ pub struct DeliveryAttempt {
     /// What went wrong, and what to do about it; nothing if it was taken.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// The beginning of what the receiver said to its refusal.
+    /// The beginning of what the receiver said to its refusal, with `...` for the path and query
+    /// of its url; nothing of a redirection.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub answer: Option<String>,
 }

@@ -6,6 +6,8 @@ use axum::http::Uri;
 use relief_api::WebhookEvent;
 use serde::{Deserialize, Deserializer, de::Error};
 
+use crate::webhooks::shown_url;
+
 /// A whole number within bounds; the text names what is counted.
 fn bounded<'de, D: Deserializer<'de>>(
     deserializer: D,
@@ -62,12 +64,13 @@ pub(super) fn webhook_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result
     Ok(name)
 }
 
-/// Where to post to. Nothing in it is secret: it is shown to whoever may use the API.
+/// Where to post to. What is refused is told without what may be secret in it: others see the log.
 pub(super) fn webhook_url<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
     let text = String::deserialize(deserializer)?;
     let refused = |why: &str| {
         Err(D::Error::custom(format!(
-            "\"{text}\" {why}: a URL such as \"https://lab.example/relief\" is needed"
+            "{:?} {why}: a URL such as \"https://lab.example/relief\" is needed",
+            shown_url(&text)
         )))
     };
     let Ok(uri) = text.parse::<Uri>() else {
@@ -79,6 +82,12 @@ pub(super) fn webhook_url<'de, D: Deserializer<'de>>(deserializer: D) -> Result<
     match uri.authority() {
         Some(authority) if authority.as_str().contains('@') => {
             refused("holds a name or password, which the receiver is not told and others would see")
+        }
+        // Also what is meant to be a password, and ends too early to be one.
+        Some(authority)
+            if authority.port_u16().is_none() && authority.as_str() != authority.host() =>
+        {
+            refused("has no number for its port")
         }
         Some(authority) if !authority.host().is_empty() => Ok(text),
         _ => refused("names no host"),

@@ -43,7 +43,7 @@ pub(crate) struct Outgoing {
     pub(crate) message: Message,
 }
 
-/// A message that is kept.
+/// A message that is kept, from now on or since earlier.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Added {
     pub(crate) webhook: String,
@@ -55,6 +55,26 @@ pub(crate) struct Added {
 /// All keys of a webhook.
 fn all_of(webhook: &str) -> RangeInclusive<Key<'_>> {
     (webhook, 0)..=(webhook, u64::MAX)
+}
+
+/// Where a message is kept.
+enum Place {
+    /// Among those that wait, under this number.
+    Waits(u64),
+    /// In the log.
+    Logged,
+}
+
+/// As much of a message that waits as tells which one it is.
+#[derive(Deserialize)]
+struct Waits {
+    delivery: Known,
+}
+
+/// As much of an entry of the log.
+#[derive(Deserialize)]
+struct Known {
+    id: String,
 }
 
 type Rows<'a> = Table<'a, Key<'static>, &'static [u8]>;
@@ -84,7 +104,33 @@ fn log(
 }
 
 impl Store {
-    /// Keeps messages. What is kept with them is in the same transaction.
+    /// Where a message is, if it is kept already.
+    fn place_of(
+        &self,
+        waiting: &Rows<'_>,
+        logged: &Rows<'_>,
+        webhook: &str,
+        id: &str,
+    ) -> Result<Option<Place>, redb::Error> {
+        // What cannot be read is no reason to keep nothing more.
+        for row in waiting.range(all_of(webhook))? {
+            let (key, bytes) = row?;
+            let waits = decode::<Waits>(&self.path, bytes.value());
+            if waits.is_ok_and(|waits| waits.delivery.id == id) {
+                return Ok(Some(Place::Waits(key.value().1)));
+            }
+        }
+        for row in logged.range(all_of(webhook))? {
+            let known = decode::<Known>(&self.path, row?.1.value());
+            if known.is_ok_and(|known| known.id == id) {
+                return Ok(Some(Place::Logged));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Keeps messages, but none a second time, where the record that it tells of is kept once
+    /// more. What is kept with them is in the same transaction.
     fn add(
         &self,
         transaction: &WriteTransaction,
@@ -94,6 +140,19 @@ impl Store {
         for Outgoing { webhook, message } in outgoing {
             let mut waiting = transaction.open_table(WAITING)?;
             let mut logged = transaction.open_table(LOG)?;
+            match self.place_of(&waiting, &logged, webhook, &message.delivery.id)? {
+                // The disk may have kept it, and said that it had not: nobody has heard of it.
+                Some(Place::Waits(number)) => {
+                    added.push(Added {
+                        webhook: webhook.clone(),
+                        number,
+                        dropped: Vec::new(),
+                    });
+                    continue;
+                }
+                Some(Place::Logged) => continue,
+                None => {}
+            }
             let number = 1 + last(&logged, webhook)?.max(last(&waiting, webhook)?);
             waiting.insert((webhook.as_str(), number), encode(message).as_slice())?;
             let numbers: Vec<u64> = waiting
@@ -420,6 +479,27 @@ mod tests {
         );
         assert_eq!(store.deliveries("a").unwrap(), []);
         assert_eq!(store.waiting("b").unwrap(), [1, 2, 3]);
+    }
+
+    #[test]
+    fn a_message_is_kept_once_for_each_webhook() {
+        let (_folder, store) = open();
+        let both = [outgoing("a", 1), outgoing("b", 1)];
+        let first = store.put_messages(&both[..1]).unwrap();
+        // It waits for one of them, who may not have heard of it.
+        let added = store.put_messages(&both).unwrap();
+        assert_eq!(added[..1], first);
+        let numbers: Vec<_> = added.iter().map(|a| (&*a.webhook, a.number)).collect();
+        assert_eq!(numbers, [("a", 1), ("b", 1)]);
+        assert_eq!(store.waiting("a").unwrap(), [1]);
+        store.put_messages(&[outgoing("a", 2)]).unwrap();
+        let mut delivery = store.message("a", 1).unwrap().unwrap().delivery;
+        delivery.state = DeliveryState::Delivered;
+        store.end_message("a", 1, &delivery).unwrap();
+        // One has got it.
+        assert_eq!(store.put_messages(&both).unwrap(), added[1..]);
+        assert_eq!(store.waiting("a").unwrap(), [2]);
+        assert_eq!(store.deliveries("a").unwrap()[1..], [delivery]);
     }
 
     #[test]

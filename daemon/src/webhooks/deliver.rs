@@ -152,3 +152,124 @@ fn tell(hook: &Hook, delivery: &Delivery) {
         ),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::sync::mpsc;
+
+    use relief_api::WebhookEvent;
+    use storage::LocalDisk;
+    use ureq::Body;
+    use ureq::http::{Request, Response};
+
+    use super::*;
+    use crate::config::{Config, WebhookConfig};
+    use crate::events::Hub;
+    use crate::service::Kept;
+    use crate::spool::Spool;
+    use crate::store::{Outgoing, Store};
+    use crate::tokens::Tokens;
+    use crate::webhooks::Webhooks;
+    use crate::webhooks::receiver::{Carrier, Receiver};
+
+    /// Far longer than anything takes that should happen.
+    const LIMIT: Duration = Duration::from_secs(60);
+
+    /// A receiver whose first answer sets off a defect.
+    struct Defect {
+        was_met: AtomicBool,
+        ids: mpsc::Sender<String>,
+    }
+
+    impl Carrier for Defect {
+        fn carry(&self, request: Request<&str>) -> Result<Response<Body>, ureq::Error> {
+            let id = request.headers()["webhook-id"].to_str().unwrap();
+            self.ids.send(id.to_owned()).unwrap();
+            if !self.was_met.swap(true, Ordering::AcqRel) {
+                std::panic::resume_unwind(Box::new("on\npurpose"));
+            }
+            Ok(Response::new(Body::builder().data("")))
+        }
+    }
+
+    fn service(folder: &std::path::Path) -> Arc<Service> {
+        let kept = Kept {
+            disk: Arc::new(LocalDisk),
+            store: Store::open(Arc::new(LocalDisk), &folder.join("store")).unwrap(),
+            spool: Spool::open(Arc::new(LocalDisk), &folder.join("spool")).unwrap(),
+            tokens: Tokens::open(Arc::new(LocalDisk), &folder.join("tokens.json")).unwrap(),
+            webhooks: Webhooks::default(),
+        };
+        let (config, hub) = (Config::default(), Arc::new(Hub::default()));
+        Arc::new(Service::new(config, Vec::new(), hub, kept, folder.into()))
+    }
+
+    fn outgoing(id: &str) -> Outgoing {
+        Outgoing {
+            webhook: "lab".into(),
+            message: Message {
+                delivery: Delivery {
+                    id: id.into(),
+                    event: WebhookEvent::JobDone,
+                    about: None,
+                    state: DeliveryState::Waiting,
+                    created_at: at(Timestamp::now()),
+                    attempts: 0,
+                    tried: Vec::new(),
+                    next_attempt_at: None,
+                },
+                body: "{}".into(),
+            },
+        }
+    }
+
+    #[test]
+    fn a_defect_costs_one_attempt_and_not_the_service() {
+        let folder = tempfile::tempdir().unwrap();
+        let service = service(folder.path());
+        let file = folder.path().join("secret");
+        fs::write(&file, "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw").unwrap();
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o600)).unwrap();
+        let mut config = WebhookConfig::new("lab", "http://127.0.0.1:9/", file);
+        config.retry.first = Duration::ZERO;
+        let (ids, told) = mpsc::channel();
+        let was_met = AtomicBool::new(false);
+        let receiver = Receiver::new(&config)
+            .unwrap()
+            .over(Defect { was_met, ids });
+        let hook = Arc::new(Hook::new(receiver));
+        let both = [outgoing("msg_1"), outgoing("msg_2")];
+        for added in service.store.put_messages(&both).unwrap() {
+            hook.change(|state| {
+                state.due.insert(added.number, Instant::now());
+            });
+        }
+        let thread = std::thread::spawn({
+            let (service, hook) = (Arc::clone(&service), Arc::clone(&hook));
+            move || deliver(&service, &hook)
+        });
+        let mut ids: Vec<String> = (0..3).map(|_| told.recv_timeout(LIMIT).unwrap()).collect();
+        hook.change(|state| state.ended = true);
+        thread.join().unwrap();
+        // A watchdog is content.
+        assert_eq!(service.liveness.check(Instant::now()), Ok(()));
+        ids.sort();
+        assert_eq!(ids, ["msg_1", "msg_1", "msg_2"]);
+        let mut log = service.store.deliveries("lab").unwrap();
+        log.sort_by(|a, b| a.id.cmp(&b.id));
+        let came_to: Vec<_> = log.iter().map(|d| (d.state, d.attempts)).collect();
+        let delivered = DeliveryState::Delivered;
+        assert_eq!(came_to, [(delivered, 2), (delivered, 1)]);
+        assert_eq!(
+            log[0].tried[0].error.as_deref(),
+            Some(
+                "the attempt ended unexpectedly: on purpose; this is a defect of the program: \
+                 please report it"
+            )
+        );
+        assert_eq!(log[0].tried[1].error, None);
+    }
+}

@@ -14,6 +14,7 @@ mod backoff;
 mod deliver;
 mod receiver;
 mod secret;
+mod shown;
 mod tell;
 mod words;
 
@@ -27,6 +28,7 @@ use crate::config::WebhookConfig;
 use crate::service::{Service, lock};
 use crate::store::{Added, Store, StoreError};
 use receiver::Receiver;
+pub(crate) use shown::shown_url;
 use words::warn_without_network;
 
 /// How long the end of the service waits for an attempt that is under way. Its message is tried
@@ -270,7 +272,8 @@ impl Webhooks {
                 continue;
             };
             hook.change(|state| {
-                state.due.insert(added.number, Instant::now());
+                // One that was kept already may have to wait.
+                state.due.entry(added.number).or_insert_with(Instant::now);
                 for number in &added.dropped {
                     state.due.remove(number);
                     state.dropped += 1;

@@ -1,14 +1,16 @@
 //! What webhooks are told: from what happens to messages, and to the answers of the API.
 
+use std::sync::{Mutex, MutexGuard, TryLockError};
+
 use deliverables::hexadecimal;
 use relief_api::{
-    Delivery, DeliveryState, Event, Job, JobState, Scan, ScannerLink, Webhook, WebhookData,
-    WebhookEvent, WebhookMessage,
+    Delivery, DeliveryState, Event, Job, JobState, Scan, ScannerLink, ScannerStatus, Webhook,
+    WebhookData, WebhookEvent, WebhookMessage,
 };
 use sha2::{Digest, Sha256};
 
 use super::receiver::Verdict;
-use super::{Hook, Webhooks};
+use super::{Hook, Webhooks, shown_url};
 use crate::error::ServiceError;
 use crate::ids::now;
 use crate::service::{Service, lock};
@@ -18,40 +20,56 @@ use crate::store::{Message, Outgoing, StoreError};
 /// Bytes of an id: two are never the same.
 const ID_BYTES: usize = 16;
 
-fn message(
-    webhook: &str,
+/// What there is to tell.
+struct News<'a> {
     event: WebhookEvent,
-    about: Option<String>,
-    timestamp: &str,
-    data: WebhookData,
-) -> Message {
+    /// What tells it from other news of its kind and time.
+    of: &'a str,
+    /// When it happened, by the record that it tells of.
+    at: &'a str,
+    /// The scan or scanner it is about.
+    about: Option<&'a str>,
+}
+
+fn message(webhook: &str, news: &News<'_>, data: WebhookData) -> Message {
+    let &News {
+        event,
+        of,
+        at,
+        about,
+    } = news;
     let told = WebhookMessage {
         event,
-        timestamp: timestamp.to_owned(),
+        timestamp: at.to_owned(),
         data,
     };
-    // Messages serialise whatever they hold.
-    let body = serde_json::to_string(&told).unwrap_or_default();
-    // By what it says: where the record that it tells of is kept once more, it is the same.
-    let hash = Sha256::digest(format!("{webhook}\n{body}"));
+    // Not of all that it says: when a record is kept once more, what goes with it, such as the
+    // numbers of jobs, may have changed.
+    let hash = Sha256::digest(format!("{webhook}\n{}\n{at}\n{of}", event.as_str()));
     Message {
         delivery: Delivery {
             id: format!("msg_{}", hexadecimal(&hash[..ID_BYTES])),
             event,
-            about,
+            about: about.map(str::to_owned),
             state: DeliveryState::Waiting,
-            created_at: timestamp.to_owned(),
+            // It has its time from now on, however late the disk took its record.
+            created_at: now(),
             attempts: 0,
             tried: Vec::new(),
             next_attempt_at: None,
         },
-        body,
+        // Messages serialise whatever they hold.
+        body: serde_json::to_string(&told).unwrap_or_default(),
     }
 }
 
-/// The address as it is shown: a query may hold what is for the receiver alone.
-fn shown_url(url: &str) -> &str {
-    url.split('?').next().unwrap_or(url)
+/// Makes sure that only one at a time goes on. Whoever ended by a panic does not go on.
+fn alone(lock: &Mutex<()>) -> Option<MutexGuard<'_, ()>> {
+    match lock.try_lock() {
+        Ok(guard) => Some(guard),
+        Err(TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
+        Err(TryLockError::WouldBlock) => None,
+    }
 }
 
 impl Hook {
@@ -62,36 +80,77 @@ impl Hook {
 
 impl Webhooks {
     /// A message to each webhook that hears of this.
-    fn outgoing(
-        &self,
-        event: WebhookEvent,
-        about: &str,
-        data: impl FnOnce() -> WebhookData,
-    ) -> Vec<Outgoing> {
+    fn outgoing(&self, news: &News<'_>, data: impl FnOnce() -> WebhookData) -> Vec<Outgoing> {
         let mut hooks = self.all();
-        hooks.retain(|hook| hook.hears(event));
+        hooks.retain(|hook| hook.hears(news.event));
         if hooks.is_empty() {
             return Vec::new();
         }
-        let (timestamp, data) = (now(), data());
+        let data = data();
         let told = hooks.iter().map(|hook| Outgoing {
             webhook: hook.name.clone(),
-            message: message(
-                &hook.name,
-                event,
-                Some(about.to_owned()),
-                &timestamp,
-                data.clone(),
-            ),
+            message: message(&hook.name, news, data.clone()),
         });
         told.collect()
     }
 
-    /// Messages that tell of a scan.
+    /// Messages that tell of a scan: of one that is over as of then, and of one that is not as
+    /// of now.
     pub(crate) fn of_scan(&self, event: WebhookEvent, scan: &Scan) -> Vec<Outgoing> {
-        self.outgoing(event, &scan.id, || WebhookData {
+        let news = News {
+            event,
+            of: &scan.id,
+            at: &scan.ended_at.clone().unwrap_or_else(now),
+            about: Some(&scan.id),
+        };
+        self.outgoing(&news, || WebhookData {
             scanner: Some(scan.scanner.clone()),
             scan: Some(scan.clone()),
+            ..WebhookData::default()
+        })
+    }
+
+    /// Messages that tell of a job that is over, and of its scan, which is asked for only if
+    /// somebody hears of it. Without the scan's record the job still tells which one it is.
+    fn of_job(
+        &self,
+        event: WebhookEvent,
+        job: &Job,
+        scan: impl FnOnce() -> Option<Scan>,
+    ) -> Vec<Outgoing> {
+        let news = News {
+            event,
+            of: &job.id.to_string(),
+            at: &job.ended_at.clone().unwrap_or_else(now),
+            about: Some(&job.scan),
+        };
+        self.outgoing(&news, || {
+            let scan = scan();
+            WebhookData {
+                scanner: scan.as_ref().map(|scan| scan.scanner.clone()),
+                scan,
+                job: Some(job.clone()),
+                ..WebhookData::default()
+            }
+        })
+    }
+
+    /// Messages that tell of a scanner's trouble, as of now.
+    fn of_trouble(&self, scanner: &str, status: &ScannerStatus) -> Vec<Outgoing> {
+        // Other trouble may come at the same time.
+        let of = format!(
+            "{scanner}\n{}",
+            status.problem.as_deref().unwrap_or_default()
+        );
+        let news = News {
+            event: WebhookEvent::ScannerTrouble,
+            of: &of,
+            at: &now(),
+            about: Some(scanner),
+        };
+        self.outgoing(&news, || WebhookData {
+            scanner: Some(scanner.to_owned()),
+            status: Some(status.clone()),
             ..WebhookData::default()
         })
     }
@@ -126,16 +185,8 @@ impl Service {
             JobState::Failed => WebhookEvent::JobFailed,
             _ => return self.store.put_job(job),
         };
-        let outgoing = self.webhooks.outgoing(event, &job.scan, || {
-            // Without the scan's record the job still tells which one it is.
-            let scan = self.store.scan(&job.scan).ok().flatten();
-            WebhookData {
-                scanner: scan.as_ref().map(|scan| scan.scanner.clone()),
-                scan,
-                job: Some(job.clone()),
-                ..WebhookData::default()
-            }
-        });
+        let scan = || self.store.scan(&job.scan).ok().flatten();
+        let outgoing = self.webhooks.of_job(event, job, scan);
         let added = self.store.put_job_telling(job, &outgoing)?;
         self.webhooks.added(added);
         Ok(())
@@ -152,14 +203,7 @@ impl Service {
             return;
         };
         if status.link == ScannerLink::Trouble {
-            let event = WebhookEvent::ScannerTrouble;
-            let outgoing = self
-                .webhooks
-                .outgoing(event, station.name(), || WebhookData {
-                    scanner: Some(station.name().to_owned()),
-                    status: Some(status.clone()),
-                    ..WebhookData::default()
-                });
+            let outgoing = self.webhooks.of_trouble(station.name(), &status);
             match self.store.put_messages(&outgoing) {
                 Ok(added) => self.webhooks.added(added),
                 Err(error) => {
@@ -183,7 +227,7 @@ impl Service {
             let state = lock(&hook.state);
             list.push(Webhook {
                 name: hook.name.clone(),
-                url: shown_url(&config.url).to_owned(),
+                url: shown_url(&config.url),
                 events: config.events.clone(),
                 waiting: state.due.len(),
                 dropped: state.dropped,
@@ -203,7 +247,7 @@ impl Service {
     pub(crate) fn test_webhook(&self, name: &str) -> Result<Delivery, ServiceError> {
         self.check_running()?;
         let hook = self.webhooks.hook(name)?;
-        let Ok(_alone) = hook.testing.try_lock() else {
+        let Some(_alone) = alone(&hook.testing) else {
             return Err(ServiceError::WebhookBusy {
                 name: name.to_owned(),
             });
@@ -212,7 +256,13 @@ impl Service {
             webhook: Some(name.to_owned()),
             ..WebhookData::default()
         };
-        let Message { mut delivery, body } = message(name, WebhookEvent::Test, None, &now(), data);
+        let news = News {
+            event: WebhookEvent::Test,
+            of: name,
+            at: &now(),
+            about: None,
+        };
+        let Message { mut delivery, body } = message(name, &news, data);
         let (tried, verdict) = hook.receiver().post(&delivery.id, &body);
         delivery.attempts = 1;
         delivery.tried.push(tried);
@@ -230,24 +280,123 @@ impl Service {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt;
+    use std::sync::Arc;
+
+    use storage::LocalDisk;
+
     use super::*;
+    use crate::config::WebhookConfig;
+    use crate::store::Store;
+
+    /// Webhooks of which one is told of everything, and a store.
+    fn webhooks() -> (tempfile::TempDir, Webhooks, Store) {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("secret");
+        fs::write(&file, "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw").unwrap();
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o600)).unwrap();
+        let store = Store::open(Arc::new(LocalDisk), &folder.path().join("store")).unwrap();
+        let mut config = WebhookConfig::new("lab", "http://127.0.0.1:9/", file);
+        config.events = WebhookEvent::CHOICES.to_vec();
+        let webhooks = Webhooks::open(&[config], &store).unwrap();
+        (folder, webhooks, store)
+    }
+
+    fn ended_scan() -> Scan {
+        serde_json::from_value(serde_json::json!({
+            "id": "20261122T095900.000Z-roof",
+            "name": "roof",
+            "scanner": "left",
+            "state": "complete",
+            "started_at": "2026-11-22T09:59:00.000Z",
+            "ended_at": "2026-11-22T10:00:00.000Z",
+        }))
+        .unwrap()
+    }
+
+    fn told(outgoing: &[Outgoing]) -> WebhookMessage {
+        assert_eq!(outgoing.len(), 1);
+        serde_json::from_str(&outgoing[0].message.body).unwrap()
+    }
 
     #[test]
-    fn a_message_is_known_by_what_it_says() {
+    fn a_scan_whose_record_is_kept_twice_is_told_once() {
+        let (_folder, webhooks, store) = webhooks();
+        let mut scan = ended_scan();
+        let keep = |scan: &Scan| {
+            let outgoing = webhooks.of_scan(WebhookEvent::ScanEnded, scan);
+            assert_eq!(told(&outgoing).timestamp, "2026-11-22T10:00:00.000Z");
+            let added = store.put_scan_telling(scan, &outgoing).unwrap();
+            added[0].number
+        };
+        assert_eq!(keep(&scan), 1);
+        // Its job may have got another number meanwhile.
+        scan.jobs = vec![2];
+        assert_eq!(keep(&scan), 1);
+        assert_eq!(store.scan(&scan.id).unwrap(), Some(scan.clone()));
+        assert_eq!(store.waiting("lab").unwrap(), [1]);
+        scan.ended_at = Some("2026-11-22T10:00:00.001Z".into());
+        let other = webhooks.of_scan(WebhookEvent::ScanEnded, &scan);
+        assert_eq!(store.put_messages(&other).unwrap()[0].number, 2);
+    }
+
+    #[test]
+    fn a_job_whose_record_is_kept_twice_is_told_once() {
+        let (_folder, webhooks, store) = webhooks();
+        let mut job: Job = serde_json::from_value(serde_json::json!({
+            "id": 1,
+            "scan": "20261122T095900.000Z-roof",
+            "result": "20261122T095900.000Z-roof",
+            "name": "roof",
+            "state": "done",
+            "queued_at": "2026-11-22T10:00:00.000Z",
+            "ended_at": "2026-11-22T10:01:00.000Z",
+        }))
+        .unwrap();
+        let keep = |job: &Job, scan: Option<Scan>| {
+            let outgoing = webhooks.of_job(WebhookEvent::JobDone, job, || scan.clone());
+            let told = told(&outgoing);
+            assert_eq!(Some(&told.timestamp), job.ended_at.as_ref());
+            assert_eq!((told.data.job.as_ref(), told.data.scan), (Some(job), scan));
+            store.put_job_telling(job, &outgoing).unwrap()[0].number
+        };
+        assert_eq!(keep(&job, None), 1);
+        assert_eq!(keep(&job, Some(ended_scan())), 1);
+        // Another that ended at the same time, and the first once it was tried again.
+        job.id = 2;
+        assert_eq!(keep(&job, None), 2);
+        job.id = 1;
+        job.ended_at = Some("2026-11-22T10:02:00.000Z".into());
+        assert_eq!(keep(&job, None), 3);
+        assert_eq!(store.waiting("lab").unwrap(), [1, 2, 3]);
+    }
+
+    #[test]
+    fn a_message_is_known_by_what_it_tells_of() {
         let of = |webhook: &str, scanner: &str| {
             let data = WebhookData {
                 scanner: Some(scanner.into()),
                 ..WebhookData::default()
             };
-            let at = "2026-11-22T10:00:00.000Z";
-            message(webhook, WebhookEvent::ScannerTrouble, None, at, data)
+            let news = News {
+                event: WebhookEvent::ScannerTrouble,
+                of: scanner,
+                at: "2026-11-22T10:00:00.000Z",
+                about: None,
+            };
+            message(webhook, &news, data)
         };
         let told = of("a", "left");
         assert_eq!(
             told.body,
             r#"{"type":"scanner-trouble","timestamp":"2026-11-22T10:00:00.000Z","data":{"scanner":"left"}}"#
         );
-        assert_eq!(told, of("a", "left"));
+        let again = of("a", "left");
+        assert_eq!(
+            (again.delivery.id, again.body),
+            (told.delivery.id.clone(), told.body)
+        );
         assert_eq!(told.delivery.id.len(), "msg_".len() + 2 * ID_BYTES);
         for other in [of("b", "left"), of("a", "right")] {
             assert_ne!(told.delivery.id, other.delivery.id);
@@ -255,11 +404,22 @@ mod tests {
     }
 
     #[test]
-    fn a_query_is_not_shown() {
-        assert_eq!(
-            shown_url("https://a.example/b?key=c"),
-            "https://a.example/b"
-        );
-        assert_eq!(shown_url("https://a.example/b"), "https://a.example/b");
+    fn one_that_ended_by_a_panic_keeps_nobody_from_a_test() {
+        let lock = Mutex::new(());
+        let held = alone(&lock);
+        assert!(held.is_some() && alone(&lock).is_none());
+        drop(held);
+        std::thread::scope(|scope| {
+            let panicked = scope.spawn(|| {
+                let _held = alone(&lock);
+                std::panic::resume_unwind(Box::new("on purpose"));
+            });
+            assert!(panicked.join().is_err());
+        });
+        assert!(lock.is_poisoned());
+        for _ in 0..2 {
+            let held = alone(&lock);
+            assert!(held.is_some() && alone(&lock).is_none());
+        }
     }
 }

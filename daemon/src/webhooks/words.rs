@@ -54,6 +54,10 @@ pub(super) fn told(error: &ureq::Error, host: &str, timeout: Duration) -> String
         }
         ureq::Error::Rustls(error) => of_tls(error, host),
         ureq::Error::Io(error) => of_io(error, host),
+        // It repeats the whole url.
+        ureq::Error::BadUri(_) | ureq::Error::RequireHttpsOnly(_) => {
+            format!("nothing can be posted to {host}: see to the url")
+        }
         other => format!("{host}: {other}"),
     }
 }

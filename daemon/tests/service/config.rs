@@ -111,23 +111,28 @@ fn faults_are_told_with_their_line_and_a_way_out() {
         ),
         (
             whole.replace("https:", "ftp:"),
-            "relief.toml, line 3, column 7: \"ftp://lab.example/\" begins with neither http:// \
+            "relief.toml, line 3, column 7: \"ftp://lab.example\" begins with neither http:// \
              nor https://: a URL such as \"https://lab.example/relief\" is needed",
         ),
         (
-            whole.replace("lab.example", "a:b@lab.example"),
-            "relief.toml, line 3, column 7: \"https://a:b@lab.example/\" holds a name or \
+            whole.replace("lab.example/", "a:hunter2@lab.example/T0?hunter2"),
+            "relief.toml, line 3, column 7: \"https://...@lab.example/...\" holds a name or \
              password, which the receiver is not told and others would see: a URL such as \
              \"https://lab.example/relief\" is needed",
         ),
         (
+            whole.replace("lab.example", "a:hunter/2@lab.example"),
+            "relief.toml, line 3, column 7: \"https://.../...\" has no number for its port: a URL \
+             such as \"https://lab.example/relief\" is needed",
+        ),
+        (
             whole.replace("lab.example", "lab example"),
-            "relief.toml, line 3, column 7: \"https://lab example/\" is no URL: a URL such as \
+            "relief.toml, line 3, column 7: \"...\" is no URL: a URL such as \
              \"https://lab.example/relief\" is needed",
         ),
         (
             whole.replace("https://lab.example/", "/relief"),
-            "relief.toml, line 3, column 7: \"/relief\" begins with neither http:// nor \
+            "relief.toml, line 3, column 7: \"...\" begins with neither http:// nor \
              https://: a URL such as \"https://lab.example/relief\" is needed",
         ),
         (
@@ -232,6 +237,11 @@ fn files_of_webhooks_are_looked_at_where_asked_for_and_told_with_their_line() {
     let told = refused();
     assert!(told.starts_with(&line(5, 11)), "{told}");
     assert!(told.contains("cannot read the certificates in"), "{told}");
+    std::fs::create_dir(place("ca.pem")).unwrap();
+    let told = refused();
+    assert!(told.starts_with(&line(5, 11)), "{told}");
+    assert!(told.contains("is no file"), "{told}");
+    std::fs::remove_dir(place("ca.pem")).unwrap();
     let own = rcgen::generate_simple_self_signed(["lab.example".to_owned()]).unwrap();
     write("ca.pem", &own.cert.pem(), 0o644);
     let config = Config::load_with_files(&file).unwrap();

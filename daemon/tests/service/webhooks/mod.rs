@@ -114,14 +114,15 @@ async fn a_scan_and_its_job_are_told_and_signed() {
     let reply = rig.client.request("GET", path::WEBHOOKS, None).await;
     let text = String::from_utf8(reply.body).unwrap();
     assert!(
-        !text.contains("whsec_") && !text.contains("key=7"),
+        !text.contains("whsec_") && !text.contains("key=7") && !text.contains("/relief"),
         "{text}"
     );
     let list: WebhookList = serde_json::from_str(&text).unwrap();
     let [lab] = list.webhooks.as_slice() else {
         panic!("{text}");
     };
-    assert_eq!((lab.name.as_str(), &lab.url), ("lab", &receiver.url()));
+    let shown = format!("http://{}/...", receiver.address);
+    assert_eq!((lab.name.as_str(), &lab.url), ("lab", &shown));
     assert_eq!((lab.waiting, lab.dropped), (0, 0));
     assert_eq!(lab.latest.as_ref().unwrap().id, second.id());
     let log = log(&rig).await;

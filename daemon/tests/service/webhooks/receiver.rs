@@ -22,7 +22,7 @@ const LIMIT: Duration = Duration::from_secs(60);
 pub(crate) enum Answer {
     /// This status and body.
     Status(u16, &'static str),
-    /// A redirection.
+    /// A redirection, whose body tells where to as well.
     Elsewhere(u16, String),
     /// Nothing, with the connection kept open.
     Hang,
@@ -230,7 +230,8 @@ fn serve(
         )?,
         Answer::Elsewhere(status, to) => write!(
             out,
-            "HTTP/1.1 {status} x\r\nLocation: {to}\r\nContent-Length: 0\r\n\r\n"
+            "HTTP/1.1 {status} x\r\nLocation: {to}\r\nContent-Length: {}\r\n\r\n{to}",
+            to.len()
         )?,
         // Until the other side has had enough.
         Answer::Hang => drop(out.read(&mut [0])?),
