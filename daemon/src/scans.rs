@@ -65,7 +65,10 @@ impl Service {
         let ticket = Ticket {
             station: Arc::clone(&station),
             scan: scan.clone(),
-            task: Task::Begin { plan, identity },
+            task: Task::Begin {
+                plan,
+                identity: Box::new(identity),
+            },
             processing,
             room,
             abort: Arc::clone(&abort),

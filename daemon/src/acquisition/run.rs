@@ -48,7 +48,7 @@ pub(crate) enum Task {
     /// All of it.
     Begin {
         plan: ResolvedPlan,
-        identity: Identity,
+        identity: Box<Identity>,
     },
     /// What the service has left undone when it last ended.
     TakeUp(TakeUp),
