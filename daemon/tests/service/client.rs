@@ -1,6 +1,7 @@
 //! Just enough HTTP to speak to the service as any client would.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use relief_api::{Event, Problem};
 use serde::Serialize;
@@ -121,6 +122,9 @@ where
     }
 }
 
+/// Longer than a service has nothing to tell while a test waits for it.
+const GUARD: Duration = Duration::from_secs(120);
+
 pub(crate) struct Events {
     lines: tokio::io::Lines<BufReader<UnixStream>>,
 }
@@ -149,7 +153,9 @@ impl Events {
     ) -> (Vec<Event>, T) {
         let mut seen = Vec::new();
         loop {
-            let event = self.next().await.expect("the stream goes on");
+            let next = tokio::time::timeout(GUARD, self.next()).await;
+            let event = next.unwrap_or_else(|_| panic!("nothing follows {:?}", seen.last()));
+            let event = event.expect("the stream goes on");
             let found = find(&event);
             seen.push(event);
             if let Some(found) = found {
