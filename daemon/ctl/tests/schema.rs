@@ -503,7 +503,9 @@ async fn webhooks_are_listed_tested_and_looked_into() {
         told
     };
     let listed = webhooks(&[]).await;
-    assert_eq!(listed["webhooks"][0]["url"], takes.as_str());
+    // What follows the host may be for the receiver alone.
+    let shown = takes.replace("/relief", "/...");
+    assert_eq!(listed["webhooks"][0]["url"], shown.as_str());
     assert_eq!(webhooks(&["test", "lab"]).await["state"], "delivered");
     assert_eq!(
         webhooks(&["test", "bad"]).await["tried"][0]["answer"],
