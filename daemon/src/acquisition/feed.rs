@@ -2,9 +2,10 @@
 
 use std::sync::mpsc::SyncSender;
 
-use scan_record::{RawColumn, RawSample};
+use scan_record::RawColumn;
 use scanner_driver::{ScanProgress, ScanStream, ScannerError};
 
+use super::columns::kept;
 use crate::service::Service;
 use crate::station::Station;
 
@@ -38,7 +39,7 @@ pub(super) fn feed(
             pulse.work(station.longest_wait);
         }
         let fed = match stream.next_progress() {
-            Ok(Some(ScanProgress::Column(column))) => Fed::Column(raw(column)),
+            Ok(Some(ScanProgress::Column(column))) => Fed::Column(kept(column)),
             Ok(Some(ScanProgress::Paused(pause))) => {
                 paused = true;
                 Fed::Paused {
@@ -59,24 +60,5 @@ pub(super) fn feed(
         if sender.send(fed).is_err() || last {
             return;
         }
-    }
-}
-
-/// The driver's column as the journal keeps it.
-fn raw(column: scanner_driver::RawColumn) -> RawColumn {
-    RawColumn {
-        index: column.index,
-        table_counts: column.table_counts,
-        dropouts: column.dropouts,
-        samples: column
-            .samples
-            .into_iter()
-            .map(|sample| RawSample {
-                lateral_counts: sample.lateral_counts,
-                range_counts: sample.range_counts,
-                intensity: sample.intensity,
-                saturated: sample.saturated,
-            })
-            .collect(),
     }
 }

@@ -1,6 +1,7 @@
 //! Taking a scan: from the scanner's columns to the journal on disk, and live to whoever
 //! looks on.
 
+mod columns;
 mod feed;
 pub(crate) mod grid_file;
 mod heading;

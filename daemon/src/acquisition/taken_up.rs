@@ -4,8 +4,9 @@ use std::io::Read;
 use std::path::Path;
 use std::time::Duration;
 
-use scan_record::{EndCause, JournalReader, JournalWriter, RawColumn, most_bytes};
+use scan_record::{EndCause, JournalReader, JournalWriter, most_bytes};
 
+use super::columns::measured;
 use super::heading::interrupted;
 use super::keep::Keeper;
 use super::live::Live;
@@ -138,24 +139,5 @@ fn aborted(journal: JournalWriter, live: Live<'_>, reason: String) -> Result<(),
     match journal.finish(&EndCause::Aborted(reason.clone())) {
         Ok(_) => Err(Failure::from(reason)),
         Err(error) => Err(Failure::from(error.to_string())),
-    }
-}
-
-/// The journal's column as the driver gave it.
-fn measured(column: RawColumn) -> scanner_driver::RawColumn {
-    scanner_driver::RawColumn {
-        index: column.index,
-        table_counts: column.table_counts,
-        dropouts: column.dropouts,
-        samples: column
-            .samples
-            .into_iter()
-            .map(|sample| scanner_driver::RawSample {
-                lateral_counts: sample.lateral_counts,
-                range_counts: sample.range_counts,
-                intensity: sample.intensity,
-                saturated: sample.saturated,
-            })
-            .collect(),
     }
 }
