@@ -4,11 +4,11 @@
 use relief_api::Scan;
 use scan_record::Header;
 use scanner_driver::{ColumnSource, InterruptedScan, ScanInfo};
-use scanner_protocol::{Calibration, Head, Identity, ScanPlan, text};
+use scanner_protocol::{Identity, ScanPlan, text};
 use serde::{Deserialize, Serialize};
 
-use super::calibration;
 use super::plan::ResolvedPlan;
+use super::{announced, calibration};
 use crate::config::Processing;
 
 /// Who measures.
@@ -40,23 +40,6 @@ struct Accepted {
     columns: u32,
     spacing_um: u32,
     uniform: bool,
-    table_count_pm: u32,
-    table_origin_nm: i64,
-    head: KeptHead,
-}
-
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum KeptHead {
-    Polar {
-        camera_y_nm: i64,
-        camera_z_nm: i64,
-        angle_count_prad: u32,
-        range_count_pm: u32,
-    },
-    Cartesian {
-        count_pm: u32,
-    },
 }
 
 /// The head of the journal of a scan that has just been accepted.
@@ -72,7 +55,7 @@ pub(super) fn header(
         serial: identity.serial.as_str().to_owned(),
         firmware: identity.firmware.as_str().to_owned(),
     };
-    let plan = KeptPlan::new(&resolved.plan, info, &identity.calibration);
+    let plan = KeptPlan::new(&resolved.plan, info);
     // These types serialise to JSON whatever they hold.
     Header {
         calibration: calibration(&identity.calibration),
@@ -95,12 +78,8 @@ pub(super) fn interrupted(header: &Header) -> Option<(InterruptedScan, ScanPlan)
     let source = ColumnSource {
         model: text(&identity.model),
         serial: text(&identity.serial),
-        calibration: accepted.calibration(),
+        calibration: announced(&header.calibration)?,
     };
-    // What the columns before were measured with is what those after are compared by.
-    if calibration(&source.calibration) != header.calibration {
-        return None;
-    }
     let info = ScanInfo {
         columns: accepted.columns,
         spacing_um: accepted.spacing_um,
@@ -110,7 +89,7 @@ pub(super) fn interrupted(header: &Header) -> Option<(InterruptedScan, ScanPlan)
 }
 
 impl KeptPlan {
-    fn new(plan: &ScanPlan, info: ScanInfo, calibration: &Calibration) -> Self {
+    fn new(plan: &ScanPlan, info: ScanInfo) -> Self {
         Self {
             first_table_counts: plan.first_table_counts,
             pitch_counts: plan.pitch_counts,
@@ -123,22 +102,6 @@ impl KeptPlan {
                 columns: info.columns,
                 spacing_um: info.spacing_um,
                 uniform: info.uniform,
-                table_count_pm: calibration.table_count_pm,
-                table_origin_nm: calibration.table_origin_nm,
-                head: match calibration.head {
-                    Head::Polar {
-                        camera_y_nm,
-                        camera_z_nm,
-                        angle_count_prad,
-                        range_count_pm,
-                    } => KeptHead::Polar {
-                        camera_y_nm,
-                        camera_z_nm,
-                        angle_count_prad,
-                        range_count_pm,
-                    },
-                    Head::Cartesian { count_pm } => KeptHead::Cartesian { count_pm },
-                },
             }),
         }
     }
@@ -152,29 +115,6 @@ impl KeptPlan {
             angle_step_counts: self.angle_step_counts,
             samples: self.samples,
             exposure_us: self.exposure_us,
-        }
-    }
-}
-
-impl Accepted {
-    fn calibration(&self) -> Calibration {
-        Calibration {
-            table_count_pm: self.table_count_pm,
-            table_origin_nm: self.table_origin_nm,
-            head: match self.head {
-                KeptHead::Polar {
-                    camera_y_nm,
-                    camera_z_nm,
-                    angle_count_prad,
-                    range_count_pm,
-                } => Head::Polar {
-                    camera_y_nm,
-                    camera_z_nm,
-                    angle_count_prad,
-                    range_count_pm,
-                },
-                KeptHead::Cartesian { count_pm } => Head::Cartesian { count_pm },
-            },
         }
     }
 }

@@ -28,11 +28,12 @@ pub(crate) use taken_up::{Rest, TakeUp};
 pub(crate) use view::check_grid;
 pub(crate) use watch::{describe_trouble, watch};
 
+const NM_PER_MM: f64 = 1e6;
+const PM_PER_MM: f64 = 1e9;
+const PRAD_PER_RAD: f64 = 1e12;
+
 /// What the device announced, as the geometry needs it.
 pub(crate) fn calibration(wire: &scanner_protocol::Calibration) -> Calibration {
-    const NM_PER_MM: f64 = 1e6;
-    const PM_PER_MM: f64 = 1e9;
-    const PRAD_PER_RAD: f64 = 1e12;
     Calibration {
         table_origin_mm: wire.table_origin_nm as f64 / NM_PER_MM,
         table_count_mm: f64::from(wire.table_count_pm) / PM_PER_MM,
@@ -53,6 +54,34 @@ pub(crate) fn calibration(wire: &scanner_protocol::Calibration) -> Calibration {
             },
         },
     }
+}
+
+/// What a device announced that gave this calibration; `None` if none can have.
+pub(crate) fn announced(known: &Calibration) -> Option<scanner_protocol::Calibration> {
+    // Beyond what can be announced these saturate, and are found not to be the same.
+    let nm = |mm: f64| (mm * NM_PER_MM).round() as i64;
+    let pm = |mm: f64| (mm * PM_PER_MM).round() as u32;
+    let wire = scanner_protocol::Calibration {
+        table_count_pm: pm(known.table_count_mm),
+        table_origin_nm: nm(known.table_origin_mm),
+        head: match known.head {
+            Head::Polar {
+                camera_y_mm,
+                camera_z_mm,
+                angle_count_rad,
+                range_count_mm,
+            } => scanner_protocol::Head::Polar {
+                camera_y_nm: nm(camera_y_mm),
+                camera_z_nm: nm(camera_z_mm),
+                angle_count_prad: (angle_count_rad * PRAD_PER_RAD).round() as u32,
+                range_count_pm: pm(range_count_mm),
+            },
+            Head::Cartesian { count_mm } => scanner_protocol::Head::Cartesian {
+                count_pm: pm(count_mm),
+            },
+        },
+    };
+    (calibration(&wire) == *known).then_some(wire)
 }
 
 /// A request to end a scan early, and by whom.
@@ -86,5 +115,45 @@ impl AbortRequest {
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_announced_is_found_again() {
+        let odd = [1, 333_333, 10_000_001, u32::MAX];
+        for (count, place_nm) in odd.into_iter().zip([0, -7, 123_456_789_012, 1 << 52]) {
+            let polar = scanner_protocol::Head::Polar {
+                camera_y_nm: place_nm,
+                camera_z_nm: -place_nm,
+                angle_count_prad: count,
+                range_count_pm: count,
+            };
+            let cartesian = scanner_protocol::Head::Cartesian { count_pm: count };
+            for head in [polar, cartesian] {
+                let wire = scanner_protocol::Calibration {
+                    table_count_pm: count,
+                    table_origin_nm: place_nm,
+                    head,
+                };
+                assert_eq!(announced(&calibration(&wire)), Some(wire));
+            }
+        }
+    }
+
+    #[test]
+    fn what_no_device_can_announce_is_refused() {
+        let known = |table_count_mm| Calibration {
+            table_origin_mm: 0.0,
+            table_count_mm,
+            head: Head::Cartesian { count_mm: 0.01 },
+        };
+        assert!(announced(&known(0.01)).is_some());
+        for odd in [0.010_000_000_1, -0.01, 5.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(announced(&known(odd)), None, "{odd}");
+        }
     }
 }
