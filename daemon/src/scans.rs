@@ -6,14 +6,17 @@ use relief_api::{
     Aborted, Event, Scan, ScanPreview, ScanState, ScannerLink, StartScan, WebhookEvent,
 };
 use scanner_driver::ScannerError;
+use scanner_protocol::Identity;
 
 use crate::acquisition::{
-    AbortRequest, Task, Ticket, calibration, check_grid, preview, resolve, run,
+    AbortRequest, ResolvedPlan, Task, Ticket, calibration, check_grid, preview, resolve, run,
 };
+use crate::config::Processing;
 use crate::error::ServiceError;
 use crate::ids::{now, shown_name};
 use crate::service::{Service, lock};
-use crate::station::{Station, stop_all};
+use crate::space::Promise;
+use crate::station::{Reservation, Station, stop_all};
 
 impl Service {
     /// Starts a scan. Blocks until the scanner has said who it is, so that a scanner that
@@ -22,21 +25,17 @@ impl Service {
         self.check_running()?;
         let name = shown_name(&request.name)?;
         let station = Arc::clone(self.station(&request.scanner)?);
-        let config = self.config();
-        let processing = config.processing().with_overrides(&request.settings)?;
+        let processing = self
+            .config()
+            .processing()
+            .with_overrides(&request.settings)?;
         let reservation = station.reserve()?;
         let identity = station.identify().map_err(|error| {
             self.note_scanner(&station, ScannerLink::Trouble, Some(error.to_string()));
             ServiceError::scanner(&station, error)
         })?;
         station.note_identity(&identity);
-        let plan = request.plan.or(&config.scan_on(station.name()));
-        let plan = resolve(&plan, &identity)?;
-        check_grid(
-            &processing.regrid,
-            &plan,
-            &calibration(&identity.calibration),
-        )?;
+        let plan = self.planned(request, &station, &identity, &processing)?;
         let id = self.ids.next(&request.name, |id| {
             self.spool.has(id) || self.journal_path(id).exists()
         });
@@ -61,31 +60,60 @@ impl Service {
             removed_at: None,
             put_back_at: None,
         };
+        let task = Task::Begin {
+            plan,
+            identity: Box::new(identity),
+        };
+        self.begin_scan(reservation, &scan, task, processing, room)?;
+        Ok(scan)
+    }
+
+    /// Puts a scan into the place that was kept for it, with a thread of its own.
+    pub(crate) fn begin_scan(
+        self: &Arc<Self>,
+        reservation: Reservation<'_>,
+        scan: &Scan,
+        task: Task,
+        processing: Processing,
+        room: Promise,
+    ) -> Result<(), ServiceError> {
+        let station = Arc::clone(self.station(&scan.scanner)?);
         let abort = Arc::new(AbortRequest::none(self.presence(&scan.id)));
         let ticket = Ticket {
             station: Arc::clone(&station),
             scan: scan.clone(),
-            task: Task::Begin {
-                plan,
-                identity: Box::new(identity),
-            },
+            task,
             processing,
             room,
             abort: Arc::clone(&abort),
         };
-        reservation.take(&scan, abort, || {
+        reservation.take(scan, abort, || {
             // Where nobody sees the slot, so that a service that stops finds either the scan
             // or none to come.
             self.check_running()?;
-            self.store.put_scan(&scan)?;
+            self.store.put_scan(scan)?;
             station.laser.scan_begins(&scan.id);
             let service = Arc::clone(self);
             std::thread::Builder::new()
                 .name(station.loop_name("scan"))
                 .spawn(move || run(&service, ticket))
                 .map_err(ServiceError::Thread)
-        })?;
-        Ok(scan)
+        })
+    }
+
+    /// What is asked for, on this scanner.
+    fn planned(
+        &self,
+        request: &StartScan,
+        station: &Station,
+        identity: &Identity,
+        processing: &Processing,
+    ) -> Result<ResolvedPlan, ServiceError> {
+        let plan = request.plan.or(&self.config().scan_on(station.name()));
+        let plan = resolve(&plan, identity)?;
+        let calibration = calibration(&identity.calibration);
+        check_grid(&processing.regrid, &plan, &calibration)?;
+        Ok(plan)
     }
 
     /// What a scan would come to, with nothing moved and nothing kept. Blocks until the scanner
@@ -93,18 +121,14 @@ impl Service {
     pub(crate) fn preview_scan(&self, request: &StartScan) -> Result<ScanPreview, ServiceError> {
         shown_name(&request.name)?;
         let station = self.station(&request.scanner)?;
-        let config = self.config();
-        let processing = config.processing().with_overrides(&request.settings)?;
+        let processing = self
+            .config()
+            .processing()
+            .with_overrides(&request.settings)?;
         let identity = station
             .identify()
             .map_err(|error| ServiceError::scanner(station, error))?;
-        let plan = request.plan.or(&config.scan_on(station.name()));
-        let plan = resolve(&plan, &identity)?;
-        check_grid(
-            &processing.regrid,
-            &plan,
-            &calibration(&identity.calibration),
-        )?;
+        let plan = self.planned(request, station, &identity, &processing)?;
         let mut preview = preview(station.name(), &identity, &plan, &processing);
         let refused = self.check_running().and_then(|()| {
             station.refuse_if_busy()?;

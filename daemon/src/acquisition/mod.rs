@@ -20,6 +20,7 @@ use std::sync::{Mutex, PoisonError};
 use range_image::{Calibration, calibration::Head};
 
 pub use plan::PlanError;
+pub(crate) use plan::ResolvedPlan;
 pub(crate) use plan::resolve;
 use presence::Presence;
 pub(crate) use preview::preview;

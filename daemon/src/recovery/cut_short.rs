@@ -8,7 +8,7 @@ use scanner_driver::ScannerError;
 
 use super::Found;
 use crate::acquisition::presence::last_seen;
-use crate::acquisition::{AbortRequest, Rest, TakeUp, Task, Ticket, not_taken_up, run};
+use crate::acquisition::{Rest, TakeUp, Task, not_taken_up};
 use crate::error::ServiceError;
 use crate::ids::{at, now};
 use crate::service::{Service, lock, remove_if_there};
@@ -99,8 +99,8 @@ impl Service {
     /// as it is, with all columns that are kept.
     pub(crate) fn take_up_scans(self: &Arc<Self>, scans: Vec<CutShort>) {
         for CutShort { scan, rest, how } in scans {
-            let mut left = scan.clone();
-            if let Err(error) = self.take_up_scan(scan, &rest, how) {
+            if let Err(error) = self.take_up_scan(&scan, &rest, how) {
+                let mut left = scan;
                 tracing::warn!(scan = %left.id, %error, "a scan that was cut short is not gone on with");
                 left.state = ScanState::Interrupted;
                 left.reason = Some(not_taken_up(&error.to_string()));
@@ -118,32 +118,14 @@ impl Service {
 
     fn take_up_scan(
         self: &Arc<Self>,
-        scan: Scan,
+        scan: &Scan,
         rest: &Rest,
         how: TakeUp,
     ) -> Result<(), ServiceError> {
-        let station = Arc::clone(self.station(&scan.scanner)?);
         let processing = self.config().processing().with_overrides(&scan.settings)?;
-        let reservation = station.reserve()?;
+        let reservation = self.station(&scan.scanner)?.reserve()?;
         let room = self.promise_room(&scan.id, rest.columns, rest.samples)?;
-        let abort = Arc::new(AbortRequest::none(self.presence(&scan.id)));
-        let ticket = Ticket {
-            station: Arc::clone(&station),
-            scan: scan.clone(),
-            task: Task::TakeUp(how),
-            processing,
-            room,
-            abort: Arc::clone(&abort),
-        };
-        reservation.take(&scan, abort, || {
-            self.store.put_scan(&scan)?;
-            station.laser.scan_begins(&scan.id);
-            let service = Arc::clone(self);
-            std::thread::Builder::new()
-                .name(station.loop_name("scan"))
-                .spawn(move || run(&service, ticket))
-                .map_err(ServiceError::Thread)
-        })
+        self.begin_scan(reservation, scan, Task::TakeUp(how), processing, room)
     }
 
     /// Of other scans nobody will ask.
