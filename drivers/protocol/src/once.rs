@@ -43,23 +43,26 @@ impl OnceOnly {
             .map(|(_, reply)| reply)
     }
 
-    /// Whether a request that is not the last one answered has been carried out before: a line
+    /// Whether a request that is not the last one answered has been answered before: a line
     /// with buffers has brought it once more, and nobody waits for it.
     #[must_use]
     pub fn is_late(&self, request: &Packet) -> bool {
-        self.passes_over && self.known.iter().any(|known| *known == request.checksum())
+        let checksum = request.checksum();
+        self.passes_over && self.known.iter().any(|known| *known == checksum)
     }
 
-    /// Keeps the reply to a request that has been carried out.
+    /// Keeps the reply to a request, whether it was carried out or refused: what was refused once
+    /// may be possible when the line brings it once more.
     pub fn remember(&mut self, request: Packet, reply: Frame) {
-        // Those of lower kinds only ask.
-        if request.kind >= Home::KIND {
-            if self.known.is_full() {
-                self.known.pop_front();
-            }
-            // There is room now.
-            let _ = self.known.push_back(request.checksum());
+        // Those of lower kinds only ask, and must not displace one that may be repeated.
+        if request.kind < Home::KIND {
+            return;
         }
+        if self.known.is_full() {
+            self.known.pop_front();
+        }
+        // There is room now.
+        let _ = self.known.push_back(request.checksum());
         self.last = Some((request, reply));
     }
 
@@ -108,6 +111,8 @@ mod tests {
         // Nothing but an answer comes of a question.
         once.remember(packet(9, &Identify {}), Frame::new(9, &HomeStarted {}));
         assert!(!once.is_late(&packet(9, &Identify {})));
+        // One that came late displaces nothing that is still repeated.
+        assert!(once.recall(&home(38)).is_some());
     }
 
     #[test]

@@ -392,13 +392,19 @@ impl Device {
     }
 
     fn reject(&mut self, packet: &Packet, reason: RejectReason, detail: u32) {
+        let rejection = self.rejection(packet, reason, detail);
+        self.send(&rejection);
+    }
+
+    /// The reply to a request that is refused.
+    fn rejection(&mut self, packet: &Packet, reason: RejectReason, detail: u32) -> Frame {
         self.log.push(Event::Rejected);
         let rejected = Rejected {
             request: packet.kind,
             reason,
             detail,
         };
-        self.send(&Frame::new(packet.tag, &rejected));
+        Frame::new(packet.tag, &rejected)
     }
 }
 

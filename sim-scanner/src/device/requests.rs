@@ -46,13 +46,12 @@ impl Device {
         if self.once.is_late(&packet) {
             return;
         }
-        match self.request(&packet, message, now) {
-            Ok(reply) => {
-                self.send(&reply);
-                self.once.remember(packet, reply);
-            }
-            Err((reason, detail)) => self.reject(&packet, reason, detail),
-        }
+        let reply = match self.request(&packet, message, now) {
+            Ok(reply) => reply,
+            Err((reason, detail)) => self.rejection(&packet, reason, detail),
+        };
+        self.send(&reply);
+        self.once.remember(packet, reply);
     }
 
     fn request(

@@ -237,3 +237,31 @@ fn a_request_that_the_line_brings_late_lights_no_laser() {
     // What comes next is heard.
     assert!(matches!(host.ask(&Home {}), DeviceMessage::HomeStarted(_)));
 }
+
+/// It could not be carried out then, and could be now, when nobody waits for it any more.
+#[test]
+fn a_refused_request_that_the_line_brings_late_lights_no_laser() {
+    let mut host = Host::ready();
+    let now = host.link.now();
+    host.link.device().raise_faults(Faults::TABLE_STALL, now);
+    host.scan(64);
+    let scan_tag = host.tag;
+    let plan = host.plan();
+    let refused = Frame::new(
+        scan_tag,
+        &ScanRequest {
+            scan_id: 9,
+            credits: 64,
+            plan,
+        },
+    );
+    host.link.device().mend(Faults::TABLE_STALL);
+    host.ask(&ClearFaults {});
+    host.told();
+    let log = host.link.device().events().len();
+    host.link.send(refused.as_bytes());
+    host.link.pass(SECOND);
+    assert_eq!(host.told(), [], "nobody waits for an answer");
+    assert_eq!(host.link.device().events().len(), log);
+    assert!(matches!(host.ask(&Home {}), DeviceMessage::HomeStarted(_)));
+}
