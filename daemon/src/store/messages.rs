@@ -129,6 +129,22 @@ impl Store {
         Ok(None)
     }
 
+    /// Whether this very message waits under this number, and not a later one of a webhook that
+    /// was taken out and put in again.
+    fn waits(
+        &self,
+        waiting: &Rows<'_>,
+        webhook: &str,
+        number: u64,
+        id: &str,
+    ) -> Result<bool, redb::Error> {
+        let row = waiting.get((webhook, number))?;
+        Ok(row.is_some_and(|bytes| {
+            let waits = decode::<Waits>(&self.path, bytes.value());
+            waits.is_ok_and(|waits| waits.delivery.id == id)
+        }))
+    }
+
     /// Keeps messages, but none a second time, where the record that it tells of is kept once
     /// more. What is kept with them is in the same transaction.
     fn add(
@@ -290,7 +306,7 @@ impl Store {
             let transaction = database.begin_write()?;
             {
                 let mut waiting = transaction.open_table(WAITING)?;
-                if waiting.get((webhook, number))?.is_some() {
+                if self.waits(&waiting, webhook, number, &message.delivery.id)? {
                     waiting.insert((webhook, number), encode(message).as_slice())?;
                 }
             }
@@ -298,7 +314,8 @@ impl Store {
         })
     }
 
-    /// Keeps how a message ended, which waits no more.
+    /// Keeps how a message ended, which waits no more. One that had to make room, or whose webhook
+    /// has gone, is told of already.
     pub(crate) fn end_message(
         &self,
         webhook: &str,
@@ -309,9 +326,11 @@ impl Store {
             let transaction = database.begin_write()?;
             {
                 let mut waiting = transaction.open_table(WAITING)?;
-                waiting.remove((webhook, number))?;
-                let mut logged = transaction.open_table(LOG)?;
-                log(&mut logged, &waiting, webhook, delivery)?;
+                if self.waits(&waiting, webhook, number, &delivery.id)? {
+                    waiting.remove((webhook, number))?;
+                    let mut logged = transaction.open_table(LOG)?;
+                    log(&mut logged, &waiting, webhook, delivery)?;
+                }
             }
             Ok(transaction.commit()?)
         })

@@ -10,6 +10,7 @@ use super::receiver::Verdict;
 use super::{Hook, backoff};
 use crate::config::Retry;
 use crate::ids::at;
+use crate::liveness::Pulse;
 use crate::service::Service;
 use crate::store::{Message, StoreError};
 
@@ -34,8 +35,7 @@ pub(super) fn deliver(service: &Arc<Service>, hook: &Arc<Hook>) {
     let _gone = Gone(hook);
     let pulse = service.liveness.begin(format!("webhook {}", hook.name));
     while let Some(number) = hook.next() {
-        pulse.work(hook.receiver().config.timeout() + RESERVE);
-        let settled = attempt(service, hook, number);
+        let settled = attempt(service, hook, number, &pulse);
         pulse.rest();
         let Err(error) = settled else { continue };
         tracing::error!(
@@ -50,28 +50,33 @@ pub(super) fn deliver(service: &Arc<Service>, hook: &Arc<Hook>) {
 }
 
 /// Tries a message once, and keeps what became of it.
-fn attempt(service: &Service, hook: &Hook, number: u64) -> Result<(), StoreError> {
+fn attempt(service: &Service, hook: &Hook, number: u64, pulse: &Pulse) -> Result<(), StoreError> {
     let forget = || {
         hook.change(|state| {
             state.due.remove(&number);
         });
     };
+    pulse.work(RESERVE);
     let Some(mut message) = service.store.message(&hook.name, number)? else {
         // It had to make room.
         forget();
         return Ok(());
     };
     let receiver = hook.receiver();
+    pulse.work(receiver.config.timeout() + RESERVE);
     let (tried, verdict) = receiver.post(&message.delivery.id, &message.body);
     let again_in = settle(&mut message, tried, verdict, &receiver.config.retry);
     tell(hook, &message.delivery);
     // What came of an attempt is not forgotten because the disk refuses it: the receiver would be
     // told once more for each time that this is tried again.
     while let Err(error) = keep(service, hook, number, &message) {
+        // The disk may refuse for long, and no scan is to end for that.
+        pulse.rest();
         if matches!(error, StoreError::Closed { .. }) || hook.wait_for_end(DISK_RETRY) {
             return Err(error);
         }
         tracing::warn!(webhook = hook.name, %error, "cannot keep what became of a message yet");
+        pulse.work(RESERVE);
     }
     match again_in {
         Some(wait) => hook.change(|state| {

@@ -52,7 +52,7 @@ impl FileError {
 
 /// Looks at the files that a webhook names.
 pub(crate) fn check_files(config: &WebhookConfig) -> Result<(), FileError> {
-    Receiver::new(config).map(drop)
+    Receiver::read_files(config).map(drop)
 }
 
 /// The webhooks cannot be used.
@@ -237,15 +237,16 @@ impl Webhooks {
         }
         // Before what waits is looked for, so that no message comes between the two.
         *self.hooks.write().unwrap_or_else(PoisonError::into_inner) = hooks;
-        for hook in self.all() {
-            let numbers = store.waiting(&hook.name)?;
-            let now = Instant::now();
-            hook.change(|state| state.due.extend(numbers.into_iter().map(|n| (n, now))));
-        }
+        // Whatever the disk says next: nobody would find them again.
         for hook in earlier {
             if !known.contains(&hook.name.as_str()) {
                 hook.change(|state| state.ended = true);
             }
+        }
+        for hook in self.all() {
+            let numbers = store.waiting(&hook.name)?;
+            let now = Instant::now();
+            hook.change(|state| state.due.extend(numbers.into_iter().map(|n| (n, now))));
         }
         for (webhook, messages) in store.forget_other_webhooks(&known)? {
             tracing::warn!(

@@ -67,13 +67,23 @@ impl fmt::Debug for Receiver {
 }
 
 impl Receiver {
-    /// Reads the files that the webhook names.
-    pub(super) fn new(config: &WebhookConfig) -> Result<Self, FileError> {
+    /// Reads the files that the webhook names: the secret, and whose certificates are trusted if
+    /// not those that the machine trusts.
+    pub(super) fn read_files(
+        config: &WebhookConfig,
+    ) -> Result<(Secret, Option<Vec<Certificate<'static>>>), FileError> {
         let secret = Secret::read(&config.secret_file)?;
+        let own = config.ca_file.as_deref().map(authorities_in).transpose()?;
+        Ok((secret, own))
+    }
+
+    /// A receiver that is reached as the webhook says.
+    pub(super) fn new(config: &WebhookConfig) -> Result<Self, FileError> {
+        let (secret, own) = Self::read_files(config)?;
         // Where another part of the process has chosen one, that will do.
         let _ = ring::default_provider().install_default();
-        let authorities = match &config.ca_file {
-            Some(path) => authorities_in(path)?,
+        let authorities = match own {
+            Some(own) => own,
             None if config.url.starts_with("https:") => authorities_of_the_machine(),
             None => Vec::new(),
         };
