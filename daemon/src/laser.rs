@@ -349,7 +349,10 @@ impl Scanner for Watched {
 
     fn take_up_scan(&self, scan: InterruptedScan) -> Result<ScanStream, ScannerError> {
         self.laser.take_up();
-        self.scanner.take_up_scan(scan)
+        self.scanner.take_up_scan(scan).inspect_err(|error| {
+            // Not known before either, and still worth a line.
+            lock(&self.laser.known).add(LaserState::Unknown, &error.to_string());
+        })
     }
 
     fn resume_scan(&self) -> Result<(), ScannerError> {

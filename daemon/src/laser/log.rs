@@ -31,13 +31,11 @@ struct Written<'a> {
     entry: &'a LaserEntry,
 }
 
-/// A line as it is read.
+/// As much of a line as every version has.
 #[derive(Deserialize)]
-struct Kept {
+struct Versioned {
     #[serde(default = "unsaid")]
     version: u32,
-    #[serde(flatten)]
-    entry: LaserEntry,
 }
 
 fn unsaid() -> u32 {
@@ -108,9 +106,8 @@ impl Log {
 }
 
 /// The last entries of the log, and the bytes up to the end of its last whole line. A line that
-/// was cut short is passed over, as is one of a later version, whose meaning is not known; one
-/// that was written again, since the disk had not said that
-/// it was safe, counts once.
+/// was cut short is passed over, as is one of a later version, whose meaning is not known; one that
+/// was written again, since the disk had not said that it was safe, counts once.
 fn read_tail(path: &Path) -> io::Result<(VecDeque<LaserEntry>, u64)> {
     let mut file = File::open(path)?;
     let bytes = file.seek(SeekFrom::End(0))?;
@@ -118,19 +115,23 @@ fn read_tail(path: &Path) -> io::Result<(VecDeque<LaserEntry>, u64)> {
     let mut tail = Vec::new();
     file.take(TAIL_BYTES).read_to_end(&mut tail)?;
     let cut_short = tail.iter().rev().take_while(|&&byte| byte != b'\n').count();
-    let (known, later): (Vec<Kept>, Vec<Kept>) = tail
-        .split(|&byte| byte == b'\n')
-        .filter_map(|line| serde_json::from_slice(line).ok())
-        .partition(|kept: &Kept| kept.version <= VERSION);
-    if let Some(kept) = later.last() {
+    let mut entries: Vec<LaserEntry> = Vec::new();
+    let mut later = Vec::new();
+    for line in tail.split(|&byte| byte == b'\n') {
+        // Before the rest, which a later version may write in words of its own.
+        match serde_json::from_slice(line) {
+            Ok(Versioned { version }) if version > VERSION => later.push(version),
+            _ => entries.extend(serde_json::from_slice::<LaserEntry>(line).ok()),
+        }
+    }
+    if let Some(version) = later.last() {
         tracing::warn!(
             log = %path.display(),
             lines = later.len(),
-            version = kept.version,
+            version,
             "lines of the laser's log are of a later version of Relief, and are not shown"
         );
     }
-    let mut entries: Vec<LaserEntry> = known.into_iter().map(|kept| kept.entry).collect();
     entries.dedup();
     entries.drain(..entries.len().saturating_sub(MOST_SHOWN));
     Ok((entries.into(), bytes - cut_short as u64))
@@ -215,7 +216,7 @@ mod tests {
     fn a_line_of_a_later_version_is_passed_over() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("laser.jsonl");
-        let later = r#"{"version":3,"at":"1","laser":"on","cause":"c"}"#;
+        let later = r#"{"version":3,"at":"1","laser":"on","cause":"c","scanner":"s"}"#;
         fs::write(&path, format!("{later}\n")).unwrap();
         let (mut log, entries) = Log::open(&LocalDisk, &path).unwrap();
         assert!(entries.is_empty(), "{entries:?}");
