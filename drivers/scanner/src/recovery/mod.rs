@@ -414,6 +414,7 @@ impl Recovery {
     /// A column that is there already, measured again; the last of them decides.
     fn compare(&mut self, again: RawColumn, now: Duration) {
         let last = again.index + 1 == self.handed;
+        let is_new = again.index >= self.old_below;
         if self.kept.has(again.index) {
             self.again.push(again);
         }
@@ -425,7 +426,13 @@ impl Recovery {
             Head::Cartesian { count_pm } => f64::from(count_pm) * 1e-9,
         };
         match overlap::compare(self.kept.iter(), &std::mem::take(&mut self.again), count_mm) {
-            Ok(()) => self.go_on(),
+            Ok(()) => {
+                if is_new {
+                    // The laser has been seen on.
+                    self.unattended_until = now + self.unattended();
+                }
+                self.go_on();
+            }
             Err(how) => {
                 let error = ScannerError::Moved {
                     column: self.handed - 1,
