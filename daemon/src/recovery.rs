@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use relief_api::{Event, JobState, Scan, ScanState, WebhookEvent};
-use scan_record::{EndCause, Ending, JournalReader};
+use scan_record::{EndCause, Ending, JournalReader, JournalWriter};
 
 use crate::acquisition::Rest;
 use crate::error::ServiceError;
@@ -85,6 +85,23 @@ impl Found {
 }
 
 impl Service {
+    /// What the journal of a scan tells. One that has all its columns and no end gets its end.
+    fn found(&self, scan: &str) -> Found {
+        let path = self.journal_path(scan);
+        let mut found = Found::in_journal(&path);
+        if let Ok(rest) = &found.rest
+            && found.columns == rest.columns
+        {
+            let ended = JournalWriter::continue_on(&*self.disk, &path, rest.continuation)
+                .and_then(|journal| journal.finish(&EndCause::Complete));
+            match ended {
+                Ok(_) => (found.state, found.reason) = (ScanState::Complete, None),
+                Err(error) => found.rest = Err(error.to_string()),
+            }
+        }
+        found
+    }
+
     /// After a restart: notes how scans ended that were under way, and what was kept of
     /// them. One that had its last column is complete, and is processed. Gives those that can
     /// be gone on with.
@@ -94,7 +111,7 @@ impl Service {
             if scan.state.is_over() {
                 continue;
             }
-            let mut found = Found::in_journal(&self.journal_path(&scan.id));
+            let mut found = self.found(&scan.id);
             if found.state == ScanState::Interrupted {
                 match self.may_go_on(&scan, &found) {
                     Ok(rest) => {
@@ -140,7 +157,7 @@ impl Service {
             if self.store.scan(&id)?.is_some() {
                 continue;
             }
-            let mut found = Found::in_journal(&self.journal_path(&id));
+            let mut found = self.found(&id);
             let Some(mut scan) = found.begun.take().filter(|scan| scan.id == id) else {
                 tracing::error!(
                     journal = %self.journal_path(&id).display(),

@@ -86,7 +86,9 @@ impl<'a> Keeper<'a> {
         };
         let closed = self.journal.finish(&cause).map_err(|e| e.to_string());
         let result = result.and(closed.map(drop));
-        self.live.finish(result.is_ok());
+        if result.is_ok() {
+            self.live.finish();
+        }
         result
     }
 

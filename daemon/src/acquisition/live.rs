@@ -44,6 +44,15 @@ impl<'a> Live<'a> {
         }
     }
 
+    /// None at all: the job regrids from the journal.
+    pub(super) fn none(service: &'a Service, scan: &'a str) -> Self {
+        Self {
+            service,
+            scan,
+            growing: None,
+        }
+    }
+
     /// The grid columns that this column finished, for showing.
     pub(super) fn push(&mut self, column: Column) -> Vec<LiveColumn> {
         let Some(growing) = &mut self.growing else {
@@ -71,9 +80,9 @@ impl<'a> Live<'a> {
             .map_or(0.0, |growing| growing.grid.settings.pitch_mm)
     }
 
-    /// Puts the rest of the grid aside for the job, or forgets it for a scan without one.
-    pub(super) fn finish(self, wanted: bool) {
-        let Some(mut growing) = self.growing else {
+    /// Puts the rest of the grid aside for the job.
+    pub(super) fn finish(mut self) {
+        let Some(mut growing) = self.growing.take() else {
             return;
         };
         let rest = growing.regridder.finish();
@@ -82,10 +91,19 @@ impl<'a> Live<'a> {
             .try_for_each(|column| growing.file.append(column))
             .and_then(|()| growing.file.finish());
         match written {
-            Ok(()) if wanted => self.service.keep_grid(self.scan, growing.grid),
-            _ => self.service.forget_grid(self.scan),
+            Ok(()) => self.service.keep_grid(self.scan, growing.grid),
+            Err(_) => self.service.forget_grid(self.scan),
         }
-        tracing::debug!(scan = self.scan, wanted, "live range image finished");
+        tracing::debug!(scan = self.scan, "live range image finished");
+    }
+}
+
+/// One that nobody has finished is wanted by no job.
+impl Drop for Live<'_> {
+    fn drop(&mut self) {
+        if self.growing.take().is_some() {
+            self.service.forget_grid(self.scan);
+        }
     }
 }
 

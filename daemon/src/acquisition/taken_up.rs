@@ -4,7 +4,7 @@ use std::io::Read;
 use std::path::Path;
 use std::time::Duration;
 
-use scan_record::{EndCause, JournalReader, JournalWriter, most_bytes};
+use scan_record::{Continuation, EndCause, JournalReader, JournalWriter, most_bytes};
 
 use super::columns::measured;
 use super::heading::interrupted;
@@ -26,6 +26,8 @@ pub(crate) struct Rest {
     pub(crate) columns: u32,
     /// Most samples of a column.
     pub(crate) samples: u16,
+    /// Where the journal goes on.
+    pub(crate) continuation: Continuation,
 }
 
 impl Rest {
@@ -50,6 +52,7 @@ impl Rest {
         Ok(Self {
             columns: scan.info().columns,
             samples: plan.samples,
+            continuation,
         })
     }
 }
@@ -79,10 +82,14 @@ pub(super) fn take_up(
     let header = reader.header().clone();
     let (mut scan, plan) =
         interrupted(&header).ok_or_else(|| not(&"its journal says too little"))?;
-    let mut live = Live::new(service, id, &ticket.processing, &header, &plan);
+    let mut live = if how.live {
+        Live::new(service, id, &ticket.processing, &header, &plan)
+    } else {
+        Live::none(service, id)
+    };
     while let Some(column) = reader.next_column().map_err(|error| not(&error))? {
         pulse.beat();
-        if how.live && ticket.abort.reason().is_none() {
+        if ticket.abort.reason().is_none() {
             live.push(column.calibrated(&header.calibration));
         }
         scan.add(measured(column)).map_err(|error| not(&error))?;
@@ -95,14 +102,7 @@ pub(super) fn take_up(
     let mut journal = journal.map_err(|error| not(&error))?;
     let abort = || ticket.abort.reason();
     if let Some(reason) = abort() {
-        return aborted(journal, live, reason);
-    }
-    if scan.is_whole() {
-        journal
-            .finish(&EndCause::Complete)
-            .map_err(|error| not(&error))?;
-        live.finish(true);
-        return Ok(());
+        return aborted(journal, reason);
     }
     journal
         .reserve(
@@ -127,15 +127,14 @@ pub(super) fn take_up(
     // now on stops the scanner. Dropped, the stream turns the laser off.
     if let Some(reason) = abort() {
         drop(stream);
-        return aborted(journal, live, reason);
+        return aborted(journal, reason);
     }
     let keeper = Keeper::new(service, ticket, &header, journal, live);
     Ok(keeper.keep_all(stream, pulse)?)
 }
 
 /// Ends a scan that nobody wants any more, before it has gone on.
-fn aborted(journal: JournalWriter, live: Live<'_>, reason: String) -> Result<(), Failure> {
-    live.finish(false);
+fn aborted(journal: JournalWriter, reason: String) -> Result<(), Failure> {
     match journal.finish(&EndCause::Aborted(reason.clone())) {
         Ok(_) => Err(Failure::from(reason)),
         Err(error) => Err(Failure::from(error.to_string())),

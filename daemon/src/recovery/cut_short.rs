@@ -67,7 +67,8 @@ impl Service {
             ))
         } else if seen.is_none() {
             Some(format!(
-                "the computer was started anew, or somebody wanted the scan to end{ASKED}"
+                "nothing tells that it went on by itself a short while ago: the computer was started \
+                 anew, or somebody had been asked or had ended it{ASKED}"
             ))
         } else {
             None
@@ -98,7 +99,8 @@ impl Service {
     /// Goes on with scans that were cut short. One that cannot be gone on with after all stays
     /// as it is, with all columns that are kept.
     pub(crate) fn take_up_scans(self: &Arc<Self>, scans: Vec<CutShort>) {
-        for CutShort { scan, rest, how } in scans {
+        // The newest first: of two on one scanner it is the one that was under way.
+        for CutShort { scan, rest, how } in scans.into_iter().rev() {
             if let Err(error) = self.take_up_scan(&scan, &rest, how) {
                 let mut left = scan;
                 tracing::warn!(scan = %left.id, %error, "a scan that was cut short is not gone on with");

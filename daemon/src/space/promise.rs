@@ -4,15 +4,12 @@
 //! never; until then the room looks free to a scan that begins on another scanner.
 
 use std::fs;
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use crate::error::ServiceError;
 use crate::service::lock;
-
-/// Bytes of a block as `stat` counts them.
-const BLOCK_BYTES: u64 = 512;
+use crate::space::on_disk;
 
 /// What was promised to the scans under way: journals, and the most bytes of each.
 #[derive(Debug, Default)]
@@ -65,7 +62,7 @@ fn outstanding(promises: &[(PathBuf, u64)]) -> u64 {
 
 /// Bytes that a journal has taken of its disk, those set aside included.
 pub(super) fn taken_bytes(journal: &Path) -> u64 {
-    fs::metadata(journal).map_or(0, |journal| journal.blocks().saturating_mul(BLOCK_BYTES))
+    fs::metadata(journal).map_or(0, |journal| on_disk(&journal))
 }
 
 #[cfg(test)]

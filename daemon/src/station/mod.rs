@@ -207,11 +207,19 @@ impl Station {
         // First the reason: whoever takes the scan stops the scanner as soon as it is asked to.
         self.laser.stop_asked(reason);
         abort.ask(reason);
-        if let Err(error) = self.scanner.abort() {
-            tracing::warn!(scanner = self.name, %error, "cannot tell the scanner to stop");
-        }
-        // Before anybody is told, so that no other start of the service goes on with it.
-        abort.presence.end();
+        std::thread::scope(|scope| {
+            // No other start of the service is to go on with it, from this moment on and whatever
+            // the scanner does; nor does the scanner wait for a disk.
+            let end = || abort.presence.end();
+            let thread = std::thread::Builder::new().name(self.loop_name("abort-noted"));
+            let noted = thread.spawn_scoped(scope, end);
+            if let Err(error) = self.scanner.abort() {
+                tracing::warn!(scanner = self.name, %error, "cannot tell the scanner to stop");
+            }
+            if noted.is_err() {
+                end();
+            }
+        });
         Some(stopped)
     }
 

@@ -3,7 +3,7 @@
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::Path;
-use std::sync::{Arc, Barrier};
+use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
 
 use relief_api::{Scan, ScanState, Status, path};
@@ -13,7 +13,7 @@ use storage::LocalDisk;
 use tempfile::TempDir;
 
 use crate::fake::{COLUMNS, FakeScanner};
-use crate::rig::{Rig, ended, settled};
+use crate::rig::{GUARD, Rig, ended, job_over, settled};
 
 /// Columns that are kept when it dies.
 const KEPT: u32 = 10;
@@ -23,9 +23,13 @@ async fn amid() -> (Rig, Scan) {
     let rig = Rig::new().await;
     rig.scanner.allow(KEPT);
     let scan = rig.start_scan("cut").await;
-    while active(&rig).await.is_none_or(|scan| scan.columns < KEPT) {
-        tokio::time::sleep(Duration::from_millis(5)).await;
-    }
+    let kept = async {
+        while active(&rig).await.is_none_or(|scan| scan.columns < KEPT) {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    };
+    let kept = tokio::time::timeout(GUARD, kept).await;
+    kept.expect("columns are kept");
     (rig, scan)
 }
 
@@ -177,25 +181,24 @@ async fn a_scan_that_somebody_has_ended_does_not_go_on_by_itself() {
 #[tokio::test(flavor = "multi_thread")]
 async fn an_abort_while_a_scan_is_taken_up_holds() {
     let (first, scan) = amid().await;
-    let (asked, go) = (Arc::new(Barrier::new(2)), Arc::new(Barrier::new(2)));
-    let (told, wait) = (Arc::clone(&asked), Arc::clone(&go));
+    let (told, asked) = mpsc::channel();
+    let (go, wait) = mpsc::channel::<()>();
+    let held = Mutex::new(Some((told, wait)));
     let hold = move |scanner: &FakeScanner| {
-        let (told, wait) = (Arc::clone(&told), Arc::clone(&wait));
+        let (told, wait) = held.lock().unwrap().take().expect("one scanner");
         scanner.on_start(move || {
-            told.wait();
-            wait.wait();
+            told.send(()).unwrap();
+            // Also if the test has failed meanwhile.
+            let _ = wait.recv_timeout(GUARD);
         });
     };
     let disk = Arc::new(LocalDisk);
     let rig = Rig::start_before(left_by(&first), disk, |_| {}, hold).await;
     let mut events = rig.client.events().await;
-    tokio::task::spawn_blocking(move || asked.wait())
-        .await
-        .unwrap();
+    let asked = tokio::task::spawn_blocking(move || asked.recv_timeout(GUARD));
+    asked.await.unwrap().expect("the scan is taken up");
     let _: Scan = rig.client.post(&path::scan_abort(&scan.id), &()).await;
-    tokio::task::spawn_blocking(move || go.wait())
-        .await
-        .unwrap();
+    go.send(()).unwrap();
     let over = ended(&mut events, &scan.id).await;
     assert_eq!((over.state, over.columns), (ScanState::Aborted, KEPT));
     assert!(!rig.scanner.laser_is_on());
@@ -231,7 +234,41 @@ async fn a_scan_goes_on_after_the_service_died_only_where_it_may() {
     let _: Scan = rig.client.post(&path::scan_resume(&scan.id), &()).await;
     let over = ended(&mut events, &scan.id).await;
     assert_eq!((over.state, over.columns), (ScanState::Complete, COLUMNS));
+    // No live range image was made of a part of it.
+    let job = job_over(&mut events, &rig, over.jobs[0]).await;
+    let other = Rig::new().await;
+    let (undisturbed, _) = other.scan_to_result("cut").await;
+    let picture = |rig: &Rig, result: &str| {
+        fs::read(rig.daemon.spool_dir().join(result).join("range.png")).unwrap()
+    };
+    assert!(picture(&rig, &job.result) == picture(&other, &undisturbed.id));
+    other.daemon.shutdown().await;
     rig.daemon.shutdown().await;
+}
+
+/// All columns are there, and the service died before the journal got its end.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_scan_with_all_its_columns_is_complete_without_scanner_or_person() {
+    let (first, scan) = amid().await;
+    let folder = left_by(&first);
+    first.scanner.allow_all();
+    let mut events = first.client.events().await;
+    if active(&first).await.is_some() {
+        ended(&mut events, &scan.id).await;
+    }
+    let whole = fs::read(first.journal(&scan.id)).unwrap();
+    // An end record is a kind, a length, a cause, a count and a checksum.
+    let cut = &whole[..whole.len() - (1 + 4 + 1 + 4 + 4)];
+    let journal = folder.path().join(format!("state/scans/{}.scan", scan.id));
+    fs::write(journal, cut).unwrap();
+    let rig = Rig::start(folder, |config| config.scanner.resume = false).await;
+    let over: Scan = rig.client.get(&path::scan(&scan.id)).await;
+    assert_eq!((over.state, over.columns), (ScanState::Complete, COLUMNS));
+    assert_eq!(over.jobs.len(), 1);
+    assert!(rig.scanner.taken_up().is_empty());
+    assert!(fs::read(rig.journal(&scan.id)).unwrap() == whole);
+    rig.daemon.shutdown().await;
+    first.daemon.shutdown().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -15,6 +15,9 @@ use tempfile::TempDir;
 use crate::client::{Client, Events};
 use crate::fake::FakeScanner;
 
+/// Longer than anything takes that is waited for.
+pub(crate) const GUARD: Duration = Duration::from_secs(60);
+
 pub(crate) struct Rig {
     pub(crate) daemon: Daemon,
     pub(crate) client: Client,
@@ -134,13 +137,17 @@ pub(crate) async fn ended(events: &mut Events, id: &str) -> Scan {
 
 /// The scan once its state is no longer `starting`.
 pub(crate) async fn settled(client: &Client, id: &str) -> Scan {
-    loop {
-        let scan: Scan = client.get(&path::scan(id)).await;
-        if scan.state != ScanState::Starting {
-            return scan;
+    let settled = async {
+        loop {
+            let scan: Scan = client.get(&path::scan(id)).await;
+            if scan.state != ScanState::Starting {
+                return scan;
+            }
+            tokio::time::sleep(Duration::from_millis(5)).await;
         }
-        tokio::time::sleep(Duration::from_millis(5)).await;
-    }
+    };
+    let settled = tokio::time::timeout(GUARD, settled).await;
+    settled.expect("the scan stays as it is")
 }
 
 /// Waits for a job's end, which may be over already. The stream may still hold the end of

@@ -187,16 +187,21 @@ pub(crate) fn a_part_moved_while_the_service_was_dead_waits_for_a_person() -> Re
     service.end()
 }
 
-/// Waits until the scan waits for a person; why.
+/// Waits until it is kept that the scan waits for a person; why.
 async fn waits_for_a_person(client: &Client, id: &str) -> Result<String> {
-    loop {
-        let scan: Scan = client.get(&path::scan(id)).await?;
-        ensure!(!scan.state.is_over(), "{scan:?}");
-        if scan.state == ScanState::Paused && scan.needs_person {
-            return Ok(scan.reason.unwrap_or_default());
-        }
-        tokio::time::sleep(std::time::Duration::from_millis(10)).await;
-    }
+    let mut events = client.events().await?;
+    let waits = |scan: &Scan| scan.state == ScanState::Paused && scan.needs_person;
+    let told = |event: &Event| match event {
+        // Told once it is kept; what a status shows need not be yet.
+        Event::Scan(scan) if scan.id == id && waits(scan) => Some(scan.clone()),
+        _ => None,
+    };
+    let scan: Scan = client.get(&path::scan(id)).await?;
+    let scan = match waits(&scan) {
+        true => scan,
+        false => events.until(told).await?.1,
+    };
+    Ok(scan.reason.unwrap_or_default())
 }
 
 pub(crate) fn two_scans_survive_the_death_of_the_service() -> Result<()> {

@@ -110,10 +110,4 @@ impl InterruptedScan {
     pub fn columns(&self) -> u32 {
         self.columns
     }
-
-    /// Whether all of it is there.
-    #[must_use]
-    pub fn is_whole(&self) -> bool {
-        self.columns == self.info.columns
-    }
 }

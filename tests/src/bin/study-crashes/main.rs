@@ -20,7 +20,7 @@ use anyhow::{Context, Result, ensure};
 use clap::Parser;
 use relief_api::{Scan, ScanState, StartScan, Status, path};
 use relief_tests::mutations::Dice;
-use relief_tests::rig::{Client, Program, small_house};
+use relief_tests::rig::{Client, GUARD, Program, small_house};
 use sim_scanner::config::SimConfig;
 use sim_scanner::control::Control;
 use sim_scanner::device::{DeviceSettings, Event as Happened};
@@ -325,7 +325,9 @@ async fn under_way(client: &Client) -> Result<Option<Scan>> {
 
 /// Waits until no scan is under way.
 async fn none_under_way(client: &Client) -> Result<()> {
-    while under_way(client).await?.is_some() {
+    let waiting = Instant::now();
+    while let Some(scan) = under_way(client).await? {
+        ensure!(waiting.elapsed() < GUARD, "it goes on and on: {scan:?}");
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
     Ok(())

@@ -153,7 +153,9 @@ impl Promises {
                 let columns = journal_columns(&journal)?;
                 ensure!(columns.len() == scan.columns as usize, "{}", scan.id);
                 if scan.state == ScanState::Complete {
+                    // The first of all was left alone.
                     if self.columns.is_empty() {
+                        ensure!(scan.interruption.is_none(), "{} was cut short", scan.id);
                         self.columns.clone_from(&columns);
                     }
                     ensure!(columns == self.columns, "{} has other columns", scan.id);
