@@ -19,8 +19,6 @@ const SLACK: Duration = Duration::from_secs(2);
 pub(super) struct Guard {
     /// When it was last on, or a person last said that it may be.
     fine: Option<Duration>,
-    /// Since when it has been on without a break.
-    lit_since: Option<Duration>,
     asleep_since: Option<Duration>,
 }
 
@@ -38,23 +36,18 @@ impl Simulation {
     /// The laser is off while a person is waited for and while the host sleeps, at the latest
     /// after the dead-man time; and it does not go on again by itself once it has been off for
     /// so long that somebody may have come to the table.
-    ///
-    /// A request that a line brings once more much later may light it while a person is waited
-    /// for, until the driver notices: no longer than the dead-man time either.
     pub(super) fn watch_the_laser(&mut self) -> Result<()> {
         let seed = self.conditions.seed;
         if self.now >= self.asleep_until {
             self.guard.asleep_since = None;
         }
         if !self.device.snapshot(self.now).laser_on {
-            self.guard.lit_since = None;
             return Ok(());
         }
-        let lit_since = *self.guard.lit_since.get_or_insert(self.now);
         let longest = self.settings.dead_man + SLACK;
-        let asked = self.asked_since.map(|since| since.max(lit_since));
         ensure!(
-            asked.is_none_or(|since| self.now <= since + longest),
+            self.asked_since
+                .is_none_or(|since| self.now <= since + longest),
             "seed {seed}: the laser is on while a person is waited for: {:?}",
             self.told
         );
