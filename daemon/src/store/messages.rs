@@ -521,6 +521,25 @@ mod tests {
         assert_eq!(store.deliveries("a").unwrap()[1..], [delivery]);
     }
 
+    /// The webhook was taken out and put in again while a message of before was under way.
+    #[test]
+    fn what_becomes_of_one_message_is_not_taken_for_anothers() {
+        let (_folder, store) = open();
+        let [before, after] = [outgoing("a", 1), outgoing("a", 2)];
+        store.put_messages(std::slice::from_ref(&before)).unwrap();
+        store.forget_other_webhooks(&[]).unwrap();
+        store.put_messages(std::slice::from_ref(&after)).unwrap();
+        let (mut late, waits) = (before.message, after.message);
+        late.delivery.attempts = 1;
+        store.keep_attempt("a", 1, &late).unwrap();
+        assert_eq!(store.message("a", 1).unwrap(), Some(waits.clone()));
+        late.delivery.state = DeliveryState::Delivered;
+        store.end_message("a", 1, &late.delivery).unwrap();
+        assert_eq!(store.message("a", 1).unwrap(), Some(waits));
+        let delivered = |delivery: &Delivery| delivery.state == DeliveryState::Delivered;
+        assert!(!store.deliveries("a").unwrap().iter().any(delivered));
+    }
+
     #[test]
     fn too_many_messages_push_out_the_oldest_and_the_log_is_bounded() {
         let (_folder, store) = open();

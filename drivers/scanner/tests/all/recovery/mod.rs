@@ -47,6 +47,25 @@ fn a_computer_that_was_suspended_for_long_asks_a_person_first() {
 }
 
 #[test]
+fn the_last_columns_measured_again_show_the_laser_as_well_as_new_ones() {
+    let mut rig = Rig::new();
+    rig.plugged = false;
+    rig.run_for(20 * MINUTE);
+    assert!(rig.asks());
+    rig.plugged = true;
+    rig.resume();
+    let columns = rig.columns;
+    rig.run_until("going on", |rig| rig.resumed > 0);
+    assert_eq!(rig.columns, columns, "a new column has come already");
+    rig.told.clear();
+    rig.plugged = false;
+    rig.run_for(14 * MINUTE);
+    assert!(!rig.asks(), "{:?}", rig.told);
+    rig.plugged = true;
+    rig.run_to_its_end();
+}
+
+#[test]
 fn columns_that_a_sleeping_computer_finds_in_its_buffers_are_no_news() {
     let mut rig = Rig::new();
     rig.run_until("columns", |rig| rig.columns > 20);

@@ -31,6 +31,8 @@ pub(super) struct Rig {
     pub(super) plugged: bool,
     pub(super) scan: Recovery,
     pub(super) columns: u32,
+    /// How often it has gone on after a pause.
+    pub(super) resumed: u32,
     pub(super) told: Vec<Pause>,
     pub(super) over: Option<Result<(), ScannerError>>,
     pub(super) mishap: Mishap,
@@ -74,6 +76,7 @@ impl Rig {
             plugged: true,
             scan,
             columns: 0,
+            resumed: 0,
             told: Vec::new(),
             over: None,
             mishap: Mishap::None,
@@ -153,7 +156,7 @@ impl Rig {
                     }
                 }
                 Progress::Paused(pause) => self.told.push(pause),
-                Progress::Resumed => {}
+                Progress::Resumed => self.resumed += 1,
                 Progress::Over(result) => self.over = Some(result),
             }
         }
