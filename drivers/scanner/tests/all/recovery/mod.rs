@@ -49,6 +49,7 @@ fn a_computer_that_was_suspended_for_long_asks_a_person_first() {
 #[test]
 fn the_last_columns_measured_again_show_the_laser_as_well_as_new_ones() {
     let mut rig = Rig::new();
+    rig.device.columns_per_poll = 1;
     rig.plugged = false;
     rig.run_for(20 * MINUTE);
     assert!(rig.asks());
