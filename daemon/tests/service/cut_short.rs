@@ -217,6 +217,9 @@ async fn a_scan_goes_on_after_the_service_died_only_where_it_may() {
         let paused = settled(&rig.client, &scan.id).await;
         let interruption = paused.interruption.clone().unwrap();
         assert_eq!((interruption.times, interruption.columns), (times, KEPT));
+        // The live range image may be what ends it.
+        let grid = format!("state/scans/{}.grid", scan.id);
+        assert_eq!(rig.folder.path().join(grid).exists(), times < 3);
         if times < 3 {
             assert!(!paused.needs_person, "{paused:?}");
         } else {
