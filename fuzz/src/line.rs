@@ -82,7 +82,7 @@ impl Line {
     fn open() -> Self {
         let (source, settings) = SOURCE.clone();
         Self {
-            session: Session::new("fuzz", LinkSettings::default(), Duration::ZERO),
+            session: Session::new("fuzz", LinkSettings::default(), 0, Duration::ZERO),
             device: MemoryLink::new(source, settings, 1),
             now: Duration::ZERO,
             tickets: 0,
@@ -127,7 +127,9 @@ impl Line {
                     }
                 }
                 Event::Lost(_) => {
-                    self.session = Session::new("fuzz", LinkSettings::default(), self.now);
+                    let first_tag = self.session.next_tag();
+                    self.session =
+                        Session::new("fuzz", LinkSettings::default(), first_tag, self.now);
                 }
                 Event::Ready(_) | Event::ScanOver(_) => {}
             }

@@ -21,16 +21,20 @@ const PASSES_OVER_SINCE_VERSION: u8 = 2;
 #[derive(Debug, Clone, Default)]
 pub struct OnceOnly {
     last: Option<(Packet, Frame)>,
-    /// Checksums of the requests carried out of late in this session.
-    known: Deque<u32, KNOWN_REQUESTS>,
+    /// Tags and checksums of the requests answered of late, in this session and before.
+    known: Deque<(u16, u32), KNOWN_REQUESTS>,
     passes_over: bool,
 }
 
 impl OnceOnly {
-    /// A session has been opened in this version: all is forgotten, since its host may number its
-    /// requests as an earlier one did.
-    pub fn opened(&mut self, version: u8) {
-        self.forget();
+    /// A session has been opened in this version, by a `Hello` of this tag.
+    ///
+    /// What has a tag behind that one, by less than half of the circle of tags, can only come
+    /// late from now on, and is remembered. The rest is forgotten, since the host is going to
+    /// use those tags.
+    pub fn opened(&mut self, version: u8, tag: u16) {
+        self.last = None;
+        self.known.retain(|(known, _)| is_behind(*known, tag));
         self.passes_over = version >= PASSES_OVER_SINCE_VERSION;
     }
 
@@ -48,7 +52,7 @@ impl OnceOnly {
     #[must_use]
     pub fn is_late(&self, request: &Packet) -> bool {
         let checksum = request.checksum();
-        self.passes_over && self.known.iter().any(|known| *known == checksum)
+        self.passes_over && self.known.iter().any(|(_, known)| *known == checksum)
     }
 
     /// Keeps the reply to a request, whether it was carried out or refused: what was refused once
@@ -62,7 +66,7 @@ impl OnceOnly {
             self.known.pop_front();
         }
         // There is room now.
-        let _ = self.known.push_back(request.checksum());
+        let _ = self.known.push_back((request.tag, request.checksum()));
         self.last = Some((request, reply));
     }
 
@@ -70,6 +74,11 @@ impl OnceOnly {
     pub fn forget(&mut self) {
         *self = Self::default();
     }
+}
+
+/// Whether a tag was counted before this one, on the shorter way around the circle.
+fn is_behind(tag: u16, this: u16) -> bool {
+    (1..=u16::MAX / 2).contains(&this.wrapping_sub(tag))
 }
 
 #[cfg(test)]
@@ -96,7 +105,7 @@ mod tests {
     #[test]
     fn what_was_carried_out_before_is_known_again() {
         let mut once = OnceOnly::default();
-        once.opened(2);
+        once.opened(2, u16::MAX);
         for tag in 0..40 {
             carry_out(&mut once, tag);
         }
@@ -104,7 +113,7 @@ mod tests {
         assert!(!once.is_late(&home(7)), "so much is not remembered");
         assert!((8..40).all(|tag| once.is_late(&home(tag))));
         // Another host begins to count where it likes.
-        once.opened(2);
+        once.opened(2, 37);
         assert!(once.recall(&home(39)).is_none());
         carry_out(&mut once, 39);
         carry_out(&mut once, 38);
@@ -116,9 +125,30 @@ mod tests {
     }
 
     #[test]
+    fn what_an_earlier_session_asked_for_is_known_where_it_can_only_be_late() {
+        let mut once = OnceOnly::default();
+        once.opened(2, 0xfff0);
+        for tag in [0xfff1, 0xffff, 0, 1] {
+            carry_out(&mut once, tag);
+        }
+        // The same host goes on counting.
+        once.opened(2, 2);
+        for tag in [0xfff1, 0xffff, 0, 1] {
+            assert!(once.is_late(&home(tag)), "{tag}");
+            assert!(once.recall(&home(tag)).is_none());
+        }
+        // A host that begins behind them is going to use those tags.
+        once.opened(2, 0xfffe);
+        assert!(once.is_late(&home(0xfff1)));
+        for tag in [0xffff, 0, 1] {
+            carry_out(&mut once, tag);
+        }
+    }
+
+    #[test]
     fn in_version_1_nothing_is_passed_over() {
         let mut once = OnceOnly::default();
-        once.opened(1);
+        once.opened(1, 0);
         carry_out(&mut once, 1);
         carry_out(&mut once, 2);
         assert!(!once.is_late(&home(1)));

@@ -161,7 +161,7 @@ impl Device {
         self.halt(ScanEndReason::Closed, now);
         self.scan = None;
         self.version = newest.min(hello.max_version);
-        self.once.opened(self.version);
+        self.once.opened(self.version, packet.tag);
         // What a silent host brought about is over once there is a new session. What needs a
         // person's eye stays until somebody has said so.
         self.faults = self

@@ -68,6 +68,8 @@ struct Simulation {
     /// Time that will have passed, for all, when anything is looked at next.
     leap: Duration,
     session: Option<Session>,
+    /// The first tag of the next session.
+    next_tag: u16,
     /// By the host's clock.
     connect_at: Duration,
     identity: Option<Box<Identity>>,
@@ -128,6 +130,7 @@ impl Simulation {
             clock: HostClock::default(),
             leap: Duration::ZERO,
             session: None,
+            next_tag: 0,
             connect_at: now,
             identity: None,
             stage: Stage::Home(None),

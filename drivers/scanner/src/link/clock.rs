@@ -18,6 +18,12 @@ impl Clock {
         }
     }
 
+    /// The seconds at the start, around the circle of tags: so requests are numbered ahead of
+    /// those of a program that had the device before.
+    pub(super) fn first_tag(self) -> u16 {
+        self.start.as_secs() as u16
+    }
+
     pub(super) fn now(self) -> Duration {
         since_boot().saturating_sub(self.start)
     }

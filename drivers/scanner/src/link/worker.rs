@@ -48,6 +48,8 @@ pub(super) struct Worker {
     calls: Receiver<Call>,
     clock: Clock,
     line: Option<Line>,
+    /// The first tag of the next session.
+    next_tag: u16,
     backoff: Backoff,
     retry_at: Duration,
     last_attempt: Option<Duration>,
@@ -80,13 +82,15 @@ impl Worker {
         settings: LinkSettings,
         calls: Receiver<Call>,
     ) -> Self {
+        let clock = Clock::start();
         Self {
             connector,
             backoff: Backoff::new(&settings),
             settings,
             calls,
-            clock: Clock::start(),
+            clock,
             line: None,
+            next_tag: clock.first_tag(),
             retry_at: Duration::ZERO,
             last_attempt: None,
             logged: None,
@@ -257,7 +261,8 @@ impl Worker {
         match self.connector.connect() {
             Ok(transport) => {
                 let name = self.connector.name();
-                let mut session = Session::new(&name, self.settings.clone(), self.now());
+                let settings = self.settings.clone();
+                let mut session = Session::new(&name, settings, self.next_tag, now);
                 for (ticket, command) in self.parked.drain(..) {
                     session.command(ticket, command, now);
                 }
@@ -397,7 +402,9 @@ impl Worker {
             tracing::warn!(%error, "scanner not connected");
             self.logged = Some(error.clone());
         }
-        self.line = None;
+        if let Some(line) = self.line.take() {
+            self.next_tag = line.session.next_tag();
+        }
         self.identity = None;
         for reply in self.identify.drain(..) {
             let _ = reply.send(Err(error.clone()));

@@ -85,8 +85,12 @@ struct Motion {
 
 impl Session {
     /// Begins a session: the first bytes to send are there at once.
+    ///
+    /// Requests are numbered from `first_tag` on. Where that is the [`Session::next_tag`] of the
+    /// session before, the device knows what the line still holds of that one, and passes it
+    /// over.
     #[must_use]
-    pub fn new(port: &str, settings: LinkSettings, now: Duration) -> Self {
+    pub fn new(port: &str, settings: LinkSettings, first_tag: u16, now: Duration) -> Self {
         let mut session = Self {
             port: port.to_owned(),
             settings,
@@ -94,7 +98,7 @@ impl Session {
             outbox: Vec::new(),
             events: VecDeque::new(),
             phase: Phase::Opening,
-            requests: Requests::new(now),
+            requests: Requests::new(first_tag),
             waiting: VecDeque::new(),
             boot_id: 0,
             version: 0,
@@ -105,8 +109,8 @@ impl Session {
             recovered: None,
             scan: None,
             scan_over: false,
-            // As with tags: another number than those of earlier sessions.
-            next_scan_id: now.as_millis() as u16,
+            // No scan takes less than a request, so this is ahead of earlier scans' too.
+            next_scan_id: first_tag,
             stream_tag: 0,
             last_sent: now,
             last_heard: now,
@@ -118,6 +122,12 @@ impl Session {
         };
         session.open(now);
         session
+    }
+
+    /// The tag of the next request, for the session after this one to begin with.
+    #[must_use]
+    pub fn next_tag(&self) -> u16 {
+        self.requests.next_tag()
     }
 
     /// Takes bytes from the device.

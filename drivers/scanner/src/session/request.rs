@@ -3,7 +3,8 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use scanner_protocol::{Faults, Frame, Request, ScanPlan};
+use scanner_protocol::commands::Heartbeat;
+use scanner_protocol::{Faults, Frame, Message, Request, ScanPlan};
 
 use super::event::Ticket;
 use super::scan::Taken;
@@ -134,6 +135,8 @@ pub(super) struct Open {
 #[derive(Debug, Default)]
 pub(super) struct Requests {
     next_tag: u16,
+    /// Heartbeats are many, and count by themselves: so the tags of the others last.
+    next_heartbeat: u16,
     queue: VecDeque<Open>,
     open: Option<Open>,
     abort: Option<Open>,
@@ -150,22 +153,33 @@ pub(super) enum Due {
 }
 
 impl Requests {
-    /// No requests yet. The first tag depends on the time, so that a reply to an earlier
-    /// session, late on a line with buffers, is not taken for one of this session.
-    pub(super) fn new(now: Duration) -> Self {
+    /// No requests yet.
+    pub(super) fn new(first_tag: u16) -> Self {
         Self {
-            next_tag: now.as_millis() as u16,
+            next_tag: first_tag,
+            next_heartbeat: first_tag,
             ..Self::default()
         }
     }
 
+    /// The tag of the next request, heartbeats aside.
+    pub(super) fn next_tag(&self) -> u16 {
+        self.next_tag
+    }
+
     /// Queues a request. An abort overtakes all others.
     pub(super) fn push<R: Request>(&mut self, request: &R, purpose: Purpose) {
-        self.next_tag = self.next_tag.wrapping_add(1);
+        let counter = if R::KIND == Heartbeat::KIND {
+            &mut self.next_heartbeat
+        } else {
+            &mut self.next_tag
+        };
+        let tag = *counter;
+        *counter = tag.wrapping_add(1);
         let open = Open {
-            tag: self.next_tag,
+            tag,
             kind: R::KIND,
-            frame: Frame::new(self.next_tag, request),
+            frame: Frame::new(tag, request),
             attempts: 0,
             due: Duration::ZERO,
             purpose,
@@ -267,5 +281,25 @@ impl Requests {
             .flatten()
             .map(|open| open.due)
             .min()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use scanner_protocol::commands::Home;
+
+    use super::*;
+
+    #[test]
+    fn heartbeats_use_up_no_tags_of_others() {
+        let mut requests = Requests::new(u16::MAX);
+        requests.push(&Home {}, Purpose::Home(Ticket(1)));
+        for _ in 0..3 {
+            requests.push(&Heartbeat {}, Purpose::Heartbeat);
+        }
+        requests.push(&Home {}, Purpose::Home(Ticket(2)));
+        let tags: Vec<u16> = requests.queue.iter().map(|open| open.tag).collect();
+        assert_eq!(tags, [u16::MAX, u16::MAX, 0, 1, 0]);
+        assert_eq!(requests.next_tag(), 1);
     }
 }

@@ -79,7 +79,7 @@ impl Bench {
         settings.validate().unwrap();
         Self {
             now: Duration::ZERO,
-            session: Session::new("bench", settings, Duration::ZERO),
+            session: Session::new("bench", settings, 0, Duration::ZERO),
             device,
             mishaps: Mishaps::default(),
             columns: Vec::new(),

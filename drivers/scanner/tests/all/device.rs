@@ -38,6 +38,8 @@ pub(crate) struct Device {
     pub(crate) moved_counts: i32,
     /// How often each kind of request was carried out.
     pub(crate) homings: u32,
+    /// The tags of all but heartbeats and stream frames, each once.
+    pub(crate) asked: Vec<u16>,
     pub(crate) scans: u32,
     pub(crate) aborts: u32,
     pub(crate) most_unacknowledged: u32,
@@ -108,6 +110,7 @@ impl Device {
             gap: 0..0,
             moved_counts: 0,
             homings: 0,
+            asked: Vec::new(),
             scans: 0,
             aborts: 0,
             most_unacknowledged: 0,
@@ -196,6 +199,13 @@ impl Device {
                 continue;
             };
             let tag = packet.tag;
+            let counts = !matches!(
+                message,
+                HostMessage::Heartbeat(_) | HostMessage::Grant(_) | HostMessage::Resend(_)
+            );
+            if counts && self.asked.last() != Some(&tag) {
+                self.asked.push(tag);
+            }
             let before = self.out.len();
             let repeatable = matches!(message, HostMessage::Heartbeat(_) | HostMessage::Abort(_));
             self.message(message, tag, packet.kind, now);

@@ -244,6 +244,14 @@ fn a_pulled_cable_is_told_and_the_next_connection_is_found() {
         assert_eq!(stream.next().unwrap(), Some(expected(index)));
     }
     assert_eq!(stream.next(), Ok(None));
+
+    // Requests are counted through both connections, so that the device knows old ones again.
+    let asked = running.device.lock().unwrap().asked.clone();
+    assert!(asked.len() > 8, "{asked:?}");
+    for pair in asked.windows(2) {
+        let ahead = pair[1].wrapping_sub(pair[0]);
+        assert!((1..=3).contains(&ahead), "{asked:?}");
+    }
 }
 
 #[test]

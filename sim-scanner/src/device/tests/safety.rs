@@ -236,6 +236,23 @@ fn a_request_that_the_line_brings_late_lights_no_laser() {
     assert_eq!(host.link.device().events().len(), log);
     // What comes next is heard.
     assert!(matches!(host.ask(&Home {}), DeviceMessage::HomeStarted(_)));
+    host.link.pass(SECOND);
+
+    // The same after the line has been opened anew, by a host that counts on.
+    host.greet(2000);
+    host.told();
+    let log = host.link.device().events().len();
+    host.link.send(again.as_bytes());
+    assert_eq!(host.told(), [], "nobody waits for an answer");
+    assert_eq!(host.link.device().events().len(), log);
+
+    // A host that begins to count there anew is heard.
+    host.tag = scan_tag - 2;
+    host.greet(2000);
+    host.told();
+    host.link.send(again.as_bytes());
+    let tags: Vec<u16> = host.told().iter().map(|(tag, _)| *tag).collect();
+    assert_eq!(tags, [scan_tag], "answered");
 }
 
 /// It could not be carried out then, and could be now, when nobody waits for it any more.

@@ -24,7 +24,8 @@ impl Simulation {
                 self.connect_at = shown + self.settings.reconnect_first;
             }
             None if shown >= self.connect_at => {
-                self.session = Some(Session::new("line", self.settings.clone(), shown));
+                let settings = self.settings.clone();
+                self.session = Some(Session::new("line", settings, self.next_tag, shown));
             }
             None => {}
             Some(session) => {
@@ -105,7 +106,8 @@ impl Simulation {
                 Some(Event::Ready(identity)) => self.identity = Some(identity),
                 Some(Event::Finished(ticket, result)) => self.finished(ticket, result)?,
                 Some(Event::Lost(_)) => {
-                    self.session = None;
+                    let lost = self.session.take();
+                    self.next_tag = lost.map_or(self.next_tag, |lost| lost.next_tag());
                     self.line.hang_up();
                     self.connect_at = shown + self.settings.reconnect_first;
                 }

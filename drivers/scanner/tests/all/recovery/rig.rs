@@ -47,7 +47,7 @@ impl Rig {
     pub(super) fn before_any_column() -> Self {
         let mut device = Device::homed();
         let mut now = Duration::ZERO;
-        let mut session = Session::new("bench", settings(), now);
+        let mut session = Session::new("bench", settings(), 0, now);
         let (mut identity, mut begun) = (None, None);
         while begun.is_none() {
             now += STEP;
@@ -115,7 +115,7 @@ impl Rig {
     fn host(&mut self) {
         let now = self.now;
         if self.session.is_none() && self.plugged {
-            self.session = Some(Session::new("bench", settings(), now));
+            self.session = Some(Session::new("bench", settings(), 0, now));
         }
         if let Some(session) = &mut self.session {
             if !self.plugged {
