@@ -284,6 +284,8 @@ async fn live(
     }
     service.ready().await?;
     if wait_for_jobs {
+        // A scan that waits for a person would keep it from that for ever.
+        none_under_way(service.client()).await?;
         service.idle().await?;
     }
     let mut heard = Heard::listen(service.client()).await?;
