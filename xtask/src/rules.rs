@@ -25,7 +25,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("regrid", &["range-image"]),
     ("segment", &["range-image"]),
     ("shapes", &[]),
-    ("reconstruct", &["nurbs", "range-image"]),
+    ("reconstruct", &["nurbs", "range-image", "shapes"]),
     ("cad-exchange", &["nurbs", "reconstruct"]),
     (
         "pipeline",

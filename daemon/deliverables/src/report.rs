@@ -113,6 +113,9 @@ pub struct SettingsReport {
     /// Region of interest, least and greatest z.
     #[serde(default)]
     pub roi_z_mm: [Option<f64>; 2],
+    /// Which kinds of surface faces may be of: `auto` or `freeform`.
+    #[serde(default)]
+    pub kinds: String,
     /// Root mean square distance from the nodes at which a fitted surface is not made
     /// nearer still; no bound on how far it may lie off.
     pub tolerance_mm: f64,
@@ -157,7 +160,8 @@ pub struct RegionsReport {
 pub struct RegionReport {
     /// Its label, from 1.
     pub label: u16,
-    /// What its surface is; `none` where no face could be made of it.
+    /// What its surface is: `plane`, `sphere`, `cylinder`, `cone`, `torus`, or `bicubic patches`
+    /// for a free form; `none` where no face could be made of it.
     pub kind: String,
     /// What shape its samples speak for, whatever the faces in the CAD file are made of.
     #[serde(default)]

@@ -67,6 +67,7 @@ fn settings(settings: &Settings, cad: &CadOptions) -> SettingsReport {
         roi_x_mm: limits(settings.regrid.roi.x_mm),
         roi_y_mm: limits(settings.regrid.roi.y_mm),
         roi_z_mm: limits(settings.regrid.roi.z_mm),
+        kinds: settings.kinds.as_str().to_owned(),
         tolerance_mm: settings.reconstruct.tolerance_mm,
         iges_entities: cad.entity_number(),
     }
@@ -162,8 +163,9 @@ fn crumbs(outcome: &Outcome) -> CrumbsReport {
 }
 
 fn kind(face: &Face) -> &'static str {
-    match face.surface {
-        Surface::Patches(_) => "bicubic patches",
+    match (&face.shape, &face.surface) {
+        (Some(shape), _) => shape.family().as_str(),
+        (None, Surface::Patches(_)) => "bicubic patches",
     }
 }
 

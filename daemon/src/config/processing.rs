@@ -94,6 +94,16 @@ pub enum BackgroundPolicy {
     Keep,
 }
 
+/// Which kinds of surface faces may be of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kinds {
+    /// Planes, spheres, cylinders, cones and tori where the samples speak for them.
+    Auto,
+    /// Free forms all.
+    FreeForm,
+}
+
 /// From the range image to regions.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -134,6 +144,9 @@ pub struct ReconstructConfig {
     /// Which road is taken.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<Method>,
+    /// Which kinds of surface faces may be of; method `relief` only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kinds: Option<Kinds>,
     /// Root mean square distance from the range image at which a surface is near enough and
     /// gets no further knots; no bound on how far it may lie off.
     #[serde(
@@ -258,6 +271,13 @@ impl Processing {
             self.segment.background.map(|policy| match policy {
                 BackgroundPolicy::Remove => pipeline::BackgroundPolicy::Remove,
                 BackgroundPolicy::Keep => pipeline::BackgroundPolicy::Keep,
+            }),
+        );
+        set(
+            &mut settings.kinds,
+            self.reconstruct.kinds.map(|kinds| match kinds {
+                Kinds::Auto => pipeline::Kinds::Auto,
+                Kinds::FreeForm => pipeline::Kinds::FreeForm,
             }),
         );
         self.reconstruct.apply(&mut settings.reconstruct);

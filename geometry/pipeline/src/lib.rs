@@ -23,7 +23,7 @@ mod settings;
 pub use background::{BackgroundPolicy, Crumb, NodeRole, UnknownPolicy};
 pub use columns::{Columns, ReadAgainError};
 pub use extent::{Extent, finest_pitch_mm, no_surface, unusual_size};
-pub use kinds::{Basis, RegionKind};
+pub use kinds::{Basis, Kinds, RegionKind, UnknownKinds};
 pub use method::{Method, UnknownMethod};
 pub use observer::{Observer, Stage};
 pub use part::{Part, divide};

@@ -1,14 +1,15 @@
 //! The stages in their order.
 
 use range_image::{Cancelled, Column, RangeImage, RegionMap};
-use reconstruct::{ReconstructError, Reconstruction};
+use reconstruct::{Fitted, ReconstructError, Reconstruction};
 use regrid::RegridError;
 use segment::SegmentError;
+use shapes::Shape;
 
 use crate::columns::{Columns, ReadAgainError};
 use crate::kinds::{RegionKind, kinds};
 use crate::part::divide;
-use crate::{Background, Crumb, NodeRole, View};
+use crate::{Background, Crumb, Kinds, NodeRole, View};
 use crate::{Observer, Settings, SettingsError, Stage};
 
 /// What became of a range image.
@@ -227,11 +228,16 @@ fn in_view(
 
     observer.stage(Stage::Reconstruct);
     let part_image = part.image.as_ref().unwrap_or(image);
-    let (reconstruction, kinds) = rayon::join(
-        || reconstruct::reconstruct(part_image, &part.regions, &settings.reconstruct, observer),
+    let (fitted, kinds) = rayon::join(
+        || Fitted::of(part_image, &part.regions, &settings.reconstruct, observer),
         || kinds(part_image, &part.regions, columns, observer),
     );
-    let (reconstruction, kinds) = (reconstruction?, kinds?);
+    let (fitted, kinds) = (fitted?, kinds?);
+    let shapes: Vec<Option<Shape>> = match settings.kinds {
+        Kinds::Auto => kinds.iter().map(RegionKind::shape).collect(),
+        Kinds::FreeForm => Vec::new(),
+    };
+    let reconstruction = fitted.reconstruct(&shapes, observer)?;
     Ok(Outcome {
         regions: part.regions,
         background: part.background,

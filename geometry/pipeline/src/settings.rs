@@ -4,7 +4,7 @@ use reconstruct::ReconstructSettings;
 use regrid::{Estimator, RegridSettings};
 use segment::SegmentSettings;
 
-use crate::{BackgroundPolicy, Method};
+use crate::{BackgroundPolicy, Kinds, Method};
 
 /// The settings of every stage that can change the result.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +15,8 @@ pub struct Settings {
     pub segment: SegmentSettings,
     /// What is done with a recognised table or back plane.
     pub background: BackgroundPolicy,
+    /// Which kinds of surface faces may be of; method `relief` only.
+    pub kinds: Kinds,
     /// From regions to the model.
     pub reconstruct: ReconstructSettings,
 }
@@ -37,6 +39,7 @@ impl Settings {
             regrid: RegridSettings::with_pitch(pitch_mm),
             segment: SegmentSettings::default(),
             background: BackgroundPolicy::default(),
+            kinds: Kinds::default(),
             reconstruct: ReconstructSettings::default(),
         }
         .with_seed(1)

@@ -4,10 +4,12 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use pipeline::{
-    Basis, Method, NodeRole, Observer, Outcome, PipelineError, Settings, Stage, View, divide,
-    process, process_columns,
+    Basis, Kinds, Method, NodeRole, Observer, Outcome, PipelineError, Settings, Stage, View,
+    divide, process, process_columns,
 };
 use range_image::{Column, Lattice, Monitor, RangeImage, Sample, Unmonitored};
+use reconstruct::Surface;
+use shapes::Family;
 
 /// A roof of two planes that meet at x = 0, 24 mm square, columns 0.5 mm apart.
 fn roof() -> Vec<Column> {
@@ -81,9 +83,12 @@ fn a_roof_becomes_two_faces_that_share_its_ridge() {
 
 #[test]
 fn a_range_image_alone_is_not_regridded() {
-    let (image, with_columns) =
-        process_columns(&roof(), &Settings::new(0.5), &Unmonitored).unwrap();
-    let from_image = process(&image, &Settings::new(0.5), &Unmonitored).unwrap();
+    let settings = Settings {
+        kinds: Kinds::FreeForm,
+        ..Settings::new(0.5)
+    };
+    let (image, with_columns) = process_columns(&roof(), &settings, &Unmonitored).unwrap();
+    let from_image = process(&image, &settings, &Unmonitored).unwrap();
     assert_eq!(from_image.stages, [Stage::Segment, Stage::Reconstruct]);
     assert_eq!(from_image.regions, with_columns.regions);
     assert_eq!(from_image.reconstruction, with_columns.reconstruction);
@@ -210,4 +215,59 @@ fn a_smooth_plane_behind_has_no_say_in_the_faces_of_a_rough_part() {
         .iter()
         .filter(|&&label| label != 0);
     assert_eq!(of_part.count(), labelled.count());
+}
+
+/// A dome between two planes, as a sphere of 30 mm that rises from a tilted plane.
+fn dome() -> Vec<Column> {
+    (-40..=40)
+        .map(|i| {
+            let x_mm = f64::from(i) * 0.5;
+            let samples = (-40..=40).map(|j| {
+                let y_mm = f64::from(j) * 0.5;
+                let off2 = x_mm * x_mm + y_mm * y_mm;
+                let cap_mm = (30.0_f64 * 30.0 - off2).sqrt() - 26.0;
+                Sample {
+                    y_mm,
+                    z_mm: cap_mm.max(0.05 * x_mm),
+                    intensity: 255,
+                }
+            });
+            Column::new(x_mm, samples.collect())
+        })
+        .collect()
+}
+
+#[test]
+fn surfaces_that_are_known_are_the_faces_themselves() {
+    let (_, outcome) = process_columns(&dome(), &Settings::new(0.5), &Unmonitored).unwrap();
+    let faces = &outcome.reconstruction.model.faces;
+    let families: Vec<_> = faces
+        .iter()
+        .map(|face| face.shape.as_ref().map(|shape| shape.family()))
+        .collect();
+    assert!(families.contains(&Some(Family::Sphere)), "{families:?}");
+    assert!(families.contains(&Some(Family::Plane)), "{families:?}");
+    for face in faces {
+        let Surface::Patches(patches) = &face.surface;
+        let shape = face.shape.as_ref().unwrap();
+        if shape.family() == Family::Plane {
+            assert_eq!(patches.patches.len(), 1);
+        }
+        // Where its border runs as well as within.
+        let coedges = || face.outer.coedges.iter();
+        assert!(coedges().count() > 0);
+        for [x, y, z] in coedges().flat_map(|coedge| coedge.space_curve.sampled(100)) {
+            let off = shape.distance_mm(&nalgebra::Vector3::new(x, y, z));
+            assert!(off.abs() < 2e-3, "{:?} at {x}, {y}: {off}", shape.family());
+        }
+    }
+
+    let settings = Settings {
+        kinds: Kinds::FreeForm,
+        ..Settings::new(0.5)
+    };
+    let (_, outcome) = process_columns(&dome(), &settings, &Unmonitored).unwrap();
+    let faces = &outcome.reconstruction.model.faces;
+    assert!(faces.iter().all(|face| face.shape.is_none()));
+    assert!(outcome.kinds.iter().any(|kind| kind.shape().is_some()));
 }

@@ -2,6 +2,7 @@
 
 use nurbs::{PatchSurface, PiecewiseCubic};
 use range_image::RangeImage;
+use shapes::Shape;
 
 use crate::border::map::PlanarMap;
 use crate::fit::Domain;
@@ -96,6 +97,8 @@ pub(crate) struct Carrier {
     pub(crate) region: u16,
     pub(crate) name: String,
     pub(crate) surface: PatchSurface,
+    /// What the surface is, where that is known.
+    pub(crate) shape: Option<Shape>,
     /// Root mean square residual, millimetres.
     pub(crate) rms_mm: f64,
 }
@@ -167,6 +170,7 @@ pub(crate) fn model(map: &PlanarMap, carriers: Vec<Carrier>, placement: Placemen
                 name: carrier.name,
                 region: carrier.region,
                 surface: Surface::Patches(carrier.surface),
+                shape: carrier.shape,
                 outer,
                 inner,
             });

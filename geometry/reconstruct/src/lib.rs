@@ -18,6 +18,7 @@ pub mod settings;
 
 mod assemble;
 mod border;
+mod known;
 mod lift;
 mod noise;
 mod pieces;
@@ -29,5 +30,5 @@ mod trim;
 
 pub use metrics::Metrics;
 pub use model::{Coedge, Edge, EdgeId, EdgeKind, Face, Loop, Model, Surface, Vertex, VertexId};
-pub use run::{Reconstruction, RegionFit, reconstruct};
+pub use run::{Fitted, Reconstruction, RegionFit, reconstruct};
 pub use settings::{Method, ReconstructError, ReconstructSettings, SettingsError};

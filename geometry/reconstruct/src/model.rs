@@ -6,6 +6,7 @@
 //! surface, and the two lifted curves of a crease meet as well as the surfaces do.
 
 use nurbs::{PatchSurface, PiecewiseCubic};
+use shapes::Shape;
 
 /// Index into [`Model::vertices`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -70,6 +71,9 @@ pub struct Face {
     pub region: u16,
     /// The untrimmed surface; its normal points towards the camera (+z).
     pub surface: Surface,
+    /// What the surface is, where it is of a kind that engineers know by its numbers: the patches
+    /// are this shape to [`SHAPE_TOLERANCE_MM`] root mean square. `None` for a free form.
+    pub shape: Option<Shape>,
     /// Counter-clockwise in the parameter plane.
     pub outer: Loop,
     /// Holes, clockwise in the parameter plane.
@@ -107,3 +111,6 @@ pub struct Coedge {
 
 /// How far a coedge's space curve may lie off its surface, millimetres.
 pub const SPACE_CURVE_TOLERANCE_MM: f64 = 1e-4;
+
+/// How far the patches of a face may lie off its shape, root mean square, millimetres.
+pub const SHAPE_TOLERANCE_MM: f64 = 5e-4;

@@ -3,12 +3,14 @@
 use nurbs::{Observation, PatchSurface};
 use range_image::{Monitor, RangeImage, RegionMap};
 use rayon::prelude::*;
+use shapes::Shape;
 
 use crate::assemble::{Carrier, Placement, domains, model};
 use crate::border::cracks::trace;
 use crate::border::intersection::intersections;
 use crate::border::map::{BorderSettings, PlanarMap, build};
 use crate::fit::{Demand, Domain, FitError, patches_from_spline, patches_through_nodes};
+use crate::known;
 use crate::metrics::{Metrics, compare, psnr_db};
 use crate::model::{Model, Surface};
 use crate::noise::ImageNoise;
@@ -58,117 +60,223 @@ pub struct RegionFit {
 
 /// Margin of a surface around the nodes of its region, pitches: half of one to the
 /// border, and what smoothing may do.
-const SURFACE_MARGIN: f64 = 3.0;
+pub(crate) const SURFACE_MARGIN: f64 = 3.0;
+
+/// A shape is as good as a free-form surface that leaves its nodes so much less, at the least:
+/// that follows the noise, and nodes are the middles of windows, which blunt what bends; the
+/// second figure in pitches.
+const AS_WELL: f64 = 1.5;
+const SMOOTHED: f64 = 0.02;
 
 /// Narrowest span of a fitted spline, pitches.
 const LEAST_SPAN: f64 = 2.0;
 
 /// A node with its place and height in millimetres.
 #[derive(Debug, Clone, Copy)]
-struct Node {
-    column: usize,
-    row: usize,
-    z_mm: f64,
+pub(crate) struct Node {
+    pub(crate) column: usize,
+    pub(crate) row: usize,
+    pub(crate) z_mm: f64,
 }
 
-/// Makes a model of trimmed faces from the regions of a range image.
+/// Makes a model of trimmed faces from the regions of a range image, all of them free-form.
 ///
 /// # Errors
-/// [`ReconstructError`] when a setting is out of range, the map does not belong to the
-/// image, no region can become a face, or the caller cancels.
+/// As [`Fitted::of`] and [`Fitted::reconstruct`].
 pub fn reconstruct(
     image: &RangeImage,
     map: &RegionMap,
     settings: &ReconstructSettings,
     monitor: &dyn Monitor,
 ) -> Result<Reconstruction, ReconstructError> {
-    settings.validate()?;
-    check_input(image, map)?;
-    let limits = PieceLimits {
-        min_nodes: settings.min_piece_nodes,
-        min_hole_nodes: settings.min_hole_nodes,
-    };
-    let pieces = PieceMap::new(map, limits);
-    if pieces.regions.is_empty() {
-        return Err(ReconstructError::NoFaces {
-            regions: usize::from(map.regions()),
-            min_nodes: settings.min_piece_nodes,
-        });
-    }
-    monitor.check()?;
-    let borders = BorderSettings {
-        literal: settings.method == Method::ShimLee,
-        corner_cosine: libm::cos(settings.corner_angle_rad),
-        piece_price: settings.piece_price_pitch2,
-        bound: settings.border_bound_pitches,
-    };
-    let nodes = nodes_of(image, map, &pieces);
-    let placement = Placement::of(image);
-    let noise = ImageNoise::of(image);
-    let cracks = trace(&pieces);
-    let failed = |region: u16| {
-        move |e: FitError| ReconstructError::Fit {
-            label: region,
-            reason: e.to_string(),
-        }
-    };
-    // By the letter of the paper the border comes first, and the surface covers it.
-    let mut early = Vec::new();
-    if settings.method == Method::Relief {
-        let fitted = nodes
-            .par_iter()
-            .zip(&pieces.regions)
-            .map(|(nodes, region)| {
-                monitor.check()?;
-                let domain = around(image, nodes).ok_or(FitError::Empty);
-                let surface =
-                    domain.and_then(|domain| surface(image, nodes, &domain, &noise, settings));
-                surface.map_err(failed(*region))
-            });
-        // Of several errors the first, as without threads.
-        let fitted: Vec<Result<_, ReconstructError>> = fitted.collect();
-        early = fitted.into_iter().collect::<Result<_, _>>()?;
-    }
-    let placed = intersections(&cracks, &early, placement);
-    monitor.progress(0.4);
-    let planar = build(&cracks, &placed, &borders, monitor)?;
+    Fitted::of(image, map, settings, monitor)?.reconstruct(&[], monitor)
+}
 
-    let names = names(&pieces.regions);
-    let mut carriers = Vec::with_capacity(nodes.len());
-    let mut fits: Vec<RegionFit> = Vec::new();
-    for (k, domain) in domains(&planar, placement).into_iter().enumerate() {
-        monitor.check()?;
-        let region = pieces.regions[k];
-        let domain = domain.ok_or(FitError::Empty).map_err(failed(region))?;
-        let surface = match early.get(k) {
-            Some(surface) if domain.is_within(surface) => surface.clone(),
-            _ => surface(image, &nodes[k], &domain, &noise, settings).map_err(failed(region))?,
+/// Regions with a free-form surface each, the first half of the road: what kinds of surface they
+/// are can be found out meanwhile.
+pub struct Fitted<'a> {
+    image: &'a RangeImage,
+    map: &'a RegionMap,
+    settings: &'a ReconstructSettings,
+    pieces: PieceMap,
+    /// Of each piece.
+    nodes: Vec<Vec<Node>>,
+    noise: ImageNoise,
+    /// Of each piece; by the letter of the paper none yet, since there the border comes first,
+    /// and the surface covers it.
+    surfaces: Vec<PatchSurface>,
+}
+
+impl<'a> Fitted<'a> {
+    /// Fits a surface to each piece of a region.
+    ///
+    /// # Errors
+    /// [`ReconstructError`] when a setting is out of range, the map does not belong to the
+    /// image, no region can become a face, or the caller cancels.
+    pub fn of(
+        image: &'a RangeImage,
+        map: &'a RegionMap,
+        settings: &'a ReconstructSettings,
+        monitor: &dyn Monitor,
+    ) -> Result<Self, ReconstructError> {
+        settings.validate()?;
+        check_input(image, map)?;
+        let limits = PieceLimits {
+            min_nodes: settings.min_piece_nodes,
+            min_hole_nodes: settings.min_hole_nodes,
         };
-        let rms_mm = tally(&mut fits, region, image, &nodes[k], &surface);
-        carriers.push(Carrier {
-            region,
-            name: names[k].clone(),
-            surface,
-            rms_mm,
+        let pieces = PieceMap::new(map, limits);
+        if pieces.regions.is_empty() {
+            return Err(ReconstructError::NoFaces {
+                regions: usize::from(map.regions()),
+                min_nodes: settings.min_piece_nodes,
+            });
+        }
+        monitor.check()?;
+        let mut all = Self {
+            nodes: nodes_of(image, map, &pieces),
+            noise: ImageNoise::of(image),
+            surfaces: Vec::new(),
+            image,
+            map,
+            settings,
+            pieces,
+        };
+        if settings.method == Method::Relief {
+            let fitted = (0..all.nodes.len()).into_par_iter().map(|piece| {
+                monitor.check()?;
+                let domain = around(image, &all.nodes[piece]);
+                all.free_form(piece, domain)
+            });
+            // Of several errors the first, as without threads.
+            let fitted: Vec<Result<_, ReconstructError>> = fitted.collect();
+            all.surfaces = fitted.into_iter().collect::<Result<_, _>>()?;
+        }
+        monitor.progress(0.3);
+        Ok(all)
+    }
+
+    /// Draws the borders, and makes the model. Regions of which a shape is known, by label from 1
+    /// on, get that in place of the free-form surface, where their nodes are met by it as well.
+    /// By the letter of the paper none is.
+    ///
+    /// # Errors
+    /// [`ReconstructError`] when a surface cannot be fitted, or the caller cancels.
+    pub fn reconstruct(
+        mut self,
+        shapes: &[Option<Shape>],
+        monitor: &dyn Monitor,
+    ) -> Result<Reconstruction, ReconstructError> {
+        let (image, settings) = (self.image, self.settings);
+        let shapes = self.take_over(shapes);
+        let borders = BorderSettings {
+            literal: settings.method == Method::ShimLee,
+            corner_cosine: libm::cos(settings.corner_angle_rad),
+            piece_price: settings.piece_price_pitch2,
+            bound: settings.border_bound_pitches,
+        };
+        let placement = Placement::of(image);
+        let cracks = trace(&self.pieces);
+        let placed = intersections(&cracks, &self.surfaces, placement);
+        monitor.progress(0.4);
+        let planar = build(&cracks, &placed, &borders, monitor)?;
+
+        let names = names(&self.pieces.regions);
+        let mut carriers = Vec::with_capacity(self.nodes.len());
+        let mut fits: Vec<RegionFit> = Vec::new();
+        for (k, domain) in domains(&planar, placement).into_iter().enumerate() {
+            monitor.check()?;
+            let (surface, shape) = self.surface(k, domain, shapes[k])?;
+            let region = self.pieces.regions[k];
+            let rms_mm = tally(&mut fits, region, image, &self.nodes[k], &surface);
+            carriers.push(Carrier {
+                region,
+                name: names[k].clone(),
+                surface,
+                shape,
+                rms_mm,
+            });
+            monitor.progress(0.4 + 0.4 * (k + 1) as f64 / self.nodes.len() as f64);
+        }
+        for fit in &mut fits {
+            fit.psnr_db = psnr_db(fit.rms_mm);
+        }
+        let model = model(&planar, carriers, placement);
+        monitor.check()?;
+        let restored = restore(image, &model, placement, &mut fits);
+        monitor.progress(1.0);
+        Ok(Reconstruction {
+            metrics: compare(image, &restored),
+            warnings: warnings(&self.pieces, &planar, self.map),
+            model,
+            restored,
+            regions: fits,
+            filled_holes: (self.pieces.filled_holes, self.pieces.filled_nodes),
+            unsmoothed_borders: planar.unsmoothed,
+        })
+    }
+
+    /// Puts shapes in the place of free-form surfaces; gives those taken, of each piece.
+    fn take_over(&mut self, shapes: &[Option<Shape>]) -> Vec<Option<Shape>> {
+        let of_piece = |piece: usize| -> Option<(Shape, PatchSurface)> {
+            let free = self.surfaces.get(piece)?;
+            let label = usize::from(self.pieces.regions[piece]);
+            let shape = *shapes.get(label - 1)?.as_ref()?;
+            let nodes = &self.nodes[piece];
+            let domain = around(self.image, nodes)?;
+            let surface = known::patches(&shape, self.image, nodes, &domain)?;
+            let rms = [&surface, free].map(|s| residuals(self.image, nodes, s).0);
+            let allowed_mm = AS_WELL * rms[1] + SMOOTHED * self.image.pitch_mm();
+            (rms[0] <= allowed_mm).then_some((shape, surface))
+        };
+        let found: Vec<_> = (0..self.nodes.len())
+            .into_par_iter()
+            .map(of_piece)
+            .collect();
+        let mut taken = vec![None; found.len()];
+        for (piece, found) in found.into_iter().enumerate() {
+            if let Some((shape, surface)) = found {
+                taken[piece] = Some(shape);
+                self.surfaces[piece] = surface;
+            }
+        }
+        taken
+    }
+
+    /// The surface of a piece over the domain that its border asks for, and the shape that it is.
+    fn surface(
+        &self,
+        piece: usize,
+        domain: Option<Domain>,
+        shape: Option<Shape>,
+    ) -> Result<(PatchSurface, Option<Shape>), ReconstructError> {
+        let fits = |surface: &&PatchSurface| domain.is_some_and(|domain| domain.is_within(surface));
+        if let Some(surface) = self.surfaces.get(piece).filter(fits) {
+            return Ok((surface.clone(), shape));
+        }
+        if let (Some(shape), Some(domain)) = (shape, domain)
+            && let Some(surface) = known::patches(&shape, self.image, &self.nodes[piece], &domain)
+        {
+            return Ok((surface, Some(shape)));
+        }
+        Ok((self.free_form(piece, domain)?, None))
+    }
+
+    /// A free-form surface of a piece over a domain.
+    fn free_form(
+        &self,
+        piece: usize,
+        domain: Option<Domain>,
+    ) -> Result<PatchSurface, ReconstructError> {
+        let fitted = domain.ok_or(FitError::Empty).and_then(|domain| {
+            let nodes = &self.nodes[piece];
+            surface(self.image, nodes, &domain, &self.noise, self.settings)
         });
-        monitor.progress(0.4 + 0.4 * (k + 1) as f64 / nodes.len() as f64);
+        fitted.map_err(|e| ReconstructError::Fit {
+            label: self.pieces.regions[piece],
+            reason: e.to_string(),
+        })
     }
-    for fit in &mut fits {
-        fit.psnr_db = psnr_db(fit.rms_mm);
-    }
-    let model = model(&planar, carriers, placement);
-    monitor.check()?;
-    let restored = restore(image, &model, placement, &mut fits);
-    monitor.progress(1.0);
-    Ok(Reconstruction {
-        metrics: compare(image, &restored),
-        warnings: warnings(&pieces, &planar, map),
-        model,
-        restored,
-        regions: fits,
-        filled_holes: (pieces.filled_holes, pieces.filled_nodes),
-        unsmoothed_borders: planar.unsmoothed,
-    })
 }
 
 fn check_input(image: &RangeImage, map: &RegionMap) -> Result<(), ReconstructError> {
@@ -278,13 +386,9 @@ fn tally(
     nodes: &[Node],
     surface: &PatchSurface,
 ) -> f64 {
-    let (mut sum, mut max_mm) = (0.0, 0.0_f64);
-    for n in nodes {
-        let off = surface.z(image.x_mm(n.column), image.y_mm(n.row)) - n.z_mm;
-        sum += off * off;
-        max_mm = max_mm.max(off.abs());
-    }
+    let (rms_mm, max_mm) = residuals(image, nodes, surface);
     let count = nodes.len() as f64;
+    let sum = rms_mm * rms_mm * count;
     match fits.last_mut() {
         Some(fit) if fit.label == label => {
             let before = fit.rms_mm * fit.rms_mm * fit.nodes as f64;
@@ -300,12 +404,23 @@ fn tally(
             faces: 1,
             patches: surface.patches.len(),
             area_mm2: 0.0,
-            rms_mm: (sum / count).sqrt(),
+            rms_mm,
             max_mm,
             psnr_db: 0.0,
         }),
     }
-    (sum / count).sqrt()
+    rms_mm
+}
+
+/// Root mean square and greatest residual of nodes, millimetres.
+fn residuals(image: &RangeImage, nodes: &[Node], surface: &PatchSurface) -> (f64, f64) {
+    let (mut sum, mut max_mm) = (0.0, 0.0_f64);
+    for n in nodes {
+        let off = surface.z(image.x_mm(n.column), image.y_mm(n.row)) - n.z_mm;
+        sum += off * off;
+        max_mm = max_mm.max(off.abs());
+    }
+    ((sum / nodes.len() as f64).sqrt(), max_mm)
 }
 
 fn names(regions: &[u16]) -> Vec<String> {

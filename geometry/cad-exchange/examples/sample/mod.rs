@@ -65,6 +65,7 @@ pub(crate) fn model() -> Model {
             outer: border(&barrel, &[(0, false), (1, false), (2, false), (3, false)]),
             inner: vec![border(&barrel, &[(4, true)])],
             surface: Surface::Patches(barrel),
+            shape: None,
         },
         Face {
             name: "Ramp".to_owned(),
@@ -72,6 +73,7 @@ pub(crate) fn model() -> Model {
             outer: border(&ramp, &[(5, false), (6, false), (7, false), (1, true)]),
             inner: Vec::new(),
             surface: Surface::Patches(ramp),
+            shape: None,
         },
     ];
     let vertices = vertices

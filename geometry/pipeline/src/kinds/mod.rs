@@ -2,16 +2,18 @@
 
 mod neighbourhood;
 mod nodes;
+mod policy;
 mod samples;
 
 use core::num::NonZeroU16;
 
 use range_image::{Monitor, RangeImage, RegionMap};
 use rayon::prelude::*;
-use shapes::{Evidence, Sample, decide};
+use shapes::{Evidence, Sample, Shape, Verdict, decide};
 
 use crate::columns::Columns;
 use crate::process::PipelineError;
+pub use policy::{Kinds, UnknownKinds};
 
 /// A region's kind of surface.
 #[derive(Debug, Clone)]
@@ -22,6 +24,17 @@ pub struct RegionKind {
     pub evidence: Evidence,
     /// What it rests on.
     pub basis: Basis,
+}
+
+impl RegionKind {
+    /// The shape, where it is one.
+    #[must_use]
+    pub fn shape(&self) -> Option<Shape> {
+        match &self.evidence.verdict {
+            Verdict::Shape(fit) => Some(fit.shape),
+            Verdict::FreeForm | Verdict::Unknown => None,
+        }
+    }
 }
 
 /// What a verdict rests on.

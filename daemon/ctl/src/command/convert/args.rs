@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use deliverables::{CadOptions, Entities, file_stem};
 use jiff::Timestamp;
-use pipeline::{Method, Settings};
+use pipeline::{Kinds, Method, Settings};
 use scan_files::Units;
 
 use crate::command::part::PartArgs;
@@ -32,6 +32,10 @@ pub(crate) struct Args {
     /// what a .scan file was set to, else ours
     #[arg(long, value_name = "METHOD", value_enum)]
     method: Option<MethodName>,
+    /// Faces that are planes, spheres, cylinders, cones and tori where the samples speak
+    /// for them (auto), or free forms all; default: auto
+    #[arg(long, value_name = "KINDS", value_enum)]
+    kinds: Option<KindsName>,
     /// Root mean square distance from the range image at which a surface is near enough,
     /// millimetres
     #[arg(long, value_name = "MM")]
@@ -88,6 +92,12 @@ pub(crate) struct Args {
 enum MethodName {
     Relief,
     ShimLee,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum KindsName {
+    Auto,
+    Freeform,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -186,6 +196,12 @@ impl Args {
                 MethodName::Relief => Method::Relief,
                 MethodName::ShimLee => Method::ShimLee,
             });
+        }
+        if let Some(kinds) = self.kinds {
+            settings.kinds = match kinds {
+                KindsName::Auto => Kinds::Auto,
+                KindsName::Freeform => Kinds::FreeForm,
+            };
         }
         if let Some(seed) = self.seed {
             settings = settings.with_seed(seed);
