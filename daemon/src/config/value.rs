@@ -274,8 +274,11 @@ pub(super) fn loopback<'de, D: Deserializer<'de>>(
 /// A filter that `tracing` understands.
 pub(super) fn log_filter<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
     let text = String::deserialize(deserializer)?;
-    match tracing_subscriber::EnvFilter::try_new(&text) {
-        Ok(_) if !text.trim().is_empty() => Ok(text),
+    // Not asked about other letters: it cuts a filter with fields of spans at bytes, which may
+    // lie within one, and nothing that could be named in it has any.
+    let is_known = || tracing_subscriber::EnvFilter::try_new(&text).is_ok();
+    match text.is_ascii() && is_known() {
+        true if !text.trim().is_empty() => Ok(text),
         _ => Err(D::Error::custom(format!(
             "\"{text}\" is no log level: use error, warn, info, debug or trace, \
              or a filter such as \"info,reliefd=debug\""
