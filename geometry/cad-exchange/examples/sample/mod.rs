@@ -224,3 +224,27 @@ fn lifted(surface: &PatchSurface, path: &PiecewiseCubic<2>) -> PiecewiseCubic<3>
     }
     PiecewiseCubic::new(breaks, pieces).unwrap()
 }
+
+/// A face of the model lifted anew onto its surface, which rises by `slope` along y from
+/// `at` on, which must be where curves are cut to be lifted: 0 or 18.75.
+pub(crate) fn raised(face: &Face, model: &Model, at: f64, slope: f64) -> Face {
+    let Surface::Patches(old) = &face.surface;
+    let mut v = vec![0.0, at.max(1.0), 30.0];
+    v.dedup();
+    let surface = patches(&old.u_breaks, &v, |x, y| {
+        old.z(x, y) + slope * (y - at).max(0.0)
+    });
+    let border = |border: &Loop| Loop {
+        coedges: border
+            .coedges
+            .iter()
+            .map(|c| coedge(&surface, &model.edges, c.edge.0, c.reversed))
+            .collect(),
+    };
+    Face {
+        outer: border(&face.outer),
+        inner: face.inner.iter().map(border).collect(),
+        surface: Surface::Patches(surface.clone()),
+        ..face.clone()
+    }
+}

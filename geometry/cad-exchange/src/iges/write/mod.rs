@@ -6,12 +6,10 @@
 //! its name (406 form 15); and the trimmed surface (144) over all of these. Colours (314)
 //! come first. So every pointer points back, and one pass numbers everything.
 
-mod check;
 mod colour;
 mod error;
 mod fields;
 mod options;
-mod rounding;
 mod shapes;
 mod sheet;
 
@@ -20,11 +18,13 @@ use std::io;
 use nurbs::PiecewiseCubic;
 use reconstruct::{Face, Loop, Model, Surface};
 
-pub use error::{FaceDefect, WriteError};
-pub use options::{DEFAULT_PALETTE, Entities, WriteOptions};
+pub use crate::common::{DEFAULT_PALETTE, FaceDefect};
+pub use error::WriteError;
+pub use options::{Entities, WriteOptions};
 
+use crate::common::{ROUNDING_PART, SMOOTH_MM, check, without_kinks};
 use colour::Colours;
-use shapes::{Joined, SMOOTH_MM, curve_status, plain_entry};
+use shapes::{Joined, curve_status, plain_entry};
 use sheet::{ColourField, Entry, Pointer, Sheet, Status};
 
 /// Preference of 142 for the curve in space. Neighbours share it, and readers that take
@@ -33,9 +33,6 @@ const PREFER_SPACE_CURVE: usize = 2;
 
 /// Width of lines on paper; the standard wants one above 0.
 const LINE_WIDTH_MM: f64 = 0.1;
-
-/// Part of the resolution that curves may be off for the sake of smooth joints.
-const ROUNDING_PART: f64 = 0.5;
 
 /// How the entities of a face are written.
 #[derive(Debug, Clone, Copy)]
@@ -77,7 +74,7 @@ pub fn write(
     out: &mut impl io::Write,
 ) -> Result<Summary, WriteError> {
     options.validate()?;
-    let resolution_mm = check::check(model, options.resolution_mm)?.max(options.resolution_mm);
+    let resolution_mm = check(model, options.resolution_mm)?.max(options.resolution_mm);
     let mut sheet = Sheet::default();
     let colours = Colours::define(&mut sheet, model, options)?;
     for (index, face) in model.faces.iter().enumerate() {
@@ -180,7 +177,7 @@ fn write_chain<const D: usize>(
     let mut pointers = Vec::with_capacity(curves.len());
     for (curve, next) in curves.iter().zip(curves.iter().cycle().skip(1)) {
         let joined = Joined {
-            curve: &rounding::without_kinks(curve, SMOOTH_MM, rounding_mm),
+            curve: &without_kinks(curve, SMOOTH_MM, rounding_mm),
             end: next.start(),
             closed: curves.len() == 1,
             flat_mm: style.resolution_mm,

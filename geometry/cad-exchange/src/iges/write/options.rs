@@ -1,6 +1,7 @@
 //! What the caller decides about a file.
 
 use super::WriteError;
+use crate::common::DEFAULT_PALETTE;
 
 /// The entities that carry the shape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -11,20 +12,6 @@ pub enum Entities {
     /// B-splines of the same shape, 128 and 126, for readers without the former.
     Rational128,
 }
-
-/// Colours that neighbours are told apart by, red, green and blue of 0 to 255.
-pub const DEFAULT_PALETTE: [[u8; 3]; 10] = [
-    [78, 121, 167],
-    [242, 142, 43],
-    [89, 161, 79],
-    [225, 87, 89],
-    [118, 183, 178],
-    [237, 201, 72],
-    [176, 122, 161],
-    [255, 157, 167],
-    [156, 117, 95],
-    [186, 176, 172],
-];
 
 /// Everything about a file that is not in the model. Characters beyond printable ASCII
 /// are replaced by `_` in the file.

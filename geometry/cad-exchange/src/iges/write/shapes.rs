@@ -5,9 +5,7 @@ use nurbs::{BSplineCurve, KnotVector, PatchSurface, PiecewiseCubic};
 use super::error::WriteError;
 use super::options::Entities;
 use super::sheet::{ColourField, Entry, Pointer, Record, Sheet, Status};
-
-/// Joints whose derivatives differ by less than this, in millimetres, count as smooth.
-pub(super) const SMOOTH_MM: f64 = 1e-9;
+use crate::common::SMOOTH_MM;
 
 /// The same for what 112 claims of its joints; readers that check allow for no more than
 /// rounding.

@@ -6,7 +6,7 @@ use nurbs::{PatchSurface, PiecewiseCubic};
 use reconstruct::model::SPACE_CURVE_TOLERANCE_MM;
 use reconstruct::{Coedge, Face, Loop, Model, Surface, VertexId};
 
-use super::error::{FaceDefect, WriteError};
+use super::defect::{Defect, FaceDefect};
 
 /// Gaps up to this many times the resolution are written, with the file's resolution
 /// raised to the largest of them; a larger one is a defect of the model.
@@ -14,9 +14,9 @@ const GAP_LIMIT_FACTOR: f64 = 10.0;
 
 /// Checks every face and returns the largest gap between things that should meet,
 /// millimetres.
-pub(super) fn check(model: &Model, resolution_mm: f64) -> Result<f64, WriteError> {
+pub(crate) fn check(model: &Model, resolution_mm: f64) -> Result<f64, Defect> {
     if model.faces.is_empty() {
-        return Err(WriteError::NoFaces);
+        return Err(Defect::NoFaces);
     }
     let limit = GAP_LIMIT_FACTOR * resolution_mm.max(SPACE_CURVE_TOLERANCE_MM);
     let mut names = BTreeSet::new();
@@ -26,11 +26,11 @@ pub(super) fn check(model: &Model, resolution_mm: f64) -> Result<f64, WriteError
     };
     for face in &model.faces {
         if !names.insert(face.name.as_str()) {
-            return Err(WriteError::DuplicateName {
+            return Err(Defect::DuplicateName {
                 name: face.name.clone(),
             });
         }
-        check_face(model, face, &mut gaps).map_err(|defect| WriteError::Face {
+        check_face(model, face, &mut gaps).map_err(|defect| Defect::Face {
             face: face.name.clone(),
             defect,
         })?;

@@ -17,7 +17,7 @@ const LARGEST_PART: f64 = 0.25;
 /// The curve with tangents that do not jump, except at corners; nowhere further from the
 /// original than `tolerance_mm`. Jumps below `smooth_mm` (times the narrower piece's
 /// width) are left as they are.
-pub(super) fn without_kinks<const D: usize>(
+pub(crate) fn without_kinks<const D: usize>(
     curve: &PiecewiseCubic<D>,
     smooth_mm: f64,
     tolerance_mm: f64,

@@ -1,0 +1,17 @@
+//! STEP: clear text encoding (ISO 10303-21) of application protocols 242 and 214.
+//!
+//! [`write()`] turns a [`reconstruct::Model`] into shells of trimmed faces that share
+//! their edges and vertices; [`read_model`] reads back what [`write()`] writes.
+//!
+//! A scan sees a part from one side, so its faces never close: they become open shells
+//! (`SHELL_BASED_SURFACE_MODEL`, ISO 10303-42, 6.4.26), and no solid is written.
+
+mod read;
+mod write;
+
+pub use read::{
+    MAX_FILE_BYTES, ReadError, StepEdge, StepEdgeUse, StepFace, StepModel, StepSurface, read_model,
+};
+pub use write::{
+    DEFAULT_PALETTE, FaceDefect, LengthUnit, Schema, Summary, WriteError, WriteOptions, write,
+};

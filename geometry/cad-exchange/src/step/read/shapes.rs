@@ -1,0 +1,137 @@
+//! Points, curves and surfaces, in millimetres.
+
+use nurbs::{BSplineCurve, BSplineSurface, KnotVector, MAX_DEGREE};
+
+use super::exchange::{Exchange, Fields};
+use super::{ReadError, StepSurface};
+
+/// Reads shapes of a file whose unit is so many millimetres.
+pub(super) struct Shapes<'a, 'b> {
+    pub(super) exchange: &'b Exchange<'a>,
+    pub(super) unit_mm: f64,
+}
+
+impl Shapes<'_, '_> {
+    pub(super) fn point(&self, id: u64) -> Result<[f64; 3], ReadError> {
+        self.triple(id, "CARTESIAN_POINT", self.unit_mm)
+    }
+
+    fn triple(&self, id: u64, keyword: &'static str, unit: f64) -> Result<[f64; 3], ReadError> {
+        let mut fields = self.exchange.fields(id, &[keyword])?;
+        fields.skip("its name")?;
+        let numbers = fields.reals("its coordinates")?;
+        match <[f64; 3]>::try_from(numbers) {
+            Ok(triple) => {
+                let triple = triple.map(|c| c * unit);
+                if triple.iter().all(|c| c.is_finite()) {
+                    Ok(triple)
+                } else {
+                    Err(fields.defect("a coordinate is beyond all numbers"))
+                }
+            }
+            Err(_) => Err(fields.defect("it does not have three coordinates")),
+        }
+    }
+
+    pub(super) fn curve(&self, id: u64) -> Result<BSplineCurve<3>, ReadError> {
+        let mut fields = self.exchange.fields(id, &["B_SPLINE_CURVE_WITH_KNOTS"])?;
+        fields.skip("its name")?;
+        let degree = fields.count("its degree")?;
+        let points = self.points(&fields.ids("its control points")?)?;
+        for what in ["its form", "closed", "self-intersecting"] {
+            fields.skip(what)?;
+        }
+        let multiplicities = fields.counts("its multiplicities")?;
+        let breaks = fields.reals("its knots")?;
+        let knots = knots(&fields, degree, points.len(), &multiplicities, &breaks)?;
+        BSplineCurve::new(knots, points).map_err(|defect| fields.defect(defect.to_string()))
+    }
+
+    fn points(&self, ids: &[u64]) -> Result<Vec<[f64; 3]>, ReadError> {
+        ids.iter().map(|&id| self.point(id)).collect()
+    }
+
+    pub(super) fn surface(&self, id: u64) -> Result<StepSurface, ReadError> {
+        let known = ["B_SPLINE_SURFACE_WITH_KNOTS", "PLANE"];
+        let fields = self.exchange.fields(id, &known)?;
+        if fields.keyword() == "PLANE" {
+            self.plane(fields)
+        } else {
+            self.spline(fields).map(StepSurface::BSpline)
+        }
+    }
+
+    fn plane(&self, mut fields: Fields<'_, '_>) -> Result<StepSurface, ReadError> {
+        fields.skip("its name")?;
+        let placement = fields.id("its placement")?;
+        let mut placement = self.exchange.fields(placement, &["AXIS2_PLACEMENT_3D"])?;
+        placement.skip("its name")?;
+        Ok(StepSurface::Plane {
+            origin_mm: self.point(placement.id("its location")?)?,
+            normal: self.triple(placement.id("its axis")?, "DIRECTION", 1.0)?,
+            x: self.triple(placement.id("its x")?, "DIRECTION", 1.0)?,
+        })
+    }
+
+    fn spline(&self, mut fields: Fields<'_, '_>) -> Result<BSplineSurface, ReadError> {
+        fields.skip("its name")?;
+        let u_degree = fields.count("its degree in u")?;
+        let v_degree = fields.count("its degree in v")?;
+        let rows = fields.rows("its control points")?;
+        let (columns, width) = (rows.len(), rows.first().map_or(0, Vec::len));
+        if rows.iter().any(|row| row.len() != width) {
+            return Err(fields.defect("its rows of control points differ in length"));
+        }
+        for what in [
+            "its form",
+            "closed in u",
+            "closed in v",
+            "self-intersecting",
+        ] {
+            fields.skip(what)?;
+        }
+        let u_multiplicities = fields.counts("its multiplicities in u")?;
+        let v_multiplicities = fields.counts("its multiplicities in v")?;
+        let u_breaks = fields.reals("its knots in u")?;
+        let v_breaks = fields.reals("its knots in v")?;
+        let u = knots(&fields, u_degree, columns, &u_multiplicities, &u_breaks)?;
+        let v = knots(&fields, v_degree, width, &v_multiplicities, &v_breaks)?;
+        let points = self.points(&rows.concat())?;
+        BSplineSurface::new(u, v, points).map_err(|defect| fields.defect(defect.to_string()))
+    }
+}
+
+/// A knot vector for so many control points. Multiplicities are held against that number
+/// before any knot is repeated.
+fn knots(
+    fields: &Fields<'_, '_>,
+    degree: usize,
+    points: usize,
+    multiplicities: &[usize],
+    breaks: &[f64],
+) -> Result<KnotVector, ReadError> {
+    if degree > MAX_DEGREE {
+        return Err(fields.defect(format!("a degree of {degree} is not read")));
+    }
+    if multiplicities.len() != breaks.len() {
+        return Err(fields.defect(format!(
+            "it has {} multiplicities, but {} knots",
+            multiplicities.len(),
+            breaks.len()
+        )));
+    }
+    let sum = multiplicities
+        .iter()
+        .try_fold(0_usize, |sum, &m| sum.checked_add(m));
+    if sum != Some(points + degree + 1) || multiplicities.contains(&0) {
+        return Err(fields.defect(format!(
+            "its multiplicities do not suit {points} control points of degree {degree}"
+        )));
+    }
+    let repeated = breaks
+        .iter()
+        .zip(multiplicities)
+        .flat_map(|(&b, &m)| std::iter::repeat_n(b, m))
+        .collect();
+    KnotVector::new(degree, repeated).map_err(|defect| fields.defect(defect.to_string()))
+}

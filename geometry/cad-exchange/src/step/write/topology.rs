@@ -1,0 +1,369 @@
+//! What faces share: vertices, edges, shells.
+//!
+//! In the model two faces share the path of their border in the x-y plane, and each lifts
+//! it onto its own surface. Along a crease the two curves differ by what is left of the
+//! noise; there one curve between them is written for both, as far as they are near to
+//! each other. Along a step they differ wholly, and each face keeps its own.
+
+use std::collections::BTreeMap;
+
+use nurbs::PiecewiseCubic;
+use reconstruct::{Coedge, EdgeKind, Loop, Model, VertexId};
+
+use super::bend::bent;
+use super::options::WriteOptions;
+use super::seam::{Seam, distance};
+use crate::common::{ROUNDING_PART, SMOOTH_MM, without_kinks};
+
+/// The use of an edge by a loop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Use {
+    /// Index into [`Topology::edges`].
+    pub(super) edge: usize,
+    /// The loop runs from the edge's start to its end.
+    pub(super) forward: bool,
+}
+
+/// A curve between two vertices, millimetres.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Strand {
+    /// Indices into [`Topology::vertices`].
+    pub(super) ends: [usize; 2],
+    pub(super) curve: PiecewiseCubic<3>,
+}
+
+/// What is written once, however many faces it belongs to.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Topology {
+    /// Millimetres.
+    pub(super) vertices: Vec<[f64; 3]>,
+    pub(super) edges: Vec<Strand>,
+    /// By face, loop (the outer one first) and coedge.
+    pub(super) uses: Vec<Vec<Vec<Use>>>,
+    /// Indices of faces that hang together, each in ascending order.
+    pub(super) shells: Vec<Vec<usize>>,
+    /// Edges of two faces.
+    pub(super) shared: usize,
+    /// Those of them that are cut where the two curves part.
+    pub(super) partly_shared: usize,
+    /// Creases whose two curves are too far apart to be shared.
+    pub(super) parted: usize,
+    /// How far a written curve or vertex is from where a face of the model has it.
+    pub(super) gap_mm: f64,
+}
+
+/// Indices of a face, of a loop of it (the outer one first) and of a coedge of that.
+pub(super) type Place = (usize, usize, usize);
+
+/// The topology of a checked model.
+pub(super) fn topology(model: &Model, options: &WriteOptions) -> Topology {
+    let (seams, parted) = seams(model, options.sharing_mm);
+    let corners = Corners::new(model, &seams);
+    let mut hung = Groups::new(model.faces.len());
+    for (place, seam) in &seams {
+        hung.join(place.0, seam.other.0);
+    }
+    let mut out = Topology {
+        vertices: corners.points.clone(),
+        shells: hung.groups(),
+        shared: seams.len(),
+        partly_shared: seams.values().filter(|seam| !seam.is_whole()).count(),
+        parted,
+        ..Topology::default()
+    };
+    let mut rounds = Builder {
+        out: &mut out,
+        rounding_mm: ROUNDING_PART * options.resolution_mm,
+        written: BTreeMap::new(),
+    };
+    let mut uses = Vec::new();
+    for (face, loops) in model.faces.iter().map(loops_of).enumerate() {
+        let mut chains = Vec::new();
+        for (n, border) in loops.iter().enumerate() {
+            let mut chain = Vec::new();
+            for (k, coedge) in border.coedges.iter().enumerate() {
+                let place = (face, n, k);
+                let ends = corners.ends(model, face, coedge);
+                chain.extend(rounds.coedge(place, &coedge.space_curve, ends, seams.get(&place)));
+            }
+            chains.push(chain);
+        }
+        uses.push(chains);
+    }
+    out.uses = uses;
+    out
+}
+
+/// The creases whose two curves meet, by the place of their first use, and the number of
+/// those that do not.
+fn seams(model: &Model, sharing_mm: f64) -> (BTreeMap<Place, Seam>, usize) {
+    let mut seams = BTreeMap::new();
+    let mut parted = 0;
+    for (edge, places) in places_by_edge(model) {
+        let &[place, other] = places.as_slice() else {
+            continue;
+        };
+        let kind = model.edges.get(edge).map(|edge| edge.kind);
+        let (Some(first), Some(second)) = (coedge(model, place), coedge(model, other)) else {
+            continue;
+        };
+        if kind != Some(EdgeKind::Crease) || first.reversed == second.reversed {
+            continue;
+        }
+        match Seam::between(&first.space_curve, &second.space_curve, other, sharing_mm) {
+            Some(seam) => {
+                seams.insert(place, seam);
+            }
+            None => parted += 1,
+        }
+    }
+    (seams, parted)
+}
+
+/// Writes down strands, shared ones once.
+struct Builder<'a> {
+    out: &'a mut Topology,
+    rounding_mm: f64,
+    /// What the second user of a seam has to know.
+    written: BTreeMap<Place, Written>,
+}
+
+/// A shared edge as it was written for the first of its faces.
+struct Written {
+    edge: usize,
+    /// Where it begins and ends along the second use, which runs the other way; `None` for
+    /// the ends of that.
+    mirrored: [Option<f64>; 2],
+}
+
+impl Builder<'_> {
+    /// The edges of a coedge in its sense of travel: the shared one, where there is one,
+    /// and what is left of the face's own curve before and after it.
+    fn coedge(
+        &mut self,
+        place: Place,
+        curve: &PiecewiseCubic<3>,
+        ends: [usize; 2],
+        seam: Option<&Seam>,
+    ) -> Vec<Use> {
+        let (first, last) = curve.domain();
+        let (range, edge, forward) = if let Some(seam) = seam {
+            let cut = |whole: bool, vertex: usize, at: [f64; 3], out: &mut Topology| {
+                if whole {
+                    return vertex;
+                }
+                out.vertices.push(at);
+                out.vertices.len() - 1
+            };
+            let start = cut(seam.range.0 == first, ends[0], seam.curve.start(), self.out);
+            let end = cut(seam.range.1 == last, ends[1], seam.curve.end(), self.out);
+            let edge = self.strand(&seam.curve, [start, end], &seam.sides);
+            let mirrored = [
+                (seam.range.1 < last).then_some(seam.range.1),
+                (seam.range.0 > first).then_some(seam.range.0),
+            ]
+            .map(|cut| cut.map(|t| first + (last - t)));
+            let written = Written { edge, mirrored };
+            self.written.insert(seam.other, written);
+            (seam.range, edge, true)
+        } else if let Some(Written { edge, mirrored }) = self.written.remove(&place) {
+            let [from, to] = mirrored;
+            ((from.unwrap_or(first), to.unwrap_or(last)), edge, false)
+        } else {
+            let edge = self.strand(curve, ends, &[curve.clone()]);
+            return vec![Use {
+                edge,
+                forward: true,
+            }];
+        };
+        let shared = Use { edge, forward };
+        let mut cuts = self.out.edges[edge].ends;
+        if !forward {
+            cuts.reverse();
+        }
+        let mut chain = Vec::new();
+        chain.extend(self.rest(curve, (first, range.0), [ends[0], cuts[0]]));
+        chain.push(shared);
+        chain.extend(self.rest(curve, (range.1, last), [cuts[1], ends[1]]));
+        chain
+    }
+
+    /// The part of a face's own curve between two parameters, if there is one.
+    fn rest(
+        &mut self,
+        curve: &PiecewiseCubic<3>,
+        (from, to): (f64, f64),
+        ends: [usize; 2],
+    ) -> Option<Use> {
+        let part = curve.restricted(from, to)?;
+        let edge = self.strand(&part, ends, std::slice::from_ref(&part));
+        Some(Use {
+            edge,
+            forward: true,
+        })
+    }
+
+    /// Adds a curve that is led to its vertices and has no kinks for which readers would
+    /// split it, and notes how far it is from what the faces have.
+    fn strand(
+        &mut self,
+        curve: &PiecewiseCubic<3>,
+        ends: [usize; 2],
+        sides: &[PiecewiseCubic<3>],
+    ) -> usize {
+        let [start, end] = ends.map(|vertex| self.out.vertices[vertex]);
+        let curve = without_kinks(&bent(curve, start, end), SMOOTH_MM, self.rounding_mm);
+        for side in sides {
+            self.out.gap_mm = self.out.gap_mm.max(distance(side, &curve));
+        }
+        self.out.edges.push(Strand { ends, curve });
+        self.out.edges.len() - 1
+    }
+}
+
+fn loops_of(face: &reconstruct::Face) -> Vec<&Loop> {
+    std::iter::once(&face.outer).chain(&face.inner).collect()
+}
+
+fn coedge(model: &Model, (face, n, k): Place) -> Option<&Coedge> {
+    let face = model.faces.get(face)?;
+    loops_of(face).get(n)?.coedges.get(k)
+}
+
+/// Where each edge is used, in the order of the faces.
+fn places_by_edge(model: &Model) -> BTreeMap<usize, Vec<Place>> {
+    let mut places: BTreeMap<usize, Vec<Place>> = BTreeMap::new();
+    for (face, loops) in model.faces.iter().map(loops_of).enumerate() {
+        for (n, border) in loops.iter().enumerate() {
+            for (k, coedge) in border.coedges.iter().enumerate() {
+                places.entry(coedge.edge.0).or_default().push((face, n, k));
+            }
+        }
+    }
+    places
+}
+
+/// Ends of edges. A vertex of the model is a place in the x-y plane; each face has it at
+/// a height of its own, and faces that share an edge have it at one.
+struct Corners {
+    /// Number of each vertex as a face has it.
+    numbers: BTreeMap<(VertexId, usize), usize>,
+    points: Vec<[f64; 3]>,
+}
+
+impl Corners {
+    fn new(model: &Model, seams: &BTreeMap<Place, Seam>) -> Self {
+        let mut nodes: BTreeMap<(VertexId, usize), usize> = BTreeMap::new();
+        let mut points: Vec<[f64; 3]> = Vec::new();
+        for (face, loops) in model.faces.iter().map(loops_of).enumerate() {
+            for coedge in loops.iter().flat_map(|border| &border.coedges) {
+                let (start, _) = ends(model, coedge);
+                nodes.entry((start, face)).or_insert_with(|| {
+                    points.push(coedge.space_curve.start());
+                    points.len() - 1
+                });
+            }
+        }
+        let mut same = Groups::new(points.len());
+        for (&place, seam) in seams {
+            let Some(coedge) = coedge(model, place) else {
+                continue;
+            };
+            let (start, end) = ends(model, coedge);
+            let (first, last) = coedge.space_curve.domain();
+            let shared = [(start, seam.range.0 == first), (end, seam.range.1 == last)];
+            for (vertex, shared) in shared {
+                let node = |face: usize| nodes.get(&(vertex, face));
+                if let (true, Some(&a), Some(&b)) = (shared, node(place.0), node(seam.other.0)) {
+                    same.join(a, b);
+                }
+            }
+        }
+        let groups = same.groups();
+        let mut number_of = vec![0; points.len()];
+        for (number, group) in groups.iter().enumerate() {
+            for &node in group {
+                number_of[node] = number;
+            }
+        }
+        Self {
+            numbers: nodes
+                .into_iter()
+                .map(|(key, node)| (key, number_of[node]))
+                .collect(),
+            points: groups.iter().map(|group| middle(group, &points)).collect(),
+        }
+    }
+
+    /// The vertices of a face's coedge, in its sense of travel.
+    fn ends(&self, model: &Model, face: usize, coedge: &Coedge) -> [usize; 2] {
+        let (start, end) = ends(model, coedge);
+        [start, end].map(|vertex| self.numbers.get(&(vertex, face)).copied().unwrap_or(0))
+    }
+}
+
+/// Half way between the extremes.
+fn middle(group: &[usize], points: &[[f64; 3]]) -> [f64; 3] {
+    [0, 1, 2].map(|d| {
+        let coordinates = || group.iter().map(|&node| points[node][d]);
+        let low = coordinates().fold(f64::INFINITY, f64::min);
+        let high = coordinates().fold(f64::NEG_INFINITY, f64::max);
+        // A point alone keeps its last digit.
+        if low == high { low } else { (low + high) / 2.0 }
+    })
+}
+
+/// The vertices of a coedge in the sense of travel.
+fn ends(model: &Model, coedge: &Coedge) -> (VertexId, VertexId) {
+    let edge = &model.edges[coedge.edge.0];
+    if coedge.reversed {
+        (edge.end, edge.start)
+    } else {
+        (edge.start, edge.end)
+    }
+}
+
+/// Sets of things that are joined one pair at a time.
+struct Groups(Vec<usize>);
+
+impl Groups {
+    fn new(count: usize) -> Self {
+        Self((0..count).collect())
+    }
+
+    /// The least member of a thing's set.
+    fn least(&self, mut of: usize) -> usize {
+        while self.0[of] != of {
+            of = self.0[of];
+        }
+        of
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.least(a), self.least(b));
+        self.0[a.max(b)] = a.min(b);
+    }
+
+    /// The sets, ordered by their least members; members ascend.
+    fn groups(&self) -> Vec<Vec<usize>> {
+        let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for k in 0..self.0.len() {
+            groups.entry(self.least(k)).or_default().push(k);
+        }
+        groups.into_values().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_are_ordered_by_their_least_members() {
+        let mut groups = Groups::new(6);
+        groups.join(5, 3);
+        groups.join(1, 5);
+        groups.join(4, 2);
+        assert_eq!(groups.groups(), [vec![0], vec![1, 3, 5], vec![2, 4]]);
+    }
+}
