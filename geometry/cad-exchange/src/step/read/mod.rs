@@ -7,6 +7,7 @@
 
 mod error;
 mod exchange;
+mod known;
 mod model;
 mod properties;
 mod shapes;

@@ -6,6 +6,7 @@ use std::io::Read;
 use nurbs::{BSplineCurve, BSplineSurface};
 
 use super::exchange::{self, Exchange, Fields};
+use super::known::KNOWN;
 use super::properties::{self, Context, Validation};
 use super::shapes::Shapes;
 use super::syntax::Value;
@@ -92,64 +93,6 @@ pub enum StepSurface {
     /// `B_SPLINE_SURFACE_WITH_KNOTS`.
     BSpline(BSplineSurface),
 }
-
-/// Entities that are read, or that are known to say nothing of the shape.
-const KNOWN: &[&str] = &[
-    "ADVANCED_FACE",
-    "APPLICATION_CONTEXT",
-    "APPLICATION_PROTOCOL_DEFINITION",
-    "AXIS2_PLACEMENT_3D",
-    "B_SPLINE_CURVE_WITH_KNOTS",
-    "B_SPLINE_SURFACE_WITH_KNOTS",
-    "CARTESIAN_POINT",
-    "COLOUR_RGB",
-    "CONVERSION_BASED_UNIT",
-    "DERIVED_UNIT",
-    "DERIVED_UNIT_ELEMENT",
-    "DIMENSIONAL_EXPONENTS",
-    "DIRECTION",
-    "EDGE_CURVE",
-    "EDGE_LOOP",
-    "FACE_BOUND",
-    "FACE_OUTER_BOUND",
-    "FILL_AREA_STYLE",
-    "FILL_AREA_STYLE_COLOUR",
-    "GEOMETRIC_REPRESENTATION_CONTEXT",
-    "GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT",
-    "GLOBAL_UNIT_ASSIGNED_CONTEXT",
-    "LENGTH_MEASURE_WITH_UNIT",
-    "LENGTH_UNIT",
-    "MANIFOLD_SURFACE_SHAPE_REPRESENTATION",
-    "MEASURE_REPRESENTATION_ITEM",
-    "MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION",
-    "NAMED_UNIT",
-    "OPEN_SHELL",
-    "ORIENTED_EDGE",
-    "PLANE",
-    "PLANE_ANGLE_UNIT",
-    "PRESENTATION_STYLE_ASSIGNMENT",
-    "PRODUCT",
-    "PRODUCT_CONTEXT",
-    "PRODUCT_DEFINITION",
-    "PRODUCT_DEFINITION_CONTEXT",
-    "PRODUCT_DEFINITION_FORMATION",
-    "PRODUCT_DEFINITION_SHAPE",
-    "PRODUCT_RELATED_PRODUCT_CATEGORY",
-    "PROPERTY_DEFINITION",
-    "PROPERTY_DEFINITION_REPRESENTATION",
-    "REPRESENTATION",
-    "REPRESENTATION_CONTEXT",
-    "SHAPE_DEFINITION_REPRESENTATION",
-    "SHELL_BASED_SURFACE_MODEL",
-    "SI_UNIT",
-    "SOLID_ANGLE_UNIT",
-    "STYLED_ITEM",
-    "SURFACE_SIDE_STYLE",
-    "SURFACE_STYLE_FILL_AREA",
-    "SURFACE_STYLE_USAGE",
-    "UNCERTAINTY_MEASURE_WITH_UNIT",
-    "VERTEX_POINT",
-];
 
 /// Reads the shells of a file that [`crate::step::write()`] wrote.
 ///

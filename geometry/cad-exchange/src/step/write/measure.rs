@@ -11,9 +11,9 @@ use reconstruct::{Face, Loop, Model, Surface};
 /// Abscissae and weights of Gauss's rule of six points over -1 to 1, one half of them
 /// (Abramowitz & Stegun 1964, table 25.4).
 const GAUSS_6: [(f64, f64); 3] = [
-    (0.238_619_186_083_196_9, 0.467_913_934_572_691_05),
+    (0.238_619_186_083_196_9, 0.467_913_934_572_691_04),
     (0.661_209_386_466_264_5, 0.360_761_573_048_138_6),
-    (0.932_469_514_203_152_1, 0.171_324_492_379_170_35),
+    (0.932_469_514_203_152, 0.171_324_492_379_170_35),
 ];
 
 /// Parts into which a loop is cut along the height of a patch.

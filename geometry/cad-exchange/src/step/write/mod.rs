@@ -7,8 +7,10 @@
 //! pass numbers everything.
 
 mod bend;
+mod corners;
 mod data;
 mod error;
+mod groups;
 mod measure;
 mod options;
 mod product;

@@ -8,9 +8,11 @@
 use std::collections::BTreeMap;
 
 use nurbs::PiecewiseCubic;
-use reconstruct::{Coedge, EdgeKind, Loop, Model, VertexId};
+use reconstruct::{Coedge, EdgeKind, Loop, Model};
 
 use super::bend::bent;
+use super::corners::Corners;
+use super::groups::Groups;
 use super::options::WriteOptions;
 use super::seam::{Seam, distance};
 use crate::common::{ROUNDING_PART, SMOOTH_MM, without_kinks};
@@ -71,7 +73,7 @@ pub(super) fn topology(model: &Model, options: &WriteOptions) -> Topology {
         parted,
         ..Topology::default()
     };
-    let mut rounds = Builder {
+    let mut builder = Builder {
         out: &mut out,
         rounding_mm: ROUNDING_PART * options.resolution_mm,
         written: BTreeMap::new(),
@@ -84,7 +86,7 @@ pub(super) fn topology(model: &Model, options: &WriteOptions) -> Topology {
             for (k, coedge) in border.coedges.iter().enumerate() {
                 let place = (face, n, k);
                 let ends = corners.ends(model, face, coedge);
-                chain.extend(rounds.coedge(place, &coedge.space_curve, ends, seams.get(&place)));
+                chain.extend(builder.coedge(place, &coedge.space_curve, ends, seams.get(&place)));
             }
             chains.push(chain);
         }
@@ -170,7 +172,7 @@ impl Builder<'_> {
             let [from, to] = mirrored;
             ((from.unwrap_or(first), to.unwrap_or(last)), edge, false)
         } else {
-            let edge = self.strand(curve, ends, &[curve.clone()]);
+            let edge = self.strand(curve, ends, std::slice::from_ref(curve));
             return vec![Use {
                 edge,
                 forward: true,
@@ -221,11 +223,11 @@ impl Builder<'_> {
     }
 }
 
-fn loops_of(face: &reconstruct::Face) -> Vec<&Loop> {
+pub(super) fn loops_of(face: &reconstruct::Face) -> Vec<&Loop> {
     std::iter::once(&face.outer).chain(&face.inner).collect()
 }
 
-fn coedge(model: &Model, (face, n, k): Place) -> Option<&Coedge> {
+pub(super) fn coedge(model: &Model, (face, n, k): Place) -> Option<&Coedge> {
     let face = model.faces.get(face)?;
     loops_of(face).get(n)?.coedges.get(k)
 }
@@ -241,129 +243,4 @@ fn places_by_edge(model: &Model) -> BTreeMap<usize, Vec<Place>> {
         }
     }
     places
-}
-
-/// Ends of edges. A vertex of the model is a place in the x-y plane; each face has it at
-/// a height of its own, and faces that share an edge have it at one.
-struct Corners {
-    /// Number of each vertex as a face has it.
-    numbers: BTreeMap<(VertexId, usize), usize>,
-    points: Vec<[f64; 3]>,
-}
-
-impl Corners {
-    fn new(model: &Model, seams: &BTreeMap<Place, Seam>) -> Self {
-        let mut nodes: BTreeMap<(VertexId, usize), usize> = BTreeMap::new();
-        let mut points: Vec<[f64; 3]> = Vec::new();
-        for (face, loops) in model.faces.iter().map(loops_of).enumerate() {
-            for coedge in loops.iter().flat_map(|border| &border.coedges) {
-                let (start, _) = ends(model, coedge);
-                nodes.entry((start, face)).or_insert_with(|| {
-                    points.push(coedge.space_curve.start());
-                    points.len() - 1
-                });
-            }
-        }
-        let mut same = Groups::new(points.len());
-        for (&place, seam) in seams {
-            let Some(coedge) = coedge(model, place) else {
-                continue;
-            };
-            let (start, end) = ends(model, coedge);
-            let (first, last) = coedge.space_curve.domain();
-            let shared = [(start, seam.range.0 == first), (end, seam.range.1 == last)];
-            for (vertex, shared) in shared {
-                let node = |face: usize| nodes.get(&(vertex, face));
-                if let (true, Some(&a), Some(&b)) = (shared, node(place.0), node(seam.other.0)) {
-                    same.join(a, b);
-                }
-            }
-        }
-        let groups = same.groups();
-        let mut number_of = vec![0; points.len()];
-        for (number, group) in groups.iter().enumerate() {
-            for &node in group {
-                number_of[node] = number;
-            }
-        }
-        Self {
-            numbers: nodes
-                .into_iter()
-                .map(|(key, node)| (key, number_of[node]))
-                .collect(),
-            points: groups.iter().map(|group| middle(group, &points)).collect(),
-        }
-    }
-
-    /// The vertices of a face's coedge, in its sense of travel.
-    fn ends(&self, model: &Model, face: usize, coedge: &Coedge) -> [usize; 2] {
-        let (start, end) = ends(model, coedge);
-        [start, end].map(|vertex| self.numbers.get(&(vertex, face)).copied().unwrap_or(0))
-    }
-}
-
-/// Half way between the extremes.
-fn middle(group: &[usize], points: &[[f64; 3]]) -> [f64; 3] {
-    [0, 1, 2].map(|d| {
-        let coordinates = || group.iter().map(|&node| points[node][d]);
-        let low = coordinates().fold(f64::INFINITY, f64::min);
-        let high = coordinates().fold(f64::NEG_INFINITY, f64::max);
-        // A point alone keeps its last digit.
-        if low == high { low } else { (low + high) / 2.0 }
-    })
-}
-
-/// The vertices of a coedge in the sense of travel.
-fn ends(model: &Model, coedge: &Coedge) -> (VertexId, VertexId) {
-    let edge = &model.edges[coedge.edge.0];
-    if coedge.reversed {
-        (edge.end, edge.start)
-    } else {
-        (edge.start, edge.end)
-    }
-}
-
-/// Sets of things that are joined one pair at a time.
-struct Groups(Vec<usize>);
-
-impl Groups {
-    fn new(count: usize) -> Self {
-        Self((0..count).collect())
-    }
-
-    /// The least member of a thing's set.
-    fn least(&self, mut of: usize) -> usize {
-        while self.0[of] != of {
-            of = self.0[of];
-        }
-        of
-    }
-
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.least(a), self.least(b));
-        self.0[a.max(b)] = a.min(b);
-    }
-
-    /// The sets, ordered by their least members; members ascend.
-    fn groups(&self) -> Vec<Vec<usize>> {
-        let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-        for k in 0..self.0.len() {
-            groups.entry(self.least(k)).or_default().push(k);
-        }
-        groups.into_values().collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn groups_are_ordered_by_their_least_members() {
-        let mut groups = Groups::new(6);
-        groups.join(5, 3);
-        groups.join(1, 5);
-        groups.join(4, 2);
-        assert_eq!(groups.groups(), [vec![0], vec![1, 3, 5], vec![2, 4]]);
-    }
 }
