@@ -133,6 +133,40 @@ fn the_same_samples_give_the_same_bytes_whatever_the_threads() {
 }
 
 #[test]
+fn the_ending_of_the_output_picks_the_format() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    fs::write(at.join("roof.xyz"), roof()).unwrap();
+    let converted = |out: &str, more: &[&str]| {
+        let arguments = [&["convert", "roof.xyz", "--json", "-o", out][..], more].concat();
+        let output = relief(at, &arguments);
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let settings = &told["report"]["settings"];
+        let settings = [&settings["step"], &settings["step_units"]].map(Value::to_string);
+        (fs::read_to_string(at.join(out)).unwrap(), settings)
+    };
+    let (iges, settings) = converted("roof.igs", &[]);
+    assert!(iges.lines().all(|line| line.len() == 80));
+    assert_eq!(settings, ["\"off\"", "\"mm\""]);
+    let (step, settings) = converted("roof.step", &[]);
+    assert!(step.starts_with("ISO-10303-21;") && step.contains("FILE_SCHEMA(('AP242_MANAGED_"));
+    assert_eq!(settings, ["\"ap242\"", "\"mm\""]);
+    assert_eq!(step.matches("=ADVANCED_FACE(").count(), 2);
+    let (same, _) = converted("same.STP", &[]);
+    assert_eq!(same.replace("same", "roof"), step);
+    let options = ["--step-schema", "ap214", "--step-units", "inch"];
+    let (other, settings) = converted("inch.stp", &options);
+    assert!(other.contains("AUTOMOTIVE_DESIGN { 1 0 10303 214 3 1 1 }"));
+    assert!(other.contains("CONVERSION_BASED_UNIT('INCH'"));
+    assert_eq!(settings, ["\"ap214\"", "\"inch\""]);
+}
+
+#[test]
 fn wrong_usage_is_told_in_one_line_with_exit_code_2() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
@@ -141,9 +175,9 @@ fn wrong_usage_is_told_in_one_line_with_exit_code_2() {
     refused(&relief(at, &["convert"]), 2, "INPUT");
     refused(&relief(at, &["retry", "seven"]), 2, "seven");
     refused(
-        &relief(at, &["convert", "roof.xyz", "-o", "roof.stp"]),
+        &relief(at, &["convert", "roof.xyz", "-o", "roof.dxf"]),
         2,
-        ".igs, .iges",
+        ".igs, .iges, .step, .stp",
     );
     refused(
         &relief(at, &["convert", "roof.xyz", "--pitch-mm", "0"]),
@@ -395,6 +429,7 @@ fn the_demo_leaves_the_deliverables_and_nothing_else() {
         names,
         [
             "cylinder.igs",
+            "cylinder.step",
             "inliers.png",
             "manifest.json",
             "range.png",

@@ -1,19 +1,24 @@
-//! The model as a CAD file.
+//! The model as CAD files.
 
 use std::io::Write;
 
-use cad_exchange::iges;
+use cad_exchange::{iges, step};
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use reconstruct::Model;
 
-pub use cad_exchange::iges::{Entities, WriteError};
+pub use cad_exchange::iges::Entities;
+pub use cad_exchange::step::{LengthUnit, Schema};
 
-/// What the user may say about the CAD file.
+/// What the user may say about the CAD files.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CadOptions {
     /// Which IGES entities carry the shape.
     pub entities: Entities,
+    /// What the STEP file follows, where there is one.
+    pub step: Option<Schema>,
+    /// The unit of lengths in the STEP file.
+    pub step_units: LengthUnit,
     /// Who made the model; may be empty.
     pub author: String,
     /// The author's organisation; may be empty.
@@ -27,6 +32,49 @@ impl CadOptions {
         match self.entities {
             Entities::Parametric114 => 114,
             Entities::Rational128 => 128,
+        }
+    }
+
+    /// What the STEP file follows, in the words of configuration and command line.
+    #[must_use]
+    pub fn step_name(&self) -> &'static str {
+        match self.step {
+            Some(Schema::Ap242) => "ap242",
+            Some(Schema::Ap214) => "ap214",
+            None => "off",
+        }
+    }
+
+    /// The unit of lengths in the STEP file, in the same words.
+    #[must_use]
+    pub fn step_units_name(&self) -> &'static str {
+        match self.step_units {
+            LengthUnit::Millimetre => "mm",
+            LengthUnit::Inch => "inch",
+        }
+    }
+}
+
+/// The model is none that a CAD file can hold, or the file could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// As IGES.
+    #[error(transparent)]
+    Iges(#[from] iges::WriteError),
+    /// As STEP.
+    #[error(transparent)]
+    Step(#[from] step::WriteError),
+}
+
+impl WriteError {
+    /// What the destination said, where that was the trouble.
+    #[must_use]
+    pub fn io(&self) -> Option<&std::io::Error> {
+        match self {
+            Self::Iges(iges::WriteError::Io(error)) | Self::Step(step::WriteError::Io(error)) => {
+                Some(error)
+            }
+            _ => None,
         }
     }
 }
@@ -54,6 +102,31 @@ pub fn write_iges(
     options.author.clone_from(&cad.author);
     options.organization.clone_from(&cad.organisation);
     iges::write(model, &options, &mut sink)?;
+    Ok(())
+}
+
+/// Writes a model as STEP; AP242 where the options name no schema. The bytes depend on
+/// nothing but the arguments: the service and `relief convert` both come through here.
+///
+/// # Errors
+/// As [`step::write`].
+pub fn write_step(
+    model: &Model,
+    name: &str,
+    timestamp: Timestamp,
+    cad: &CadOptions,
+    mut sink: impl Write,
+) -> Result<(), WriteError> {
+    let time = timestamp
+        .to_zoned(TimeZone::UTC)
+        .strftime("%Y-%m-%dT%H:%M:%S+00:00")
+        .to_string();
+    let mut options = step::WriteOptions::new(file_stem(name), time);
+    options.schema = cad.step.unwrap_or_default();
+    options.unit = cad.step_units;
+    options.author.clone_from(&cad.author);
+    options.organization.clone_from(&cad.organisation);
+    step::write(model, &options, &mut sink)?;
     Ok(())
 }
 

@@ -1,4 +1,4 @@
-//! What a processed scan leaves behind: CAD file, pictures, report, manifest.
+//! What a processed scan leaves behind: CAD files, pictures, report, manifest.
 //!
 //! [`write`](fn@write) fills a directory that nobody looks at yet and syncs it; the caller
 //! puts it in place by one rename. [`write_atomically`] is for a single file.
@@ -16,7 +16,9 @@ mod stopwatch;
 mod summary;
 mod write;
 
-pub use export::{CadOptions, Entities, WriteError, file_stem, write_iges};
+pub use export::{
+    CadOptions, Entities, LengthUnit, Schema, WriteError, file_stem, write_iges, write_step,
+};
 pub use file::{hexadecimal, sha256_of, write_atomically};
 pub use manifest::{MANIFEST_NAME, Manifest, ManifestFile};
 pub use report::{Report, ScanReport};

@@ -121,6 +121,12 @@ pub struct SettingsReport {
     pub tolerance_mm: f64,
     /// IGES entities of the surfaces: 114 or 128.
     pub iges_entities: u16,
+    /// What the STEP file follows: `ap242`, `ap214`, or `off` where there is none.
+    #[serde(default)]
+    pub step: String,
+    /// The unit of lengths in the STEP file: `mm` or `inch`.
+    #[serde(default)]
+    pub step_units: String,
 }
 
 /// The uniform range image.

@@ -70,6 +70,8 @@ fn settings(settings: &Settings, cad: &CadOptions) -> SettingsReport {
         kinds: settings.kinds.as_str().to_owned(),
         tolerance_mm: settings.reconstruct.tolerance_mm,
         iges_entities: cad.entity_number(),
+        step: cad.step_name().to_owned(),
+        step_units: cad.step_units_name().to_owned(),
     }
 }
 

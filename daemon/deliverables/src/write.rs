@@ -11,7 +11,7 @@ use storage::{Disk, LocalDisk, remove_file_if_there};
 
 use reconstruct::RegionFit;
 
-use crate::export::{CadOptions, WriteError, file_stem, write_iges};
+use crate::export::{CadOptions, WriteError, file_stem, write_iges, write_step};
 use crate::file::write_synced;
 use crate::manifest::{MANIFEST_NAME, Manifest, ManifestFile};
 use crate::picture;
@@ -31,7 +31,7 @@ pub struct Inputs<'a> {
     pub outcome: &'a Outcome,
     /// The settings that were used.
     pub settings: &'a Settings,
-    /// About the CAD file.
+    /// About the CAD files.
     pub cad: &'a CadOptions,
     /// Where the samples came from.
     pub scan: ScanReport,
@@ -80,20 +80,23 @@ pub const RESIDUALS_PICTURE_NAME: &str = "residuals.png";
 /// Name of the picture of the share of inliers around each node.
 pub const INLIERS_PICTURE_NAME: &str = "inliers.png";
 
-/// Whether pictures are drawn.
+/// Whether pictures are drawn, and the model written in a second format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pictures {
     /// As long as the disk has room for them; a warning in the report if it has not.
     Drawn,
-    /// The disk is nearly full: only what cannot be seen otherwise is written.
+    /// The disk is nearly full: only what is not in another file is written.
     LeftOut,
 }
 
-/// What stands in the report where pictures are missing.
+/// What stands in the report where the STEP file is missing for want of room.
+const NO_STEP: &str = "the STEP file was left out, since the disk is nearly full: make room and \
+     run the scan again to have it";
+/// The same of pictures.
 const NO_PICTURES: &str = "the pictures were left out, since the disk is nearly full: make room \
      and run the scan again to have them";
 
-/// Writes `<name>.igs`, the pictures, `report.json` and `manifest.json` into an existing
+/// Writes `<name>.igs`, `<name>.step` if it is asked for, the pictures, `report.json` and `manifest.json` into an existing
 /// directory of this disk that nobody else looks at, and syncs them and it. The caller then
 /// puts the directory in its place by one rename.
 ///
@@ -129,6 +132,11 @@ pub fn write(
             )?)
         },
     )?);
+    let step = match pictures {
+        _ if inputs.cad.step.is_none() => Some(None),
+        Pictures::Drawn => step_on(disk, directory, inputs)?.map(Some),
+        Pictures::LeftOut => None,
+    };
     watch.progress(1.0);
 
     watch.check()?;
@@ -138,6 +146,10 @@ pub fn write(
         Pictures::LeftOut => None,
     };
     let mut report = Report::new(inputs, watch.read());
+    match step {
+        Some(step) => files.extend(step),
+        None => report.warnings.push(NO_STEP.to_owned()),
+    }
     match drawn {
         Some(drawn) => files.extend(drawn),
         None => {
@@ -169,6 +181,40 @@ pub fn write(
     })
 }
 
+/// The STEP file; `None` where there was no room for it. What it holds is in the IGES file
+/// too, so it goes before a result is given up.
+fn step_on(
+    disk: &dyn Disk,
+    directory: &Path,
+    inputs: &Inputs<'_>,
+) -> Result<Option<ManifestFile>, DeliverError> {
+    let name = format!("{}.step", file_stem(inputs.name));
+    let model = &inputs.outcome.reconstruction.model;
+    let written = write_synced::<DeliverError>(disk, directory, &name, |sink| {
+        Ok(write_step(
+            model,
+            inputs.name,
+            inputs.timestamp,
+            inputs.cad,
+            sink,
+        )?)
+    });
+    match written {
+        Err(DeliverError::Io(error)) if is_full(&error) => {}
+        Err(DeliverError::Export(error)) if error.io().is_some_and(is_full) => {}
+        other => return other.map(Some),
+    }
+    remove_file_if_there(disk, &directory.join(name))?;
+    Ok(None)
+}
+
+fn is_full(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded
+    )
+}
+
 const PICTURE_NAMES: [&str; 4] = [
     RANGE_PICTURE_NAME,
     REGIONS_PICTURE_NAME,
@@ -179,14 +225,7 @@ const PICTURE_NAMES: [&str; 4] = [
 /// `None` for what there was no room for.
 fn unless_full<T>(written: io::Result<T>) -> io::Result<Option<T>> {
     match written {
-        Err(error)
-            if matches!(
-                error.kind(),
-                io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded
-            ) =>
-        {
-            Ok(None)
-        }
+        Err(error) if is_full(&error) => Ok(None),
         other => other.map(Some),
     }
 }

@@ -25,7 +25,7 @@ pub use http::HttpConfig;
 pub use load::ConfigError;
 pub use processing::{
     DeliverablesConfig, Estimator, Method, OverrideError, Processing, ReconstructConfig,
-    RegridConfig, SegmentConfig,
+    RegridConfig, SegmentConfig, StepChoice, StepUnits,
 };
 pub use reload::Reloaded;
 pub use scanner::{ScannerConfig, Transport};

@@ -175,12 +175,42 @@ pub struct DeliverablesConfig {
     /// IGES entities of the surfaces: 114 (parametric splines) or 128 (rational B-splines).
     #[serde(deserialize_with = "entities", skip_serializing_if = "Option::is_none")]
     pub entities: Option<u16>,
+    /// What the STEP file beside the IGES file follows, or that there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step: Option<StepChoice>,
+    /// The unit of lengths in the STEP file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step_units: Option<StepUnits>,
     /// Author in the CAD file's header; the scan's operator if left out.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub author: String,
     /// Organisation in the CAD file's header.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub organisation: String,
+}
+
+/// What a STEP file follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StepChoice {
+    /// ISO 10303-242.
+    #[default]
+    Ap242,
+    /// ISO 10303-214.
+    Ap214,
+    /// There is no STEP file.
+    Off,
+}
+
+/// A unit of lengths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StepUnits {
+    /// Millimetre.
+    #[default]
+    Mm,
+    /// Inch of 25.4 mm.
+    Inch,
 }
 
 fn entities<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<u16>, D::Error> {

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use deliverables::{CadOptions, DeliverError, Entities, Inputs, Pictures, ScanReport, Stopwatch};
+use deliverables::{
+    CadOptions, DeliverError, Entities, Inputs, LengthUnit, Pictures, ScanReport, Schema, Stopwatch,
+};
 use pipeline::{Columns, Observer, PipelineError, ReadAgainError, Stage, View};
 use range_image::calibration::Head;
 use range_image::{Cancelled, Column, Lattice, Monitor, RangeImage};
@@ -15,7 +17,7 @@ use super::kept_processing;
 use super::progress::Progress;
 use super::worker::JobOutcome;
 use crate::acquisition::grid_file;
-use crate::config::Processing;
+use crate::config::{Processing, StepChoice, StepUnits};
 use crate::fit::Fit;
 use crate::service::{KeptGrid, Service};
 use crate::spool::SpoolError;
@@ -377,6 +379,15 @@ fn cad_options(processing: &Processing, scan: &Scan) -> CadOptions {
             Some(128) => Entities::Rational128,
             Some(_) => Entities::Parametric114,
             None => Entities::default(),
+        },
+        step: match wanted.step.unwrap_or_default() {
+            StepChoice::Ap242 => Some(Schema::Ap242),
+            StepChoice::Ap214 => Some(Schema::Ap214),
+            StepChoice::Off => None,
+        },
+        step_units: match wanted.step_units.unwrap_or_default() {
+            StepUnits::Mm => LengthUnit::Millimetre,
+            StepUnits::Inch => LengthUnit::Inch,
         },
         author: if wanted.author.is_empty() {
             scan.operator.clone()

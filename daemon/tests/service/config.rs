@@ -91,6 +91,10 @@ fn faults_are_told_with_their_line_and_a_way_out() {
              114 or 128",
         ),
         (
+            "[deliverables]\nstep_units = \"inches\"\n",
+            "relief.toml, line 2, column 14: unknown value `inches`; did you mean `inch`?",
+        ),
+        (
             "[segment]\nclusters = 0\n",
             "relief.toml, section [segment]: clusters is 0, but must be 1 to 1000",
         ),

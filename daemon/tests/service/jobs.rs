@@ -101,6 +101,8 @@ async fn a_rerun_has_other_settings_and_a_folder_of_its_own() {
         settings: [
             ("regrid.pitch_mm".to_owned(), json!(0.8)),
             ("deliverables.entities".to_owned(), json!(128)),
+            ("deliverables.step".to_owned(), json!("ap214")),
+            ("deliverables.step_units".to_owned(), json!("inch")),
         ]
         .into(),
     };
@@ -113,12 +115,27 @@ async fn a_rerun_has_other_settings_and_a_folder_of_its_own() {
     let report = read_json(&folder.join("report.json"));
     assert_eq!(report["range_image"]["pitch_mm"], 0.8);
     assert_eq!(report["settings"]["iges_entities"], 128);
+    assert_eq!(report["settings"]["step"], "ap214");
+    assert_eq!(report["settings"]["step_units"], "inch");
+    let step = std::fs::read_to_string(folder.join("roof coarse.step")).unwrap();
+    assert!(step.contains("AUTOMOTIVE_DESIGN") && step.contains("'INCH'"));
     assert_eq!(report["scan"]["id"], scan.id.as_str());
     assert!(folder.join("roof coarse.igs").is_file());
     let after = std::fs::read(rig.daemon.spool_dir().join(&first.result).join("roof.igs"));
     assert_eq!(before.unwrap(), after.unwrap());
+    let without = Rerun {
+        name: String::new(),
+        settings: [("deliverables.step".to_owned(), json!("off"))].into(),
+    };
+    let last: Job = rig.client.post(&path::scan_rerun(&scan.id), &without).await;
+    let last = job_over(&mut events, &rig, last.id).await;
+    let folder = rig.daemon.spool_dir().join(&last.result);
+    assert!(folder.join("roof.igs").is_file() && !folder.join("roof.step").exists());
+    let report = read_json(&folder.join("report.json"));
+    assert_eq!(report["settings"]["step"], "off");
+    assert_eq!(report["warnings"].as_array().map(Vec::len), Some(0));
     let scan: Scan = rig.client.get(&path::scan(&scan.id)).await;
-    assert_eq!(scan.jobs, [first.id, job.id]);
+    assert_eq!(scan.jobs, [first.id, job.id, last.id]);
     rig.daemon.shutdown().await;
 }
 

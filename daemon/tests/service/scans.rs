@@ -49,6 +49,7 @@ async fn a_scan_becomes_a_result_in_the_spool() {
         names,
         [
             "Gable roof.igs",
+            "Gable roof.step",
             "inliers.png",
             "manifest.json",
             "range.png",
@@ -322,7 +323,7 @@ async fn streamed_and_regridded_give_the_same_bytes() {
     let file = |result: &str, name: &str| {
         std::fs::read(rig.daemon.spool_dir().join(result).join(name)).unwrap()
     };
-    for name in ["same.igs", "range.png", "regions.png"] {
+    for name in ["same.igs", "same.step", "range.png", "regions.png"] {
         assert_eq!(file(&scan.id, name), file(&job.result, name), "{name}");
     }
     rig.daemon.shutdown().await;

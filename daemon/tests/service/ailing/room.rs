@@ -54,6 +54,7 @@ async fn result(rig: &Rig, scan: &str) -> (Vec<String>, String) {
 }
 
 const BARE: [&str; 3] = ["a.igs", "manifest.json", "report.json"];
+const WITH_STEP: [&str; 4] = ["a.igs", "a.step", "manifest.json", "report.json"];
 
 #[tokio::test(flavor = "multi_thread")]
 async fn pictures_are_the_first_to_go_when_the_disk_is_full() {
@@ -67,14 +68,22 @@ async fn pictures_are_the_first_to_go_when_the_disk_is_full() {
         }
         let (scan, _) = rig.scan_to_result("a").await;
         let (names, warnings) = result(&rig, &scan.id).await;
-        assert_eq!(names, BARE);
+        assert_eq!(names, WITH_STEP);
         assert!(warnings.contains("pictures were left out"), "{warnings}");
         disk.heal();
     }
+    // Then the second CAD file, whose model is in the first.
+    disk.refuse_writes("a.step", Errno::NOSPC);
     let (scan, _) = rig.scan_to_result("a").await;
     let (names, warnings) = result(&rig, &scan.id).await;
     assert_eq!(names.len(), BARE.len() + 4);
-    assert!(!warnings.contains("pictures"), "{warnings}");
+    assert!(!names.contains(&"a.step".to_owned()), "{names:?}");
+    assert!(warnings.contains("STEP file was left out"), "{warnings}");
+    disk.heal();
+    let (scan, _) = rig.scan_to_result("a").await;
+    let (names, warnings) = result(&rig, &scan.id).await;
+    assert_eq!(names.len(), WITH_STEP.len() + 4);
+    assert!(!warnings.contains("left out"), "{warnings}");
     rig.daemon.shutdown().await;
 }
 
@@ -95,6 +104,7 @@ async fn the_reserve_is_for_scans_and_not_for_pictures() {
     let (names, warnings) = result(&rig, &scan.id).await;
     assert_eq!(names, BARE);
     assert!(warnings.contains("pictures were left out"), "{warnings}");
+    assert!(warnings.contains("STEP file was left out"), "{warnings}");
     rig.daemon.shutdown().await;
 }
 

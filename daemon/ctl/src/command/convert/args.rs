@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use deliverables::{CadOptions, Entities, file_stem};
+use deliverables::{CadOptions, Entities, LengthUnit, Schema, file_stem};
 use jiff::Timestamp;
 use pipeline::{Kinds, Method, Settings};
 use scan_files::Units;
@@ -21,9 +21,9 @@ pub(crate) struct Args {
     /// The scan file
     #[arg(value_name = "INPUT")]
     pub(super) input: PathBuf,
-    /// The CAD file; its ending picks the format (.igs or .iges). Default: the input's
-    /// name with .igs, in the current directory
-    #[arg(short, long, value_name = "OUT.igs")]
+    /// The CAD file; its ending picks the format: IGES (.igs or .iges) or STEP (.step or
+    /// .stp). Default: the input's name with .igs, in the current directory
+    #[arg(short, long, value_name = "OUT.igs|OUT.step")]
     output: Option<PathBuf>,
     /// Distance of the grid's nodes, millimetres; default: after the scan's density
     #[arg(long, value_name = "MM")]
@@ -43,6 +43,12 @@ pub(crate) struct Args {
     /// IGES entities of the surfaces: 114 (parametric splines) or 128 (rational B-splines)
     #[arg(long, value_name = "TYPE", value_enum, default_value_t = EntityType::Parametric)]
     entities: EntityType,
+    /// What a STEP file follows: AP242, or AP214 for programs that do not know the former
+    #[arg(long, value_name = "SCHEMA", value_enum, default_value_t = SchemaName::Ap242)]
+    step_schema: SchemaName,
+    /// Unit of lengths in a STEP file
+    #[arg(long, value_name = "UNIT", value_enum, default_value_t = StepUnitName::Mm)]
+    step_units: StepUnitName,
     /// Write a report as JSON, too
     #[arg(long, value_name = "FILE.json")]
     pub(super) report: Option<PathBuf>,
@@ -115,8 +121,37 @@ enum UnitName {
     Inch,
 }
 
-/// Endings that mean IGES.
-const IGES_ENDINGS: [&str; 2] = ["igs", "iges"];
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SchemaName {
+    Ap242,
+    Ap214,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum StepUnitName {
+    Mm,
+    Inch,
+}
+
+/// What is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum CadFormat {
+    Iges,
+    Step,
+}
+
+impl CadFormat {
+    /// The format that a path's ending means.
+    pub(super) fn of(path: &Path) -> Option<Self> {
+        let ending = path.extension()?.to_string_lossy().to_ascii_lowercase();
+        match ending.as_str() {
+            "igs" | "iges" => Some(Self::Iges),
+            "step" | "stp" => Some(Self::Step),
+            _ => None,
+        }
+    }
+}
+
 /// Endings of scan files that are left off a default name.
 const SCAN_ENDINGS: [&str; 8] = ["xyz", "asc", "csv", "txt", "ply", "igs", "iges", "scan"];
 
@@ -133,15 +168,10 @@ impl Args {
             }
             return Ok(path);
         };
-        let ending = path
-            .extension()
-            .map(|e| e.to_string_lossy().to_ascii_lowercase());
-        if !ending
-            .as_deref()
-            .is_some_and(|ending| IGES_ENDINGS.contains(&ending))
-        {
+        if CadFormat::of(path).is_none() {
             return Err(Failure::Usage(format!(
-                "the ending of {} names no format that can be written; known: .igs, .iges",
+                "the ending of {} names no format that can be written; known: .igs, .iges, \
+                 .step, .stp",
                 path.display()
             )));
         }
@@ -223,11 +253,20 @@ impl Args {
         Ok(settings)
     }
 
-    pub(super) fn cad(&self, operator: Option<&str>) -> CadOptions {
+    pub(super) fn cad(&self, format: CadFormat, operator: Option<&str>) -> CadOptions {
         CadOptions {
             entities: match self.entities {
                 EntityType::Parametric => Entities::Parametric114,
                 EntityType::Rational => Entities::Rational128,
+            },
+            step: match (format, self.step_schema) {
+                (CadFormat::Iges, _) => None,
+                (CadFormat::Step, SchemaName::Ap242) => Some(Schema::Ap242),
+                (CadFormat::Step, SchemaName::Ap214) => Some(Schema::Ap214),
+            },
+            step_units: match self.step_units {
+                StepUnitName::Mm => LengthUnit::Millimetre,
+                StepUnitName::Inch => LengthUnit::Inch,
             },
             author: self
                 .author

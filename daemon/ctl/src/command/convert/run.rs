@@ -10,6 +10,7 @@ use pipeline::{Extent, Observer, PipelineError, Settings, Stage};
 use range_image::Monitor;
 use serde::Serialize;
 
+use super::args::CadFormat;
 use super::{Args, places};
 use crate::failure::Failure;
 use crate::input::{self, Input};
@@ -115,7 +116,8 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
             other => other,
         })?;
     check_extent(args, &input, &settings)?;
-    let cad = args.cad(input.scan.operator.as_deref());
+    let format = CadFormat::of(&output).unwrap_or(CadFormat::Iges);
+    let cad = args.cad(format, input.scan.operator.as_deref());
     let timestamp = args.timestamp(input.timestamp)?;
     let name = args.name(input.name.as_deref());
 
@@ -144,9 +146,11 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
     watch.stage(Stage::Export);
     let model = &outcome.reconstruction.model;
     let written = write_atomically::<deliverables::DeliverError>(&output, |sink| {
-        Ok(deliverables::write_iges(
-            model, &name, timestamp, &cad, sink,
-        )?)
+        match format {
+            CadFormat::Iges => deliverables::write_iges(model, &name, timestamp, &cad, sink)?,
+            CadFormat::Step => deliverables::write_step(model, &name, timestamp, &cad, sink)?,
+        }
+        Ok(())
     })
     .map_err(|error| Failure::at(format!("cannot write {}", output.display()), &error))?;
     watch.progress(1.0);
