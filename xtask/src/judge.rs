@@ -32,15 +32,21 @@ pub(crate) struct Options {
     pub(crate) out: Option<PathBuf>,
 }
 
+/// Files of a part made by hand that the writer's own tests hold to the letter: the other
+/// schema and unit, and a name with every kind of character.
+const STEP_SAMPLES: [&str; 2] = ["sample_ap242.step", "sample_ap214_inch.step"];
+
 /// One judged scan.
 struct Case {
     name: String,
     arguments: Vec<String>,
     faces: Option<u32>,
+    /// Creases, each of which must be an edge of two faces in the STEP file.
+    creases: u32,
 }
 
-/// Scans every object through the pseudo-terminal and the service, and has each IGES file
-/// judged. All are judged before the first failure is reported.
+/// Scans every object through the pseudo-terminal and the service, and has the IGES and the
+/// STEP file of each judged. All are judged before the first failure is reported.
 pub(crate) fn run(options: &Options) -> Result<()> {
     let place = shell::root().join("target/judges");
     let python = python(&place)?;
@@ -55,6 +61,13 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         freecad: options.freecad,
     };
     let mut failed = Vec::new();
+    for name in STEP_SAMPLES {
+        let file = format!("geometry/cad-exchange/tests/golden/{name}");
+        let words = ["--expect-faces", "2", "--min-shared-edges", "1"];
+        if let Err(error) = judges.step(&file, &words) {
+            failed.push(format!("{name}: {error}"));
+        }
+    }
     for case in cases(options.seeds) {
         let folder = scenes.join(&case.name);
         if folder.exists() {
@@ -91,6 +104,7 @@ fn cases(seeds: u32) -> Vec<Case> {
                         .chain([seed.to_string()])
                         .collect(),
                     faces: Some(if object == "house" { 4 } else { 2 }),
+                    creases: if object == "house" { 5 } else { 1 },
                 });
             }
         }
@@ -101,6 +115,7 @@ fn cases(seeds: u32) -> Vec<Case> {
             name: "bun000".into(),
             arguments: vec!["--replay".into(), bunny.display().to_string()],
             faces: None,
+            creases: 1,
         });
     } else {
         println!("skipped: no recorded scans beside the repository");
@@ -125,7 +140,7 @@ impl Judges {
         let mut words: Vec<&str> = case.arguments.iter().map(String::as_str).collect();
         words.extend(["--within-s", SLOWEST_S, "--out", &out]);
         shell::run(&scan_scene, &words)?;
-        let file = iges_in(folder)?;
+        let file = file_in(folder, "igs")?;
         if case.faces.is_some() {
             let truth = folder.join("truth.json").display().to_string();
             let check = "tests/judges/scene_check.py";
@@ -134,6 +149,9 @@ impl Judges {
             let check = "tests/judges/occ_check.py";
             shell::quiet(&self.python, &[check, "--no-points", &file])?;
         }
+        let creases = case.creases.to_string();
+        let step = file_in(folder, "step")?;
+        self.step(&step, &["--iges", &file, "--min-shared-edges", &creases])?;
         let faces = case.faces.map(|n| n.to_string());
         let mut words = vec![file.as_str()];
         words.extend(faces.as_deref());
@@ -145,19 +163,25 @@ impl Judges {
         }
         Ok(())
     }
+
+    fn step(&self, file: &str, words: &[&str]) -> Result<()> {
+        let check = ["tests/judges/step_check.py", file];
+        shell::quiet(&self.python, &[&check, words].concat())
+    }
 }
 
-fn iges_in(folder: &Path) -> Result<String> {
+/// The one file of a folder with this ending.
+fn file_in(folder: &Path, ending: &str) -> Result<String> {
     let entries = std::fs::read_dir(folder).with_context(|| format!("no {}", folder.display()))?;
     let files: Vec<PathBuf> = entries
         .flatten()
         .map(|entry| entry.path())
-        .filter(|path| path.extension().is_some_and(|e| e == "igs"))
+        .filter(|path| path.extension().is_some_and(|e| e == ending))
         .collect();
     match &files[..] {
         [file] => Ok(file.display().to_string()),
         _ => bail!(
-            "{} IGES files in {} instead of one",
+            "{} files .{ending} in {} instead of one",
             files.len(),
             folder.display()
         ),
