@@ -55,7 +55,7 @@ pub(crate) fn model() -> Model {
     let border = |surface: &PatchSurface, uses: &[(usize, bool)]| Loop {
         coedges: uses
             .iter()
-            .map(|&(id, reversed)| coedge(surface, &edges, id, reversed))
+            .map(|&(id, reversed)| coedge(surface, &edges, id, reversed, 0.0))
             .collect(),
     };
     let faces = vec![
@@ -173,14 +173,14 @@ fn patches(u: &[f64], v: &[f64], z: impl Fn(f64, f64) -> f64) -> PatchSurface {
         .unwrap()
 }
 
-fn coedge(surface: &PatchSurface, edges: &[Edge], id: usize, reversed: bool) -> Coedge {
+fn coedge(surface: &PatchSurface, edges: &[Edge], id: usize, reversed: bool, nudge: f64) -> Coedge {
     let path = &edges[id].path;
     let parameter_curve = if reversed {
         path.reversed()
     } else {
         path.clone()
     };
-    let space_curve = lifted(surface, &parameter_curve);
+    let space_curve = lifted(surface, &parameter_curve, nudge);
     Coedge {
         edge: EdgeId(id),
         reversed,
@@ -189,8 +189,9 @@ fn coedge(surface: &PatchSurface, edges: &[Edge], id: usize, reversed: bool) -> 
     }
 }
 
-/// The path on the surface: x and y as they are, z by Hermite cubics.
-fn lifted(surface: &PatchSurface, path: &PiecewiseCubic<2>) -> PiecewiseCubic<3> {
+/// The path on the surface: x and y as they are, z by Hermite cubics, whose slopes are taken this
+/// share of their length inside.
+fn lifted(surface: &PatchSurface, path: &PiecewiseCubic<2>, nudge: f64) -> PiecewiseCubic<3> {
     let mut breaks = vec![path.breaks[0]];
     let mut pieces = Vec::new();
     for piece in path.breaks.windows(2) {
@@ -205,9 +206,13 @@ fn lifted(surface: &PatchSurface, path: &PiecewiseCubic<2>) -> PiecewiseCubic<3>
             let [x, y] = flat.pieces[0];
             let h = to - from;
             let height = |s: f64| {
-                let ([px, py], [dx, dy]) = (flat.piece_value(0, s, 0), flat.piece_value(0, s, 1));
+                let [px, py] = flat.piece_value(0, s, 0);
+                // The slope on this side of a kink.
+                let within = s.clamp(nudge * h, (1.0 - nudge) * h);
+                let [ix, iy] = flat.piece_value(0, within, 0);
+                let [dx, dy] = flat.piece_value(0, within, 1);
                 let slope =
-                    surface.z_partial(px, py, 1, 0) * dx + surface.z_partial(px, py, 0, 1) * dy;
+                    surface.z_partial(ix, iy, 1, 0) * dx + surface.z_partial(ix, iy, 0, 1) * dy;
                 (surface.z(px, py), slope)
             };
             let ((z0, d0), (z1, d1)) = (height(0.0), height(h));
@@ -238,7 +243,7 @@ pub(crate) fn raised(face: &Face, model: &Model, at: f64, slope: f64) -> Face {
         coedges: border
             .coedges
             .iter()
-            .map(|c| coedge(&surface, &model.edges, c.edge.0, c.reversed))
+            .map(|c| coedge(&surface, &model.edges, c.edge.0, c.reversed, 1e-9))
             .collect(),
     };
     Face {
