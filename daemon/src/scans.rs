@@ -317,12 +317,20 @@ impl Service {
 
     /// All scans, newest first.
     pub(crate) fn scans(&self) -> Result<Vec<Scan>, ServiceError> {
+        self.scans_that(|_| true)
+    }
+
+    /// Those whose records are to be looked at, newest first.
+    pub(crate) fn scans_that(
+        &self,
+        keep: impl Fn(&Scan) -> bool,
+    ) -> Result<Vec<Scan>, ServiceError> {
         let newer: Vec<Scan> = lock(&self.unkept)
             .iter()
             .cloned()
             .chain(self.active_scans())
             .collect();
-        let mut scans = self.store.scans()?;
+        let mut scans = self.store.scans_that(keep)?;
         scans.reverse();
         for newer in newer {
             if let Some(kept) = scans.iter_mut().find(|scan| scan.id == newer.id) {

@@ -173,7 +173,13 @@ impl Service {
         let limits = self.config().storage;
         // One time for all: ages in whole seconds must not differ by when they were looked at.
         let at = Timestamp::now();
-        let (mut scans, jobs) = (self.scans()?, self.jobs()?);
+        let has_columns = |scan: &Scan| self.journal_path(&scan.id).exists();
+        let mut scans = self.scans_that(has_columns)?;
+        let jobs = self.store.jobs_that(|job| match job.state {
+            JobState::Done => self.spool.directory(&job.result).exists(),
+            JobState::Cancelled => false,
+            JobState::Queued | JobState::Running | JobState::Failed => true,
+        })?;
         let mut scans_bytes = 0;
         let mut kept = Vec::new();
         for scan in &mut scans {

@@ -154,14 +154,16 @@ impl Store {
 
     /// All scans, oldest first.
     pub(crate) fn scans(&self) -> Result<Vec<Scan>, StoreError> {
-        let read = |database: &Database| -> Result<Vec<Vec<u8>>, redb::Error> {
+        self.scans_that(|_| true)
+    }
+
+    /// Some of the scans, oldest first. Only those are in memory at the same time: records are
+    /// kept for ever.
+    pub(crate) fn scans_that(&self, keep: impl Fn(&Scan) -> bool) -> Result<Vec<Scan>, StoreError> {
+        self.with(|database| {
             let table = database.begin_read()?.open_table(SCANS)?;
-            table
-                .iter()?
-                .map(|row| Ok(row?.1.value().to_vec()))
-                .collect()
-        };
-        self.decode_all(self.with(read)?)
+            self.decode_some(table.iter()?.map(|row| Ok(row?.1)), &keep)
+        })?
     }
 
     /// One scan.
@@ -181,14 +183,15 @@ impl Store {
 
     /// All jobs, oldest first.
     pub(crate) fn jobs(&self) -> Result<Vec<Job>, StoreError> {
-        let read = |database: &Database| -> Result<Vec<Vec<u8>>, redb::Error> {
+        self.jobs_that(|_| true)
+    }
+
+    /// Some of the jobs, oldest first, as [`Store::scans_that`].
+    pub(crate) fn jobs_that(&self, keep: impl Fn(&Job) -> bool) -> Result<Vec<Job>, StoreError> {
+        self.with(|database| {
             let table = database.begin_read()?.open_table(JOBS)?;
-            table
-                .iter()?
-                .map(|row| Ok(row?.1.value().to_vec()))
-                .collect()
-        };
-        self.decode_all(self.with(read)?)
+            self.decode_some(table.iter()?.map(|row| Ok(row?.1)), &keep)
+        })?
     }
 
     /// One job.
@@ -206,8 +209,21 @@ impl Store {
         self.put_job_telling(job, &[]).map(drop)
     }
 
-    fn decode_all<T: DeserializeOwned>(&self, rows: Vec<Vec<u8>>) -> Result<Vec<T>, StoreError> {
-        rows.iter().map(|bytes| decode(&self.path, bytes)).collect()
+    /// What of the rows is kept; inside, that a record cannot be read.
+    fn decode_some<'a, T: DeserializeOwned>(
+        &self,
+        rows: impl Iterator<Item = Result<redb::AccessGuard<'a, &'static [u8]>, redb::Error>>,
+        keep: &impl Fn(&T) -> bool,
+    ) -> Result<Result<Vec<T>, StoreError>, redb::Error> {
+        let mut kept = Vec::new();
+        for row in rows {
+            match decode(&self.path, row?.value()) {
+                Ok(record) if keep(&record) => kept.push(record),
+                Ok(_) => {}
+                Err(error) => return Ok(Err(error)),
+            }
+        }
+        Ok(Ok(kept))
     }
 }
 
