@@ -1,7 +1,7 @@
 //! The stages in their order.
 
 use range_image::{Cancelled, Column, RangeImage, RegionMap};
-use reconstruct::{Fitted, ReconstructError, Reconstruction};
+use reconstruct::{Fitted, Method, ReconstructError, Reconstruction};
 use regrid::RegridError;
 use segment::SegmentError;
 use shapes::Shape;
@@ -228,16 +228,20 @@ fn in_view(
 
     observer.stage(Stage::Reconstruct);
     let part_image = part.image.as_ref().unwrap_or(image);
-    let (fitted, kinds) = rayon::join(
-        || Fitted::of(part_image, &part.regions, &settings.reconstruct, observer),
-        || kinds(part_image, &part.regions, columns, observer),
-    );
-    let (fitted, kinds) = (fitted?, kinds?);
-    let shapes: Vec<Option<Shape>> = match settings.kinds {
-        Kinds::Auto => kinds.iter().map(RegionKind::shape).collect(),
-        Kinds::FreeForm => Vec::new(),
+    let of_kinds = || kinds(part_image, &part.regions, columns, observer);
+    let fit = || Fitted::of(part_image, &part.regions, &settings.reconstruct, observer);
+    let takes_shapes =
+        settings.kinds == Kinds::Auto && settings.reconstruct.method == Method::Relief;
+    let (reconstruction, kinds) = if takes_shapes {
+        let (fitted, kinds) = rayon::join(fit, of_kinds);
+        let (fitted, kinds) = (fitted?, kinds?);
+        let shapes: Vec<Option<Shape>> = kinds.iter().map(RegionKind::shape).collect();
+        (fitted.reconstruct(&shapes, observer)?, kinds)
+    } else {
+        let free_form = || fit()?.reconstruct(&[], observer);
+        let (reconstruction, kinds) = rayon::join(free_form, of_kinds);
+        (reconstruction?, kinds?)
     };
-    let reconstruction = fitted.reconstruct(&shapes, observer)?;
     Ok(Outcome {
         regions: part.regions,
         background: part.background,

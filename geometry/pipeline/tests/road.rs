@@ -4,8 +4,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use pipeline::{
-    Basis, Kinds, Method, NodeRole, Observer, Outcome, PipelineError, Settings, Stage, View,
-    divide, process, process_columns,
+    BackgroundPolicy, Basis, Kinds, Method, NodeRole, Observer, Outcome, PipelineError, Settings,
+    Stage, View, divide, process, process_columns,
 };
 use range_image::{Column, Lattice, Monitor, RangeImage, Sample, Unmonitored};
 use reconstruct::Surface;
@@ -270,4 +270,51 @@ fn surfaces_that_are_known_are_the_faces_themselves() {
     let faces = &outcome.reconstruction.model.faces;
     assert!(faces.iter().all(|face| face.shape.is_none()));
     assert!(outcome.kinds.iter().any(|kind| kind.shape().is_some()));
+}
+
+/// What a dent leaves in the sum of squares of a large plane is little; the face must have it.
+#[test]
+fn a_dented_plane_is_not_made_flat() {
+    let dent = |x: f64, y: f64| {
+        let off = (x - 4.0).hypot(y + 3.0);
+        if off < 6.0 {
+            0.1 * (1.0 + (core::f64::consts::PI * off / 6.0).cos())
+        } else {
+            0.0
+        }
+    };
+    let columns: Vec<Column> = (-80..=80)
+        .map(|i| {
+            let x_mm = f64::from(i) * 0.5 + 0.2;
+            let samples = (-90..=90).map(|j| {
+                let y_mm = f64::from(j) * 0.45;
+                // As good as random, evenly up to 0.03 mm either way.
+                let phase = f64::from(i) * 12.9898 + f64::from(j) * 78.233;
+                let rough = 0.06 * ((phase.sin() * 43_758.545).rem_euclid(1.0) - 0.5);
+                Sample {
+                    y_mm,
+                    z_mm: 0.1 * x_mm - dent(x_mm, y_mm) + rough,
+                    intensity: 255,
+                }
+            });
+            Column::new(x_mm, samples.collect())
+        })
+        .collect();
+    let mut settings = Settings {
+        background: BackgroundPolicy::Keep,
+        ..Settings::new(0.5)
+    };
+    // On the whole the plane is nearer than by the usual tolerance, dent and all.
+    settings.reconstruct.tolerance_mm = 0.002;
+    let (image, outcome) = process_columns(&columns, &settings, &Unmonitored).unwrap();
+    let restored = &outcome.reconstruction.restored;
+    let place = |count: usize, at: &dyn Fn(usize) -> f64, mm: f64| {
+        (0..count).min_by(|&a, &b| (at(a) - mm).abs().total_cmp(&(at(b) - mm).abs()))
+    };
+    let column = place(image.columns(), &|c| image.x_mm(c), 4.0).unwrap();
+    let row = place(image.rows(), &|r| image.y_mm(r), -3.0).unwrap();
+    let depth_mm = 0.1 * image.x_mm(column) - restored.z_mm(column, row).unwrap();
+    assert!((depth_mm - 0.2).abs() < 0.04, "{depth_mm}");
+    assert!(outcome.kinds[0].shape().is_some(), "most of it is a plane");
+    assert!(outcome.reconstruction.model.faces[0].shape.is_none());
 }

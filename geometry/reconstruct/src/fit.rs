@@ -45,6 +45,16 @@ pub struct Domain {
 }
 
 impl Domain {
+    /// The smallest rectangle that holds both.
+    #[must_use]
+    pub fn with(&self, other: &Self) -> Self {
+        let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+        Self {
+            x_mm: both(self.x_mm, other.x_mm),
+            y_mm: both(self.y_mm, other.y_mm),
+        }
+    }
+
     /// Whether the surface covers the rectangle.
     #[must_use]
     pub fn is_within(&self, surface: &PatchSurface) -> bool {

@@ -3,6 +3,7 @@
 //! A model is a graph over the x-y plane, so a known shape becomes patches, too: fitted to the
 //! shape itself at the nodes of its region, and a little beyond for borders to run on.
 
+use nalgebra::Vector3;
 use nurbs::{Observation, PatchSurface};
 use range_image::RangeImage;
 use shapes::Shape;
@@ -19,32 +20,66 @@ const PLANE_SIDE: usize = 5;
 /// square millimetres.
 const NO_NOISE_MM2: f64 = 1e-14;
 
+/// Part of the tolerance at which nothing more is refined.
+const AIM: f64 = 0.25;
+
+/// Share of the nodes at which the shape has to be there.
+const MET: f64 = 0.98;
+
+/// Around the nodes the shape goes on where it faces the camera so squarely at least, of the
+/// least squarely that it does at a node: what is steeper needs many patches and bounds nothing.
+const LEAST_FACING: f64 = 0.75;
+
 /// Narrowest span, pitches; half of that of a fit to nodes, since nothing is made up between
 /// them.
 const LEAST_SPAN: f64 = 1.0;
 
-/// Most spans along a side.
-const MOST_SPANS: usize = 256;
+/// How far a node may lie off the shape along its normal, pitches: what is found farther away is
+/// another sheet of it.
+const NEAR: f64 = 2.0;
 
-/// Patches of a shape over a domain; `None` where it is not seen at most of the nodes.
+/// Patches of a shape over a domain with so many spans along a side at most; `None` where they
+/// do not come within [`SHAPE_TOLERANCE_MM`], or it is not seen at the nodes.
 pub(crate) fn patches(
     shape: &Shape,
     image: &RangeImage,
     nodes: &[Node],
     domain: &Domain,
+    most_spans: usize,
 ) -> Option<PatchSurface> {
     let observations = match shape {
         Shape::Plane(_) => over(shape, domain)?,
-        _ => around(shape, image, nodes)?,
+        _ => around(shape, image, nodes, domain)?,
     };
     let demand = Demand {
-        tolerance_mm: SHAPE_TOLERANCE_MM,
+        tolerance_mm: AIM * SHAPE_TOLERANCE_MM,
         noise_density_mm2: NO_NOISE_MM2,
         least_span_mm: LEAST_SPAN * image.pitch_mm(),
-        most_spans: MOST_SPANS,
+        most_spans,
     };
     let spline = refine::fit(&observations, domain, &demand).ok()?;
-    spline.to_patches().ok()
+    let surface = spline.to_patches().ok()?;
+    is_that(shape, &surface, image, nodes).then_some(surface)
+}
+
+/// Whether a surface is a shape at the nodes, to its tolerance.
+fn is_that(shape: &Shape, surface: &PatchSurface, image: &RangeImage, nodes: &[Node]) -> bool {
+    let squares = nodes.iter().map(|node| {
+        let (x, y) = (image.x_mm(node.column), image.y_mm(node.row));
+        shape
+            .distance_mm(&Vector3::new(x, y, surface.z(x, y)))
+            .powi(2)
+    });
+    let rms_mm = (squares.sum::<f64>() / nodes.len() as f64).sqrt();
+    rms_mm <= SHAPE_TOLERANCE_MM
+}
+
+/// z of a shape over a place, and the cosine between z and its normal there; `None` where it is
+/// not there, or another sheet of it is.
+fn met(shape: &Shape, (x_mm, y_mm): (f64, f64), near_mm: f64, pitch_mm: f64) -> Option<(f64, f64)> {
+    let z_mm = shape.z_mm(x_mm, y_mm, near_mm)?;
+    let facing = shape.normal(&Vector3::new(x_mm, y_mm, z_mm)).z;
+    ((z_mm - near_mm).abs() * facing <= NEAR * pitch_mm).then_some((z_mm, facing))
 }
 
 /// A shape that is seen all over a domain, at a few places.
@@ -66,8 +101,14 @@ fn over(shape: &Shape, domain: &Domain) -> Option<Vec<Observation>> {
         .collect()
 }
 
-/// A shape at the nodes of a region, and around them as far as borders may run.
-fn around(shape: &Shape, image: &RangeImage, nodes: &[Node]) -> Option<Vec<Observation>> {
+/// A shape at the nodes of a region, and around them as far as borders may run. Distances count
+/// along the normal.
+fn around(
+    shape: &Shape,
+    image: &RangeImage,
+    nodes: &[Node],
+    domain: &Domain,
+) -> Option<Vec<Observation>> {
     let margin = SURFACE_MARGIN.ceil() as usize;
     let extent = |of: fn(&Node) -> usize| {
         let all = || nodes.iter().map(of);
@@ -84,42 +125,156 @@ fn around(shape: &Shape, image: &RangeImage, nodes: &[Node]) -> Option<Vec<Obser
         let row = (rows.0 + j) as f64 - margin as f64;
         image.y_mm(0) + row * image.pitch_mm()
     };
-    let mut z_mm = vec![f64::NAN; width * height];
-    let mut met = 0;
+    let pitch_mm = image.pitch_mm();
+    // z and weight.
+    let mut known: Vec<Option<(f64, f64)>> = vec![None; width * height];
+    let mut count = 0;
     for node in nodes {
         let (i, j) = (node.column - columns.0 + margin, node.row - rows.0 + margin);
-        if let Some(z) = shape.z_mm(x_mm(i), y_mm(j), node.z_mm) {
-            z_mm[i * height + j] = z;
-            met += 1;
-        }
+        known[i * height + j] = met(shape, (x_mm(i), y_mm(j)), node.z_mm, pitch_mm);
+        count += usize::from(known[i * height + j].is_some());
     }
-    if 2 * met < nodes.len() {
+    if (count as f64) < MET * nodes.len() as f64 {
         return None;
     }
+    let facings = known.iter().flatten().map(|(_, facing)| *facing);
+    let least_facing = LEAST_FACING * facings.fold(1.0, f64::min);
     for _ in 0..margin {
         let mut next = Vec::new();
         for i in 0..width {
-            for j in (0..height).filter(|j| z_mm[i * height + j].is_nan()) {
+            for j in (0..height).filter(|j| known[i * height + j].is_none()) {
                 let beside = (i.saturating_sub(1)..(i + 2).min(width))
                     .flat_map(|i| (j.saturating_sub(1)..(j + 2).min(height)).map(move |j| (i, j)));
-                let known = beside.map(|(i, j)| z_mm[i * height + j]);
-                let near = known.filter(|z| !z.is_nan()).reduce(f64::min);
-                if let Some(z) = near.and_then(|near| shape.z_mm(x_mm(i), y_mm(j), near)) {
-                    next.push((i * height + j, z));
+                let near = beside.filter_map(|(i, j)| known[i * height + j]);
+                let near = near.map(|(z_mm, _)| z_mm).reduce(f64::min);
+                let found = near.and_then(|near| met(shape, (x_mm(i), y_mm(j)), near, pitch_mm));
+                if let Some(found) = found.filter(|(_, facing)| *facing >= least_facing) {
+                    next.push((i * height + j, found));
                 }
             }
         }
-        for (place, z) in next {
-            z_mm[place] = z;
+        for (place, found) in next {
+            known[place] = Some(found);
         }
     }
-    let seen = (0..width).flat_map(|i| (0..height).map(move |j| (i, j)));
-    let seen = seen.filter(|(i, j)| !z_mm[i * height + j].is_nan());
-    let observation = |(i, j): (usize, usize)| Observation {
-        u: x_mm(i),
-        v: y_mm(j),
-        value: z_mm[i * height + j],
-        weight: 1.0,
+    let is_within = |(low, high): (f64, f64), at: f64| (low..=high).contains(&at);
+    let observation = |(i, j): (usize, usize)| {
+        let (value, facing) = known[i * height + j]?;
+        let (u, v) = (x_mm(i), y_mm(j));
+        (is_within(domain.x_mm, u) && is_within(domain.y_mm, v)).then_some(Observation {
+            u,
+            v,
+            value,
+            weight: facing * facing,
+        })
     };
-    Some(seen.map(observation).collect())
+    let places = (0..width).flat_map(|i| (0..height).map(move |j| (i, j)));
+    Some(places.filter_map(observation).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use range_image::Lattice;
+    use shapes::{Sphere, Torus};
+
+    /// The nodes at which a shape's upper sheet faces the camera so squarely at least.
+    fn seen(
+        shape: &Shape,
+        top_mm: f64,
+        least_facing: f64,
+        is_part: impl Fn(f64, f64) -> bool,
+    ) -> (RangeImage, Vec<Node>) {
+        let image = RangeImage::masked(Lattice { pitch_mm: 0.5 }, -120, -120, 240, 240);
+        let places = (0..240).flat_map(|column| (0..240).map(move |row| (column, row)));
+        let node = |(column, row)| {
+            let (x, y) = (image.x_mm(column), image.y_mm(row));
+            let z_mm = shape.z_mm(x, y, top_mm)?;
+            let facing = shape.normal(&Vector3::new(x, y, z_mm)).z;
+            (is_part(x, y) && z_mm > 0.0 && facing >= least_facing).then_some(Node {
+                column,
+                row,
+                z_mm,
+            })
+        };
+        let nodes = places.filter_map(node).collect();
+        (image, nodes)
+    }
+
+    fn whole() -> Domain {
+        Domain {
+            x_mm: (-30.0, 30.0),
+            y_mm: (-30.0, 30.0),
+        }
+    }
+
+    #[test]
+    fn a_sphere_becomes_patches_to_the_tolerance() {
+        let shape = Shape::Sphere(Sphere {
+            centre_mm: Vector3::zeros(),
+            radius_mm: 25.0,
+            is_hollow: false,
+        });
+        for least_facing in [0.3, 0.6] {
+            let (image, nodes) = seen(&shape, 25.0, least_facing, |_, _| true);
+            let surface = patches(&shape, &image, &nodes, &whole(), 256).unwrap();
+            let worst = nodes.iter().map(|node| {
+                let (x, y) = (image.x_mm(node.column), image.y_mm(node.row));
+                let exact = (625.0 - x * x - y * y).sqrt();
+                (surface.z(x, y) - exact).abs() * exact / 25.0
+            });
+            let worst = worst.fold(0.0, f64::max);
+            assert!(worst < 0.03, "{least_facing}: {worst}");
+            // Few spans do not do.
+            assert!(patches(&shape, &image, &nodes, &whole(), 2).is_none());
+        }
+    }
+
+    /// Beyond its shoulders the descent leads to the lower side of the ring.
+    #[test]
+    fn another_sheet_of_a_groove_has_no_say() {
+        let (radius_mm, tube_mm) = (20.0, 6.0);
+        let shape = Shape::Torus(Torus {
+            centre_mm: Vector3::zeros(),
+            axis: Vector3::y(),
+            radius_mm,
+            tube_mm,
+            is_hollow: true,
+        });
+        // The groove of a pulley: the inner half of the tube, on the side of the camera.
+        let exact = |x: f64, y: f64| {
+            let out = radius_mm - (tube_mm * tube_mm - y * y).sqrt();
+            (out * out - x * x).sqrt()
+        };
+        let image = RangeImage::masked(Lattice { pitch_mm: 0.5 }, -120, -120, 240, 240);
+        let places = (0..240).flat_map(|column| (0..240).map(move |row| (column, row)));
+        let node = |(column, row)| {
+            let z_mm = exact(image.x_mm(column), image.y_mm(row));
+            let place = Vector3::new(image.x_mm(column), image.y_mm(row), z_mm);
+            (z_mm.is_finite() && shape.normal(&place).z > 0.2).then_some(Node { column, row, z_mm })
+        };
+        let nodes: Vec<Node> = places.filter_map(node).collect();
+        assert!(nodes.len() > 1_000, "{}", nodes.len());
+        let found = around(&shape, &image, &nodes, &whole()).unwrap();
+        assert!(found.len() > nodes.len(), "it goes on a little");
+        for o in &found {
+            let off = o.value - exact(o.u, o.v);
+            assert!(off.abs() < 1e-6, "{}, {}: {}", o.u, o.v, o.value);
+        }
+    }
+
+    #[test]
+    fn a_shape_that_is_not_there_is_none() {
+        let shape = Shape::Sphere(Sphere {
+            centre_mm: Vector3::zeros(),
+            radius_mm: 25.0,
+            is_hollow: false,
+        });
+        let (image, mut nodes) = seen(&shape, 25.0, 0.5, |_, _| true);
+        let many = nodes.len() / 20;
+        for node in &mut nodes[..many] {
+            node.z_mm += 10.0;
+        }
+        assert!(patches(&shape, &image, &nodes, &whole(), 256).is_none());
+    }
 }

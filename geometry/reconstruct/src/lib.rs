@@ -16,6 +16,7 @@ pub mod model;
 pub mod polygon;
 pub mod settings;
 
+mod accept;
 mod assemble;
 mod border;
 mod known;

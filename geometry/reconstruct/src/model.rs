@@ -72,7 +72,7 @@ pub struct Face {
     /// The untrimmed surface; its normal points towards the camera (+z).
     pub surface: Surface,
     /// What the surface is, where it is of a kind that engineers know by its numbers: the patches
-    /// are this shape to [`SHAPE_TOLERANCE_MM`] root mean square. `None` for a free form.
+    /// are this shape to [`SHAPE_TOLERANCE_MM`]. `None` for a free form.
     pub shape: Option<Shape>,
     /// Counter-clockwise in the parameter plane.
     pub outer: Loop,
@@ -112,5 +112,6 @@ pub struct Coedge {
 /// How far a coedge's space curve may lie off its surface, millimetres.
 pub const SPACE_CURVE_TOLERANCE_MM: f64 = 1e-4;
 
-/// How far the patches of a face may lie off its shape, root mean square, millimetres.
-pub const SHAPE_TOLERANCE_MM: f64 = 5e-4;
+/// How far the patches of a face lie off its shape at the nodes of its region, root mean square
+/// along the normal, millimetres.
+pub const SHAPE_TOLERANCE_MM: f64 = 2e-3;

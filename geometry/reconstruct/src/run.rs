@@ -5,6 +5,7 @@ use range_image::{Monitor, RangeImage, RegionMap};
 use rayon::prelude::*;
 use shapes::Shape;
 
+use crate::accept::is_as_good;
 use crate::assemble::{Carrier, Placement, domains, model};
 use crate::border::cracks::trace;
 use crate::border::intersection::intersections;
@@ -61,12 +62,6 @@ pub struct RegionFit {
 /// Margin of a surface around the nodes of its region, pitches: half of one to the
 /// border, and what smoothing may do.
 pub(crate) const SURFACE_MARGIN: f64 = 3.0;
-
-/// A shape is as good as a free-form surface that leaves its nodes so much less, at the least:
-/// that follows the noise, and nodes are the middles of windows, which blunt what bends; the
-/// second figure in pitches.
-const AS_WELL: f64 = 1.5;
-const SMOOTHED: f64 = 0.02;
 
 /// Narrowest span of a fitted spline, pitches.
 const LEAST_SPAN: f64 = 2.0;
@@ -168,7 +163,7 @@ impl<'a> Fitted<'a> {
         monitor: &dyn Monitor,
     ) -> Result<Reconstruction, ReconstructError> {
         let (image, settings) = (self.image, self.settings);
-        let shapes = self.take_over(shapes);
+        let shapes = self.take_over(shapes, monitor)?;
         let borders = BorderSettings {
             literal: settings.method == Method::ShimLee,
             corner_cosine: libm::cos(settings.corner_angle_rad),
@@ -216,31 +211,42 @@ impl<'a> Fitted<'a> {
         })
     }
 
-    /// Puts shapes in the place of free-form surfaces; gives those taken, of each piece.
-    fn take_over(&mut self, shapes: &[Option<Shape>]) -> Vec<Option<Shape>> {
+    /// Puts shapes in the place of free-form surfaces; gives those taken, of each piece. A region
+    /// is of its shape with all its pieces, or with none.
+    fn take_over(
+        &mut self,
+        shapes: &[Option<Shape>],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Option<Shape>>, ReconstructError> {
         let of_piece = |piece: usize| -> Option<(Shape, PatchSurface)> {
             let free = self.surfaces.get(piece)?;
             let label = usize::from(self.pieces.regions[piece]);
             let shape = *shapes.get(label - 1)?.as_ref()?;
+            let surface = self.known(piece, &shape, None)?;
             let nodes = &self.nodes[piece];
-            let domain = around(self.image, nodes)?;
-            let surface = known::patches(&shape, self.image, nodes, &domain)?;
-            let rms = [&surface, free].map(|s| residuals(self.image, nodes, s).0);
-            let allowed_mm = AS_WELL * rms[1] + SMOOTHED * self.image.pitch_mm();
-            (rms[0] <= allowed_mm).then_some((shape, surface))
+            is_as_good(self.image, nodes, &surface, free).then_some((shape, surface))
         };
-        let found: Vec<_> = (0..self.nodes.len())
-            .into_par_iter()
-            .map(of_piece)
-            .collect();
+        let found = (0..self.nodes.len()).into_par_iter().map(|piece| {
+            monitor.check()?;
+            Ok(of_piece(piece))
+        });
+        let found: Vec<Result<_, ReconstructError>> = found.collect();
+        let found: Vec<_> = found.into_iter().collect::<Result<_, _>>()?;
+        let regions = self.pieces.regions.clone();
+        let holds = |piece: usize| {
+            let of_region = regions.iter().zip(&found);
+            let mut pieces = of_region.filter(|(region, _)| **region == regions[piece]);
+            pieces.all(|(_, found)| found.is_some())
+        };
+        let whole: Vec<bool> = (0..found.len()).map(holds).collect();
         let mut taken = vec![None; found.len()];
         for (piece, found) in found.into_iter().enumerate() {
-            if let Some((shape, surface)) = found {
+            if let Some((shape, surface)) = found.filter(|_| whole[piece]) {
                 taken[piece] = Some(shape);
                 self.surfaces[piece] = surface;
             }
         }
-        taken
+        Ok(taken)
     }
 
     /// The surface of a piece over the domain that its border asks for, and the shape that it is.
@@ -254,12 +260,21 @@ impl<'a> Fitted<'a> {
         if let Some(surface) = self.surfaces.get(piece).filter(fits) {
             return Ok((surface.clone(), shape));
         }
-        if let (Some(shape), Some(domain)) = (shape, domain)
-            && let Some(surface) = known::patches(&shape, self.image, &self.nodes[piece], &domain)
+        if let Some(shape) = shape
+            && let Some(surface) = self.known(piece, &shape, domain)
         {
             return Ok((surface, Some(shape)));
         }
         Ok((self.free_form(piece, domain)?, None))
+    }
+
+    /// Patches of a shape over the nodes of a piece, and over a domain besides.
+    fn known(&self, piece: usize, shape: &Shape, besides: Option<Domain>) -> Option<PatchSurface> {
+        let (image, nodes) = (self.image, &self.nodes[piece]);
+        let own = around(image, nodes)?;
+        let domain = besides.map_or(own, |besides| own.with(&besides));
+        let most_spans = self.settings.knots_per_side - 1;
+        known::patches(shape, image, nodes, &domain, most_spans)
     }
 
     /// A free-form surface of a piece over a domain.
@@ -413,7 +428,7 @@ fn tally(
 }
 
 /// Root mean square and greatest residual of nodes, millimetres.
-fn residuals(image: &RangeImage, nodes: &[Node], surface: &PatchSurface) -> (f64, f64) {
+pub(crate) fn residuals(image: &RangeImage, nodes: &[Node], surface: &PatchSurface) -> (f64, f64) {
     let (mut sum, mut max_mm) = (0.0, 0.0_f64);
     for n in nodes {
         let off = surface.z(image.x_mm(n.column), image.y_mm(n.row)) - n.z_mm;

@@ -1,0 +1,61 @@
+//! Whether the shape that a region's samples speak for does for its nodes, too.
+//!
+//! A verdict weighs the region as a whole, so that a dent in a plane hardly counts. The free-form
+//! surface has followed it: where the nodes of some place lie off the shape together, and not off
+//! that, the region is no such shape.
+
+use std::collections::BTreeMap;
+
+use nurbs::PatchSurface;
+use range_image::RangeImage;
+
+use crate::run::{Node, residuals};
+
+/// A shape may leave its nodes so much more than a free-form surface, which follows the noise;
+/// and nodes are the middles of windows, which blunt what bends: the second figure in pitches.
+const AS_WELL: f64 = 1.5;
+const BLUNTED: f64 = 0.02;
+
+/// Side of the blocks of nodes that are looked at, nodes: as wide as the windows whose samples
+/// neighbouring nodes share.
+const BLOCK: usize = 8;
+
+/// Fewest nodes of a block, of those that it has room for.
+const FEWEST: usize = 24;
+
+/// How many deviations of a node, as the free form leaves them, the mean of a block may be off:
+/// its nodes share samples, so it is known not much better than one of them.
+const TOGETHER: f64 = 5.0;
+
+/// Whether a surface does for its nodes as well as the free-form one, on the whole and in every
+/// place.
+pub(crate) fn is_as_good(
+    image: &RangeImage,
+    nodes: &[Node],
+    surface: &PatchSurface,
+    free: &PatchSurface,
+) -> bool {
+    let rms_mm = [surface, free].map(|s| residuals(image, nodes, s).0);
+    let blunted_mm = BLUNTED * image.pitch_mm();
+    if rms_mm[0] > AS_WELL * rms_mm[1] + blunted_mm {
+        return false;
+    }
+    // Of each block: nodes, sum of the nodes off the surface, and sum of their slopes.
+    let mut blocks: BTreeMap<(usize, usize), (usize, f64, f64)> = BTreeMap::new();
+    for node in nodes {
+        let (x, y) = (image.x_mm(node.column), image.y_mm(node.row));
+        let block = blocks
+            .entry((node.column / BLOCK, node.row / BLOCK))
+            .or_default();
+        let [p, q] = [(1, 0), (0, 1)].map(|(u, v)| surface.z_partial(x, y, u, v));
+        block.0 += 1;
+        block.1 += node.z_mm - surface.z(x, y);
+        block.2 += (1.0 + p * p + q * q).sqrt();
+    }
+    let mut large = blocks.values().filter(|block| block.0 >= FEWEST);
+    large.all(|&(count, off_mm, steepness)| {
+        let steepness = steepness / count as f64;
+        let allowed_mm = TOGETHER * rms_mm[1] + blunted_mm * steepness;
+        (off_mm / count as f64).abs() <= allowed_mm
+    })
+}
