@@ -20,12 +20,13 @@ const BLUNTED: f64 = 0.02;
 /// neighbouring nodes share.
 const BLOCK: usize = 8;
 
-/// Fewest nodes of a block, of those that it has room for.
-const FEWEST: usize = 24;
+/// Fewest nodes of a block, of those that it has room for: beside borders windows have samples on
+/// one side only, and nodes of steep surfaces are off together for that alone.
+const FEWEST: usize = 48;
 
 /// How many deviations of a node, as the free form leaves them, the mean of a block may be off:
 /// its nodes share samples, so it is known not much better than one of them.
-const TOGETHER: f64 = 5.0;
+const TOGETHER: f64 = 6.0;
 
 /// Whether a surface does for its nodes as well as the free-form one, on the whole and in every
 /// place.
