@@ -276,9 +276,9 @@ fn surfaces_that_are_known_are_the_faces_themselves() {
 #[test]
 fn a_dented_plane_is_not_made_flat() {
     let dent = |x: f64, y: f64| {
-        let off = (x - 4.0).hypot(y + 3.0);
+        let off = libm::hypot(x - 4.0, y + 3.0);
         if off < 6.0 {
-            0.1 * (1.0 + (core::f64::consts::PI * off / 6.0).cos())
+            0.1 * (1.0 + libm::cos(core::f64::consts::PI * off / 6.0))
         } else {
             0.0
         }
@@ -290,7 +290,7 @@ fn a_dented_plane_is_not_made_flat() {
                 let y_mm = f64::from(j) * 0.45;
                 // As good as random, evenly up to 0.03 mm either way.
                 let phase = f64::from(i) * 12.9898 + f64::from(j) * 78.233;
-                let rough = 0.06 * ((phase.sin() * 43_758.545).rem_euclid(1.0) - 0.5);
+                let rough = 0.06 * ((libm::sin(phase) * 43_758.545).rem_euclid(1.0) - 0.5);
                 Sample {
                     y_mm,
                     z_mm: 0.1 * x_mm - dent(x_mm, y_mm) + rough,
