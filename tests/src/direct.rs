@@ -7,7 +7,7 @@ use std::process::Command;
 use anyhow::{Context, Result, ensure};
 use deliverables::CadOptions;
 use jiff::Timestamp;
-use pipeline::Settings;
+use pipeline::{InMemory, Settings};
 use range_image::{Column, Sample, Unmonitored};
 use relief_api::Scan;
 use scan_files::{ReadOptions, recommended_pitch_mm};
@@ -50,7 +50,8 @@ pub fn journal(path: &Path, label: &Label, threads: usize) -> Result<Vec<u8>> {
         columns.push(raw.calibrated(&header.calibration));
     }
     let pitch_mm = recommended_pitch_mm(header.column_pitch_mm, header.sample_spacing_mm);
-    columns_to_iges(&columns, pitch_mm, label, threads)
+    let camera_mm = header.calibration.head.camera_mm();
+    columns_to_iges(&columns, camera_mm, pitch_mm, label, threads)
 }
 
 /// The CAD file of a scan file of another program, with the default settings.
@@ -73,18 +74,20 @@ pub fn scan_file(path: &Path, label: &Label, threads: usize) -> Result<Vec<u8>> 
             Column::new(column.x_mm, samples.collect())
         })
         .collect();
-    columns_to_iges(&columns, pitch_mm, label, threads)
+    columns_to_iges(&columns, None, pitch_mm, label, threads)
 }
 
 fn columns_to_iges(
     columns: &[Column],
+    camera_mm: Option<[f64; 2]>,
     pitch_mm: f64,
     label: &Label,
     threads: usize,
 ) -> Result<Vec<u8>> {
     let mut settings = Settings::new(pitch_mm);
     settings.regrid.threads = threads;
-    let (_, outcome) = pipeline::process_columns(columns, &settings, &Unmonitored)?;
+    let (_, outcome) =
+        pipeline::process_scan(&InMemory { columns, camera_mm }, &settings, &Unmonitored)?;
     let cad = CadOptions {
         author: label.author.clone(),
         ..CadOptions::default()

@@ -28,6 +28,8 @@ const MOST_SAMPLES: u64 = 1 << 25;
 pub(crate) struct Input {
     /// The columns in the order of the file.
     pub(crate) columns: Vec<Column>,
+    /// Where in a column's plane its rays come from, y and z in millimetres, if that is known.
+    pub(crate) camera_mm: Option<[f64; 2]>,
     /// Distance of neighbouring columns, millimetres.
     pub(crate) column_pitch_mm: f64,
     /// Distance of neighbouring samples in a column, millimetres.
@@ -157,6 +159,7 @@ fn from_points(scan: PointScan, name: &str) -> Input {
             ..ScanReport::default()
         },
         columns,
+        camera_mm: None,
         processing: None,
         name: None,
         timestamp: None,
@@ -200,6 +203,7 @@ fn journal(reader: impl BufRead, name: &str) -> Result<Input, Failure> {
     };
     let text = |text: &String| (!text.is_empty()).then(|| text.clone());
     Ok(Input {
+        camera_mm: header.calibration.head.camera_mm(),
         column_pitch_mm: positive(header.column_pitch_mm).unwrap_or_else(|| spacing_x(&columns)),
         sample_spacing_mm: positive(header.sample_spacing_mm)
             .unwrap_or_else(|| spacing_y(&columns)),

@@ -181,14 +181,7 @@ impl Columns for KeptColumns {
     }
 
     fn camera_mm(&self) -> Option<[f64; 2]> {
-        match self.head {
-            Head::Polar {
-                camera_y_mm,
-                camera_z_mm,
-                ..
-            } => Some([camera_y_mm, camera_z_mm]),
-            Head::Cartesian { .. } => None,
-        }
+        self.head.camera_mm()
     }
 }
 

@@ -22,9 +22,22 @@ pub trait Columns: Sync {
     }
 }
 
-impl Columns for &[Column] {
+/// A whole scan in memory.
+#[derive(Debug, Clone, Copy)]
+pub struct InMemory<'a> {
+    /// Its columns.
+    pub columns: &'a [Column],
+    /// As [`Columns::camera_mm`].
+    pub camera_mm: Option<[f64; 2]>,
+}
+
+impl Columns for InMemory<'_> {
     fn visit(&self, take: &mut dyn FnMut(&Column) -> bool) -> Result<(), ReadAgainError> {
-        self.iter().all(take);
+        self.columns.iter().all(take);
         Ok(())
+    }
+
+    fn camera_mm(&self) -> Option<[f64; 2]> {
+        self.camera_mm
     }
 }

@@ -21,12 +21,14 @@ mod process;
 mod settings;
 
 pub use background::{BackgroundPolicy, Crumb, NodeRole, UnknownPolicy};
-pub use columns::{Columns, ReadAgainError};
+pub use columns::{Columns, InMemory, ReadAgainError};
 pub use extent::{Extent, finest_pitch_mm, no_surface, unusual_size};
 pub use kinds::{Basis, Kinds, RegionKind, UnknownKinds};
 pub use method::{Method, UnknownMethod};
 pub use observer::{Observer, Stage};
 pub use part::{Part, divide};
-pub use process::{Outcome, PipelineError, process, process_columns, process_in_view};
+pub use process::{
+    Outcome, PipelineError, process, process_columns, process_in_view, process_scan,
+};
 pub use segment::{Background, BackgroundKind, BackgroundRegion, Plane, View};
 pub use settings::{Settings, SettingsError};

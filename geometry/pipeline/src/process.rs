@@ -6,7 +6,7 @@ use regrid::RegridError;
 use segment::SegmentError;
 use shapes::Shape;
 
-use crate::columns::{Columns, ReadAgainError};
+use crate::columns::{Columns, InMemory, ReadAgainError};
 use crate::kinds::{RegionKind, kinds};
 use crate::part::divide;
 use crate::{Background, Crumb, Kinds, NodeRole, View};
@@ -148,26 +148,42 @@ impl From<Cancelled> for PipelineError {
     }
 }
 
+/// As [`process_scan`], of a camera that is not known.
+///
+/// # Errors
+/// As [`process_scan`].
+pub fn process_columns(
+    columns: &[Column],
+    settings: &Settings,
+    observer: &dyn Observer,
+) -> Result<(RangeImage, Outcome), PipelineError> {
+    let scan = InMemory {
+        columns,
+        camera_mm: None,
+    };
+    process_scan(&scan, settings, observer)
+}
+
 /// From columns to a model: [`regrid::regrid`], then [`process_in_view`].
 ///
 /// # Errors
 /// As [`process_in_view`], and [`PipelineError::Regrid`].
-pub fn process_columns(
-    columns: &[Column],
+pub fn process_scan(
+    scan: &InMemory<'_>,
     settings: &Settings,
     observer: &dyn Observer,
 ) -> Result<(RangeImage, Outcome), PipelineError> {
     settings.validate()?;
     observer.stage(Stage::Regrid);
     let mut x_mm: Option<(f64, f64)> = None;
-    let each = columns.iter().cloned().inspect(|column| {
+    let each = scan.columns.iter().cloned().inspect(|column| {
         let x = column.x_mm();
         let (low, high) = x_mm.unwrap_or((x, x));
         x_mm = Some((low.min(x), high.max(x)));
     });
     let image = regrid::regrid(each, &settings.regrid, observer)?;
     let view = View { x_mm, y_mm: None };
-    let mut outcome = process_in_view(&image, Some(&columns), &view, settings, observer)?;
+    let mut outcome = process_in_view(&image, Some(scan), &view, settings, observer)?;
     outcome.stages.insert(0, Stage::Regrid);
     Ok((image, outcome))
 }

@@ -34,6 +34,22 @@ pub enum Head {
     },
 }
 
+impl Head {
+    /// Where in a column's plane its rays come from, y and z in the part frame, millimetres; `None`
+    /// where the device does not tell.
+    #[must_use]
+    pub fn camera_mm(&self) -> Option<[f64; 2]> {
+        match *self {
+            Self::Polar {
+                camera_y_mm,
+                camera_z_mm,
+                ..
+            } => Some([camera_y_mm, camera_z_mm]),
+            Self::Cartesian { .. } => None,
+        }
+    }
+}
+
 impl Calibration {
     /// x of the part frame at a table position, millimetres.
     #[must_use]

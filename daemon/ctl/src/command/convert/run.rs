@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use deliverables::{Inputs, ManifestFile, Report, Stopwatch, write_atomically};
-use pipeline::{Extent, Observer, PipelineError, Settings, Stage};
+use pipeline::{Extent, InMemory, Observer, PipelineError, Settings, Stage};
 use range_image::Monitor;
 use serde::Serialize;
 
@@ -122,7 +122,11 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
     let name = args.name(input.name.as_deref());
 
     let watch = Stopwatch::new(shown);
-    let processed = pipeline::process_columns(&input.columns, &settings, &watch);
+    let scan = InMemory {
+        columns: &input.columns,
+        camera_mm: input.camera_mm,
+    };
+    let processed = pipeline::process_scan(&scan, &settings, &watch);
     let (image, outcome) = processed.map_err(|error| {
         shown.end("failed");
         refused(&args.input, &error, input.units_suspected.as_deref())
