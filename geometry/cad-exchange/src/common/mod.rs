@@ -1,14 +1,16 @@
 //! What the writers of all formats ask of a model, and do to it, alike.
 
 mod check;
+mod decimal;
 mod defect;
 mod rounding;
 
 pub use defect::FaceDefect;
 
 pub(crate) use check::check;
+pub(crate) use decimal::decimal;
 pub(crate) use defect::Defect;
-pub(crate) use rounding::without_kinks;
+pub(crate) use rounding::{shifted, without_kinks};
 
 /// Joints whose derivatives differ by less than this, in millimetres, count as smooth.
 pub(crate) const SMOOTH_MM: f64 = 1e-9;

@@ -87,7 +87,7 @@ fn plan_length<const D: usize>(vector: &[f64; D]) -> f64 {
 }
 
 /// The same cubic, its parameter counted from `s`.
-fn shifted(c: &[f64; 4], s: f64) -> [f64; 4] {
+pub(crate) fn shifted(c: &[f64; 4], s: f64) -> [f64; 4] {
     if s == 0.0 {
         return *c;
     }

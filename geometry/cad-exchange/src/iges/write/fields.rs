@@ -2,34 +2,11 @@
 
 use std::fmt::Write as _;
 
-/// Appends the shortest decimal that reads back as the same number, always with a point:
-/// `1.`, `-0.25`, `1.5D-7`. The exponent letter is `D`, the standard's mark of double
-/// precision.
+use crate::common::decimal;
+
+/// Appends a number; the exponent letter is `D`, the standard's mark of double precision.
 pub(super) fn real(out: &mut String, value: f64) {
-    if value == 0.0 {
-        // Both zeros: a sign would say nothing to a reader.
-        out.push_str("0.");
-        return;
-    }
-    let magnitude = value.abs();
-    let from = out.len();
-    // Writing to a string cannot fail.
-    if (1e-5..1e15).contains(&magnitude) {
-        let _ = write!(out, "{value}");
-        if !out[from..].contains('.') {
-            out.push('.');
-        }
-    } else {
-        let _ = write!(out, "{value:e}");
-        let tail = out.split_off(from);
-        let (mantissa, exponent) = tail.split_once('e').unwrap_or((&tail, "0"));
-        out.push_str(mantissa);
-        if !mantissa.contains('.') {
-            out.push('.');
-        }
-        out.push('D');
-        out.push_str(exponent);
-    }
+    decimal(out, value, 'D');
 }
 
 /// Appends a string in Hollerith form, `5Hpart1`; nothing for an empty one, which is how

@@ -2,6 +2,8 @@
 
 use nurbs::PiecewiseCubic;
 
+use crate::common::shifted;
+
 /// An end is led to its vertex over this many times the distance.
 const REACH: f64 = 100.0;
 
@@ -40,19 +42,6 @@ fn from(curve: &PiecewiseCubic<3>, t: f64, next: f64) -> [[f64; 4]; 3] {
     let piece = piece.saturating_sub(1).min(curve.pieces.len() - 1);
     let s = t - curve.breaks[piece];
     curve.pieces[piece].map(|c| shifted(&c, s))
-}
-
-/// The same cubic, its parameter counted from `s`.
-fn shifted(c: &[f64; 4], s: f64) -> [f64; 4] {
-    if s == 0.0 {
-        return *c;
-    }
-    [
-        c[0] + s * (c[1] + s * (c[2] + s * c[3])),
-        c[1] + s * (2.0 * c[2] + s * 3.0 * c[3]),
-        c[2] + s * 3.0 * c[3],
-        c[3],
-    ]
 }
 
 /// The curve with its ends led to other points: near each end a cubic is added that comes
