@@ -263,3 +263,29 @@ async fn results_go_when_their_days_are_over() {
     assert!(rig.journal(&old.id).exists());
     rig.daemon.shutdown().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_scan_whose_job_failed_outlives_its_days() {
+    let rig = Rig::new().await;
+    let (failed, job) = rig.scan_to_result("a").await;
+    let (done, _) = rig.scan_to_result("b").await;
+    let (cancelled, other) = rig.scan_to_result("c").await;
+    rig.daemon.shutdown().await;
+    let folder = rig.folder.path();
+    for scan in [&failed, &done, &cancelled] {
+        change_record::<&str>(folder, "scans", &scan.id, |record| {
+            record["ended_at"] = year_ago().into();
+        });
+    }
+    for (id, state) in [(job.id, "failed"), (other.id, "cancelled")] {
+        change_record::<u64>(folder, "jobs", id, |record| record["state"] = state.into());
+    }
+    let rig = Rig::start(rig.folder, |config| config.storage.scans_days = Some(30)).await;
+    assert!(
+        rig.journal(&failed.id).exists(),
+        "nothing else is left of it"
+    );
+    assert!(!rig.journal(&done.id).exists());
+    assert!(!rig.journal(&cancelled.id).exists());
+    rig.daemon.shutdown().await;
+}
