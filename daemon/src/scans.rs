@@ -317,27 +317,26 @@ impl Service {
 
     /// All scans, newest first.
     pub(crate) fn scans(&self) -> Result<Vec<Scan>, ServiceError> {
-        self.scans_that(|_| true)
+        let mut scans = self.of_scans(Some)?;
+        scans.reverse();
+        Ok(scans)
     }
 
-    /// Those whose records are to be looked at, newest first.
-    pub(crate) fn scans_that(
+    /// Something of each of some scans as they are at this moment, oldest first.
+    pub(crate) fn of_scans<T>(
         &self,
-        keep: impl Fn(&Scan) -> bool,
-    ) -> Result<Vec<Scan>, ServiceError> {
+        mut pick: impl FnMut(Scan) -> Option<T>,
+    ) -> Result<Vec<T>, ServiceError> {
         let newer: Vec<Scan> = lock(&self.unkept)
             .iter()
             .cloned()
             .chain(self.active_scans())
             .collect();
-        let mut scans = self.store.scans_that(keep)?;
-        scans.reverse();
-        for newer in newer {
-            if let Some(kept) = scans.iter_mut().find(|scan| scan.id == newer.id) {
-                *kept = newer;
-            }
-        }
-        Ok(scans)
+        Ok(self.store.of_scans(|kept| {
+            // Of two that are newer, the active one is the newest.
+            let newest = newer.iter().rfind(|scan| scan.id == kept.id);
+            pick(newest.cloned().unwrap_or(kept))
+        })?)
     }
 }
 

@@ -7,6 +7,7 @@
 mod promise;
 mod sweep;
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
@@ -173,40 +174,41 @@ impl Service {
         let limits = self.config().storage;
         // One time for all: ages in whole seconds must not differ by when they were looked at.
         let at = Timestamp::now();
-        let has_columns = |scan: &Scan| self.journal_path(&scan.id).exists();
-        let mut scans = self.scans_that(has_columns)?;
-        let jobs = self.store.jobs_that(|job| match job.state {
-            JobState::Done => self.spool.directory(&job.result).exists(),
-            JobState::Cancelled => false,
-            JobState::Queued | JobState::Running | JobState::Failed => true,
-        })?;
-        let mut scans_bytes = 0;
-        let mut kept = Vec::new();
-        for scan in &mut scans {
-            if let Ok(metadata) = fs::metadata(self.journal_path(&scan.id)) {
-                if scan.removed_at.is_some() {
-                    self.note_put_back(scan)?;
-                }
-                let bytes = on_disk(&metadata);
-                scans_bytes += bytes;
-                kept.push(Kept {
-                    id: scan.id.clone(),
-                    bytes,
-                    age_s: age_s(scan.put_back_at.as_deref().or(scan.ended_at.as_deref()), at),
-                    needed: is_needed(scan, &jobs),
-                });
+        // Scans whose columns may still be asked for by a job, and the results that are there.
+        let mut asked_for = BTreeSet::new();
+        let results = self.store.of_jobs(|job| {
+            let folder = self.spool.directory(&job.result);
+            let is_done = job.state == JobState::Done;
+            let result = is_done.then(|| kept_result(&folder, &job, at)).flatten();
+            if asks_for_columns(job.state) {
+                asked_for.insert(job.scan);
             }
+            result
+        })?;
+        let mut put_back = Vec::new();
+        let kept = self.of_scans(|scan| {
+            let metadata = fs::metadata(self.journal_path(&scan.id)).ok()?;
+            let mut since = scan.put_back_at.as_deref().or(scan.ended_at.as_deref());
+            if scan.removed_at.is_some() {
+                put_back.push(scan.id.clone());
+                since = None;
+            }
+            Some(Kept {
+                bytes: on_disk(&metadata),
+                age_s: age_s(since, at),
+                needed: may_be_processed(&scan) || asked_for.contains(&scan.id),
+                id: scan.id,
+            })
+        })?;
+        for scan in &put_back {
+            self.note_put_back(scan)?;
         }
+        let mut scans_bytes = kept.iter().map(|kept| kept.bytes).sum();
         for gone in surplus(kept, limits.scans()) {
-            if self.remove_scan(&scans, &gone) {
+            if self.remove_scan(&gone) {
                 scans_bytes -= gone.bytes;
             }
         }
-        let results: Vec<Kept> = jobs
-            .iter()
-            .filter(|job| job.state == JobState::Done)
-            .filter_map(|job| kept_result(&self.spool.directory(&job.result), job, at))
-            .collect();
         let mut results_bytes: u64 = results.iter().map(|kept| kept.bytes).sum();
         for gone in surplus(results, limits.results()) {
             match self.spool.remove(&gone.id) {
@@ -225,60 +227,62 @@ impl Service {
 
     /// The columns of a scan are there again that were removed; it is as young as if it had
     /// just been taken, or it would be removed again at once.
-    fn note_put_back(&self, scan: &mut Scan) -> Result<(), ServiceError> {
+    fn note_put_back(&self, id: &str) -> Result<(), ServiceError> {
+        let mut scan = self.scan(id)?;
         scan.removed_at = None;
         scan.put_back_at = Some(now());
-        self.store.put_scan(scan)?;
+        self.store.put_scan(&scan)?;
         tracing::info!(scan = %scan.id, "columns of a scan put back");
-        self.hub.tell(Event::Scan(scan.clone()));
+        self.hub.tell(Event::Scan(scan));
         Ok(())
     }
 
     /// The record stays, and says that the columns are gone; it is kept first, so that none
     /// says otherwise.
-    fn remove_scan(&self, scans: &[Scan], gone: &Kept) -> bool {
-        let Some(mut scan) = scans.iter().find(|scan| scan.id == gone.id).cloned() else {
-            return false;
-        };
-        scan.removed_at = Some(now());
-        let removed = self.store.put_scan(&scan).map_err(ServiceError::from);
-        let removed = removed.and_then(|()| {
-            remove_file_if_there(&*self.disk, &self.journal_path(&scan.id)).map_err(|source| {
-                // Or the next look would take them for put back.
-                scan.removed_at = None;
-                if let Err(error) = self.store.put_scan(&scan) {
-                    tracing::warn!(scan = %scan.id, %error, "cannot keep the record of a scan");
-                }
-                ServiceError::Io {
-                    what: scan.id.clone(),
-                    source,
-                }
-            })
-        });
-        match removed {
-            Ok(()) => {
+    fn remove_scan(&self, gone: &Kept) -> bool {
+        match self.try_to_remove_scan(&gone.id) {
+            Ok(scan) => {
                 tracing::info!(scan = %scan.id, bytes = gone.bytes, "columns of a scan removed");
                 self.hub.tell(Event::Scan(scan));
                 true
             }
             Err(error) => {
-                tracing::warn!(scan = %scan.id, %error, "cannot remove the columns of a scan");
+                tracing::warn!(scan = %gone.id, %error, "cannot remove the columns of a scan");
                 false
             }
         }
     }
+
+    fn try_to_remove_scan(&self, id: &str) -> Result<Scan, ServiceError> {
+        let mut scan = self.scan(id)?;
+        scan.removed_at = Some(now());
+        self.store.put_scan(&scan)?;
+        let removed = remove_file_if_there(&*self.disk, &self.journal_path(id));
+        if let Err(source) = removed {
+            // Or the next look would take them for put back.
+            scan.removed_at = None;
+            if let Err(error) = self.store.put_scan(&scan) {
+                tracing::warn!(scan = %id, %error, "cannot keep the record of a scan");
+            }
+            return Err(ServiceError::Io {
+                what: id.to_owned(),
+                source,
+            });
+        }
+        Ok(scan)
+    }
 }
 
-/// Its columns may still be asked for.
-fn is_needed(scan: &Scan, jobs: &[Job]) -> bool {
+/// Its columns are still to be processed.
+fn may_be_processed(scan: &Scan) -> bool {
     // Its record was refused, and its job is still to come.
     let is_unprocessed = scan.state == ScanState::Complete && scan.jobs.is_empty();
-    !scan.state.is_over()
-        || is_unprocessed
-        || jobs
-            .iter()
-            .filter(|job| job.scan == scan.id)
-            .any(|job| !job.state.is_over() || job.state == JobState::Failed)
+    !scan.state.is_over() || is_unprocessed
+}
+
+/// A job that failed may be tried again.
+fn asks_for_columns(state: JobState) -> bool {
+    !state.is_over() || state == JobState::Failed
 }
 
 fn kept_result(folder: &Path, job: &Job, at: Timestamp) -> Option<Kept> {
@@ -324,26 +328,19 @@ mod tests {
             });
             serde_json::from_value(scan).unwrap()
         };
-        let job = |state: &str| -> Job {
-            let job = json!({
-                "id": 1, "scan": "s", "result": "s", "name": "s", "state": state, "attempts": 1,
-                "queued_at": "2026-11-21T11:08:30.123Z", "timings": [],
-            });
-            serde_json::from_value(job).unwrap()
-        };
-        assert!(is_needed(&scan("scanning", &[]), &[]));
+        assert!(may_be_processed(&scan("scanning", &[])));
         // Its job is not queued yet.
-        assert!(is_needed(&scan("complete", &[]), &[]));
-        assert!(!is_needed(&scan("aborted", &[]), &[]));
-        for (state, needed) in [
-            ("queued", true),
-            ("running", true),
-            ("failed", true),
-            ("done", false),
-            ("cancelled", false),
+        assert!(may_be_processed(&scan("complete", &[])));
+        assert!(!may_be_processed(&scan("complete", &[1])));
+        assert!(!may_be_processed(&scan("aborted", &[])));
+        for (state, asks) in [
+            (JobState::Queued, true),
+            (JobState::Running, true),
+            (JobState::Failed, true),
+            (JobState::Done, false),
+            (JobState::Cancelled, false),
         ] {
-            let found = is_needed(&scan("complete", &[1]), &[job(state)]);
-            assert_eq!(found, needed, "{state}");
+            assert_eq!(asks_for_columns(state), asks, "{state:?}");
         }
     }
 }

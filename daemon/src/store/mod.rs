@@ -154,15 +154,18 @@ impl Store {
 
     /// All scans, oldest first.
     pub(crate) fn scans(&self) -> Result<Vec<Scan>, StoreError> {
-        self.scans_that(|_| true)
+        self.of_scans(Some)
     }
 
-    /// Some of the scans, oldest first. Only those are in memory at the same time: records are
-    /// kept for ever.
-    pub(crate) fn scans_that(&self, keep: impl Fn(&Scan) -> bool) -> Result<Vec<Scan>, StoreError> {
+    /// Something of each of some scans, oldest first. Whole records are not in memory at the
+    /// same time: they are kept for ever.
+    pub(crate) fn of_scans<T>(
+        &self,
+        pick: impl FnMut(Scan) -> Option<T>,
+    ) -> Result<Vec<T>, StoreError> {
         self.with(|database| {
             let table = database.begin_read()?.open_table(SCANS)?;
-            self.decode_some(table.iter()?.map(|row| Ok(row?.1)), &keep)
+            self.decode_each(table.iter()?.map(|row| Ok(row?.1)), pick)
         })?
     }
 
@@ -183,14 +186,17 @@ impl Store {
 
     /// All jobs, oldest first.
     pub(crate) fn jobs(&self) -> Result<Vec<Job>, StoreError> {
-        self.jobs_that(|_| true)
+        self.of_jobs(Some)
     }
 
-    /// Some of the jobs, oldest first, as [`Store::scans_that`].
-    pub(crate) fn jobs_that(&self, keep: impl Fn(&Job) -> bool) -> Result<Vec<Job>, StoreError> {
+    /// Something of each of some jobs, oldest first, as [`Store::of_scans`].
+    pub(crate) fn of_jobs<T>(
+        &self,
+        pick: impl FnMut(Job) -> Option<T>,
+    ) -> Result<Vec<T>, StoreError> {
         self.with(|database| {
             let table = database.begin_read()?.open_table(JOBS)?;
-            self.decode_some(table.iter()?.map(|row| Ok(row?.1)), &keep)
+            self.decode_each(table.iter()?.map(|row| Ok(row?.1)), pick)
         })?
     }
 
@@ -209,21 +215,20 @@ impl Store {
         self.put_job_telling(job, &[]).map(drop)
     }
 
-    /// What of the rows is kept; inside, that a record cannot be read.
-    fn decode_some<'a, T: DeserializeOwned>(
+    /// What is picked of the rows; inside, that a record cannot be read.
+    fn decode_each<'a, R: DeserializeOwned, T>(
         &self,
         rows: impl Iterator<Item = Result<redb::AccessGuard<'a, &'static [u8]>, redb::Error>>,
-        keep: &impl Fn(&T) -> bool,
+        mut pick: impl FnMut(R) -> Option<T>,
     ) -> Result<Result<Vec<T>, StoreError>, redb::Error> {
-        let mut kept = Vec::new();
+        let mut picked = Vec::new();
         for row in rows {
             match decode(&self.path, row?.value()) {
-                Ok(record) if keep(&record) => kept.push(record),
-                Ok(_) => {}
+                Ok(record) => picked.extend(pick(record)),
                 Err(error) => return Ok(Err(error)),
             }
         }
-        Ok(Ok(kept))
+        Ok(Ok(picked))
     }
 }
 
