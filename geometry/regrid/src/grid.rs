@@ -5,7 +5,7 @@ use core::f64::consts::PI;
 use range_image::{GridColumn, Lattice, NodeQuality};
 
 use crate::consensus::{
-    Around, Conditions, Consensus, Effort, Noise, Silhouette, Surface, WIDTH, noise,
+    Around, Conditions, Consensus, Effort, Noise, Side, Silhouette, Surface, WIDTH, noise,
 };
 use crate::draws::Draws;
 use crate::exhaustive;
@@ -207,7 +207,7 @@ impl GridWorker {
                 spacing,
                 y_mm,
             };
-            return surfaces.iter().find_map(|surface| {
+            return surfaces.iter().enumerate().find_map(|(number, surface)| {
                 let fit = Fit {
                     plane: surface.plane,
                     tolerance: surface.width_mm,
@@ -217,7 +217,7 @@ impl GridWorker {
                 let closes = |n: &Neighbour| surfaces.iter().any(|other| other.holds(n));
                 let place =
                     self.surroundings
-                        .place(&self.samples, spacing, &support, agrees, closes);
+                        .place(&self.samples, spacing, &support, &agrees, closes);
                 let supported = match place {
                     Place::Among if outside <= support.margin => true,
                     Place::Among | Place::Beside { .. } => {
@@ -225,16 +225,32 @@ impl GridWorker {
                             Place::Beside { distance } => distance.max(outside),
                             _ => outside,
                         };
-                        distance <= BESIDE
-                            && self
-                                .silhouette
-                                .holds(&around, |wide, windows| {
-                                    let number = windows * neighbours;
-                                    wide.extend_from_slice(
-                                        self.search.wider(window, x_mm, y_mm, number),
-                                    );
-                                })
-                                .unwrap_or(distance <= support.margin)
+                        let side = self.silhouette.side(&around, |wide, windows| {
+                            let number = windows * neighbours;
+                            wide.extend_from_slice(self.search.wider(window, x_mm, y_mm, number));
+                        });
+                        match side {
+                            Side::Inside => distance <= BESIDE,
+                            Side::Outside => false,
+                            Side::Unknown => distance <= support.margin,
+                            Side::Clear => {
+                                let strewn = SupportSettings {
+                                    radius: STREWN * settings.support.radius,
+                                    step_margin: STREWN * settings.support.radius,
+                                    ..support
+                                };
+                                distance <= support.margin
+                                    || number == 0
+                                        && outside == 0.0
+                                        && self.surroundings.place(
+                                            &self.samples,
+                                            spacing,
+                                            &strewn,
+                                            &agrees,
+                                            closes,
+                                        ) == Place::Among
+                            }
+                        }
                     }
                     Place::Alone => false,
                 };
@@ -280,6 +296,10 @@ const SIDE_KNOWN: f64 = 1.18;
 /// How far outside of the hull of its surface's samples a node may lie, in local spacings,
 /// if the line of the silhouette has it inside.
 const BESIDE: f64 = 0.7;
+/// How many times the radius of support where outliers lie among a surface's samples, and
+/// there is a sample wherever one should be: runs of outliers lie in the surface's stead, they
+/// do not end it.
+const STREWN: f64 = 2.0;
 /// Columns on either side that tell of the noise.
 const NOISE_COLUMNS: usize = 8;
 /// Least noise believed, in spacings: scans without any are computed ones.

@@ -124,6 +124,9 @@ impl fmt::Display for Roi {
 /// from it. The hull makes a lone dropout or outlier harmless, since its neighbours
 /// surround it; the margin undoes that the outermost samples lie inside the true outline,
 /// by half a spacing or less.
+///
+/// By consensus the inliers within twice the radius count where they surround the node and no
+/// sample is missing there: outliers lie in its surface's stead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SupportSettings {
     /// Radius in which inliers count. Larger closes larger gaps, and fills concave corners

@@ -158,6 +158,34 @@ fn one_dropout_is_filled_and_one_outlier_is_no_hole() {
     }
 }
 
+/// Three columns side by side in which eight samples in a row are off, each by its own amount,
+/// and the same samples missing.
+#[test]
+fn runs_of_outliers_leave_no_hole_where_missing_samples_do() {
+    for (side_by_side, samples, missing) in [(3, 8, false), (4, 5, false), (9, 9, true)] {
+        let mut noise = Noise::new(21);
+        let columns = scan(24.0, (0.4, 0.4), (0.1, 0.3), |x, y| {
+            let (u, v) = ((x - 12.0) / 0.4, (y - 12.0) / 0.4);
+            let within = |off: f64, most: i32| off.abs() < 0.5 * f64::from(most);
+            let z = 0.1 * x + 0.05 * noise.normal();
+            if !(within(u, side_by_side) && within(v, samples)) {
+                return Some(z);
+            }
+            (!missing).then(|| z + 7.0 * (3.0 + u.round()))
+        });
+        let image = image(&columns, &RegridSettings::with_pitch(0.4));
+        let empty = |node: usize| {
+            let (column, row) = (node / image.rows(), node % image.rows());
+            image.z_mm(column, row).is_none()
+        };
+        let holes = (0..image.columns() * image.rows()).filter(|&n| empty(n));
+        assert_eq!(holes.count() > 0, missing, "{side_by_side} {samples}");
+        for (x, _, z) in nodes(&image) {
+            assert!((z - 0.1 * x).abs() < 0.1, "{x} {z}");
+        }
+    }
+}
+
 #[test]
 fn lone_outliers_in_free_space_give_nothing() {
     let mut noise = Noise::new(12);

@@ -50,6 +50,8 @@ pub(super) struct Places {
     /// Where a few are missing among others.
     lost: Vec<Place>,
     gaps: Vec<f64>,
+    /// Whether it is known how far apart samples are.
+    known: bool,
 }
 
 impl Places {
@@ -79,7 +81,9 @@ impl Places {
             .filter(|pair| pair[0].strip == pair[1].strip)
             .map(|pair| pair[1].dy - pair[0].dy);
         self.gaps.extend(gaps.filter(|gap| *gap > 0.0));
-        let gap = lower_median(&mut self.gaps)?;
+        let gap = lower_median(&mut self.gaps);
+        self.known = gap.is_some();
+        let gap = gap?;
         // Of places farther away it is not known whether they are empty.
         let within = samples.last()?.distance2.sqrt() - gap;
         let empty = |place: &Place| {
@@ -94,6 +98,11 @@ impl Places {
         self.in_line(gap, empty);
         self.level(gap, window, empty);
         (!self.missing.is_empty()).then_some(())
+    }
+
+    /// Whether the samples last looked at have none missing at an end.
+    pub(super) fn are_whole(&self) -> bool {
+        self.known && self.missing.is_empty()
     }
 
     /// Labels samples and missing ones, nearest first. A missing sample tells that the

@@ -23,5 +23,5 @@ mod wedge;
 pub(crate) use missing::Around;
 pub(crate) use node::{Conditions, Consensus};
 pub(crate) use noise::{Noise, noise};
-pub(crate) use silhouette::Silhouette;
+pub(crate) use silhouette::{Side, Silhouette};
 pub(crate) use surfaces::{Effort, Surface, WIDTH};

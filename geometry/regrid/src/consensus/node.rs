@@ -12,7 +12,7 @@ use crate::window::Spacing;
 /// known the longer it is.
 const WIDE: usize = 8;
 /// The same for nodes beside that line; fewer where it bends.
-const FAR: [usize; 2] = [25, 16];
+const FAR: [usize; 3] = [49, 25, 16];
 /// Windows in which a second surface is sought where the first has few samples in one.
 const SECOND: usize = 2;
 /// Share of a window that a surface's samples must have for z to rest on them alone; with
@@ -111,7 +111,7 @@ impl Consensus {
         }
         let mut other = 1;
         while other < self.found.len() {
-            match self.place(other, conditions.spacing, &mut wider) {
+            match self.place(other, window.len(), conditions.spacing, &mut wider) {
                 Place::First => other += 1,
                 Place::Other => {
                     self.found.swap(0, other);
@@ -188,6 +188,7 @@ impl Consensus {
     fn place(
         &mut self,
         other: usize,
+        samples: usize,
         spacing: Spacing,
         wider: &mut impl FnMut(&mut Vec<Neighbour>, usize),
     ) -> Place {
@@ -202,7 +203,7 @@ impl Consensus {
                 wider(&mut self.far, FAR[0]);
             }
             for windows in FAR {
-                let number = self.far.len() * windows / FAR[0];
+                let number = (windows * samples).min(self.far.len());
                 label(
                     &self.far[..number],
                     &first,

@@ -21,8 +21,19 @@ const BENT: [usize; 4] = [4, 8, 16, 25];
 /// The same beside a corner.
 const CORNER: usize = 16;
 /// Farther inside of the line, in spacings, a node beside the samples owes that to something
-/// else than the line, as where the scan ends.
+/// else than the line, as where the scan ends or where outliers lie in its surface's stead.
 const ELSEWHERE: f64 = 1.0;
+
+/// Where a node lies to the outline that ends its surfaces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Side {
+    Inside,
+    Outside,
+    /// Well inside, or no sample is missing anywhere around.
+    Clear,
+    /// Samples are missing, but not beyond any line.
+    Unknown,
+}
 
 /// Finds silhouettes; keeps its buffers from one node to the next.
 #[derive(Debug, Default)]
@@ -35,24 +46,36 @@ pub(crate) struct Silhouette {
 }
 
 impl Silhouette {
-    /// Whether the node lies inside of the outline that ends its surfaces; `None` where no
-    /// line does. `wider` gives the samples of so many windows, nearest first.
-    pub(crate) fn holds(
+    /// Where the node lies to the outline that ends its surfaces. `wider` gives the samples of
+    /// so many windows, nearest first.
+    pub(crate) fn side(
         &mut self,
         around: &Around<'_>,
         mut wider: impl FnMut(&mut Vec<Neighbour>, usize),
-    ) -> Option<bool> {
+    ) -> Side {
         self.samples.clear();
         wider(&mut self.samples, WINDOWS);
-        self.label(usize::MAX, around, None)?;
-        let line = separate(&mut self.labelled, &mut self.posterior)?;
+        if self.label(usize::MAX, around, None).is_none() {
+            return if self.places.are_whole() {
+                Side::Clear
+            } else {
+                Side::Unknown
+            };
+        }
+        let Some(line) = separate(&mut self.labelled, &mut self.posterior) else {
+            return Side::Unknown;
+        };
         let mut distance = line.distance();
         if line.is_near() {
             self.samples.clear();
             wider(&mut self.samples, FAR[0]);
             distance = self.lengthened(&line, around).unwrap_or(distance);
         }
-        (distance <= ELSEWHERE).then_some(distance > 0.0)
+        match distance {
+            d if d > ELSEWHERE => Side::Clear,
+            d if d > 0.0 => Side::Inside,
+            _ => Side::Outside,
+        }
     }
 
     /// The node's distance from the edge that this line is part of: straight as far as it goes

@@ -29,8 +29,15 @@ pub(crate) struct Figures {
 }
 
 impl Figures {
-    /// Counts the nodes of the image that lie among the samples.
-    pub(crate) fn add(&mut self, image: &RangeImage, truth: &Truth, (width, height): (f64, f64)) {
+    /// Counts the nodes of the image that lie among the samples, and names those that should
+    /// not be: on neither plane near the step, on the wrong one, without a value.
+    pub(crate) fn add(
+        &mut self,
+        image: &RangeImage,
+        truth: &Truth,
+        (width, height): (f64, f64),
+    ) -> Vec<String> {
+        let mut told = Vec::new();
         let lattice = image.lattice();
         let (i_first, j_first) = image.origin();
         let rim_mm = 2.0 * PITCH_MM;
@@ -43,12 +50,27 @@ impl Figures {
                 let row = usize::try_from(j - j_first).unwrap_or(usize::MAX);
                 let (x_mm, y_mm) = (lattice.line_mm(i), lattice.line_mm(j));
                 let z_mm = image.z_mm(column, row);
+                let before = (self.in_between, self.wrong_plane, self.holes);
                 self.holes += u64::from(z_mm.is_none() && inside(x_mm, y_mm));
                 if let Some(z_mm) = z_mm {
                     self.node(z_mm, truth, (x_mm, y_mm));
                 }
+                if before != (self.in_between, self.wrong_plane, self.holes) {
+                    let (from_mm, true_mm) = (
+                        truth.distance_to_step_mm(x_mm, y_mm),
+                        truth.z_mm(x_mm, y_mm),
+                    );
+                    let off = z_mm.map_or_else(
+                        || "no value".to_owned(),
+                        |z_mm| format!("{:.3} mm off", z_mm - true_mm),
+                    );
+                    told.push(format!(
+                        "node {i} {j}, {from_mm:.2} mm from the step, {off}"
+                    ));
+                }
             }
         }
+        told
     }
 
     /// Counts one node.

@@ -35,6 +35,15 @@ struct Options {
     /// is written
     #[arg(long)]
     tune: bool,
+    /// The ten scans from this seed on, by consensus alone; no table is written
+    #[arg(long, value_name = "SEED", conflicts_with_all = ["short", "tune"])]
+    first: Option<u64>,
+    /// Outliers of one kind only; no table is written
+    #[arg(long, value_name = "KIND")]
+    only: Option<String>,
+    /// Name every node on neither plane or on the wrong one, and every hole
+    #[arg(long)]
+    list: bool,
     /// Leave out what other programs make of the same samples
     #[arg(long)]
     no_peers: bool,
@@ -80,13 +89,15 @@ fn main() -> ExitCode {
 
 fn run(options: &Options) -> Result<()> {
     let cases = if options.short { SHORT_CASES } else { CASES };
-    let seeds = match (options.short, options.tune) {
-        (true, false) => 101..=101,
-        (true, true) => 1..=1,
-        (false, true) => 1..=10,
-        (false, false) => 101..=110,
+    let seeds = match (options.first, options.short, options.tune) {
+        (Some(first), _, _) => first..=first.saturating_add(9),
+        (None, true, false) => 101..=101,
+        (None, true, true) => 1..=1,
+        (None, false, true) => 1..=10,
+        (None, false, false) => 101..=110,
     };
-    let estimators: &[(&str, Estimator)] = if options.short || options.tune {
+    let ours_alone = options.short || options.tune || options.first.is_some();
+    let estimators: &[(&str, Estimator)] = if ours_alone {
         &[("consensus", Estimator::Consensus)]
     } else {
         &[
@@ -95,16 +106,27 @@ fn run(options: &Options) -> Result<()> {
             ("least squares", Estimator::LeastSquares),
         ]
     };
-    let peers = if options.short || options.no_peers {
+    let peers = if options.short || options.first.is_some() || options.no_peers {
         None
     } else {
         Some(peers::Python::ready()?)
     };
     let mut lines = Vec::new();
+    let only = options.only.as_deref();
     for (outliers, shares) in cases {
+        if only.is_some_and(|only| only != outliers.name()) {
+            continue;
+        }
         for &share in shares {
             for &(name, estimator) in estimators {
-                let line = ours(name, estimator, seeds.clone(), outliers, share)?;
+                let line = ours(
+                    name,
+                    estimator,
+                    seeds.clone(),
+                    outliers,
+                    share,
+                    options.list,
+                )?;
                 println!("{}", report::row(&line));
                 lines.push(line);
             }
@@ -125,7 +147,7 @@ fn run(options: &Options) -> Result<()> {
         }
     }
     let missed = bars::missed(&lines);
-    if !options.short && !options.tune {
+    if !ours_alone && only.is_none() {
         let text = report::page(&lines, &seeds, &missed, peers.as_ref());
         if let Some(folder) = options.out.parent() {
             std::fs::create_dir_all(folder)?;
@@ -150,6 +172,7 @@ fn ours(
     seeds: impl Iterator<Item = u64>,
     outliers: Outliers,
     share: f64,
+    list: bool,
 ) -> Result<Line> {
     let mut figures = Figures::default();
     let (mut nodes, mut seconds) = (0, 0.0);
@@ -168,7 +191,16 @@ fn ours(
         let image = regrid(columns, &settings, &Unmonitored)?;
         seconds += begun.elapsed().as_secs_f64();
         nodes += image.valid_nodes();
-        figures.add(&image, &scene.truth(), extent_mm());
+        let told = figures.add(&image, &scene.truth(), extent_mm());
+        if list {
+            for node in told {
+                println!(
+                    "{} {:.0} % seed {seed}: {node}",
+                    outliers.name(),
+                    100.0 * share
+                );
+            }
+        }
     }
     Ok(Line {
         name: name.to_owned(),
