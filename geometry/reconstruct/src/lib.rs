@@ -19,6 +19,7 @@ pub mod settings;
 mod accept;
 mod assemble;
 mod border;
+mod evidence;
 mod known;
 mod lift;
 mod noise;
@@ -29,6 +30,7 @@ mod run;
 mod testing;
 mod trim;
 
+pub use evidence::{Evidence, OutlineSample, Seen};
 pub use metrics::Metrics;
 pub use model::{Coedge, Edge, EdgeId, EdgeKind, Face, Loop, Model, Surface, Vertex, VertexId};
 pub use run::{Fitted, Reconstruction, RegionFit, reconstruct};

@@ -7,10 +7,12 @@ use range_image::{Cancelled, Monitor};
 
 use super::cracks::{Chain, CrackMap, Use};
 use super::crossing::{Strand, conflicts};
-use super::deflect::{Drawn, part};
+use super::deflect::Drawn;
 use super::junctions::{Course, place_junctions};
 use super::path;
+use super::pins::part;
 use super::segments::{Price, Samples, Segment, sharpest};
+use super::settle::{Outlines, settle};
 use super::smooth::smooth;
 use crate::polygon::{distance_to_segment, minus, norm, signed_area};
 
@@ -96,6 +98,7 @@ struct Border<'a> {
 pub(crate) fn build(
     cracks: &CrackMap,
     placed: &[Option<Vec<[f64; 2]>>],
+    outlines: &Outlines,
     settings: &BorderSettings,
     monitor: &dyn Monitor,
 ) -> Result<PlanarMap, Cancelled> {
@@ -141,7 +144,8 @@ pub(crate) fn build(
                     paths: paths.as_mut().filter(|_| border.level < TRACED),
                 })
                 .collect();
-            part(&mut drawn, &mut junctions);
+            let settled = settle(&mut drawn, &mut junctions, outlines);
+            part(&mut drawn, &mut junctions, &settled);
         }
         let bad = faults(cracks, &borders, &drawn, &junctions);
         let mut raised = false;
@@ -377,19 +381,25 @@ fn strays(samples: &Samples, outline: &[[f64; 2]], tips: &[Tip]) -> bool {
     }
     let total = total.max(1e-9);
     let reach = 6.0 + 0.1 * drawn;
+    let is_near = |point: [f64; 2], near: f64| {
+        let from = length
+            .partition_point(|&l| l < near - reach)
+            .saturating_sub(1);
+        let to = length.partition_point(|&l| l <= near + reach);
+        outline[from..(to + 1).min(outline.len())]
+            .windows(2)
+            .any(|s| distance_to_segment(point, s[0], s[1]) <= FARTHEST)
+    };
     samples
         .smooth
         .iter()
         .zip(&samples.length)
         .any(|(point, at)| {
             let near = at / total * drawn;
-            let from = length
-                .partition_point(|&l| l < near - reach)
-                .saturating_sub(1);
-            let to = length.partition_point(|&l| l <= near + reach);
-            let close = outline[from..(to + 1).min(outline.len())]
-                .windows(2)
-                .any(|s| distance_to_segment(*point, s[0], s[1]) <= FARTHEST);
+            // Without tips the border is closed, and its end is as near to its start.
+            let close = is_near(*point, near)
+                || (tips.is_empty()
+                    && (is_near(*point, near + drawn) || is_near(*point, near - drawn)));
             let at_tip = |t: &Tip| norm(minus(*point, t.place)) <= t.moved + FARTHEST;
             !close && !tips.iter().any(at_tip)
         })
