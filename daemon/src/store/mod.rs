@@ -34,8 +34,9 @@ use record::decode;
 const SCANS: TableDefinition<'_, &str, &[u8]> = TableDefinition::new("scans");
 const JOBS: TableDefinition<'_, JobId, &[u8]> = TableDefinition::new("jobs");
 
-/// Memory for pages of the file; a record has about a kilobyte.
-const CACHE_BYTES: usize = 4 << 20;
+/// Memory for pages of the file; a record has about a kilobyte. More would mostly be scattered
+/// over the heaps of the threads that happen to read, and the system keeps the file's pages, too.
+const CACHE_BYTES: usize = 1 << 20;
 
 /// How often a locked file is tried again.
 const RETRY: Duration = Duration::from_millis(20);
