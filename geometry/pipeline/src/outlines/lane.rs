@@ -22,6 +22,9 @@ const LIT: f64 = 0.5;
 const BEFORE: usize = 3;
 const DIM: usize = 2;
 
+/// A column that falls apart into more runs is no part's: each place would be looked up in all.
+const MOST_RUNS: usize = 1000;
+
 /// A sample of a region.
 #[derive(Debug, Clone, Copy)]
 struct Own {
@@ -49,6 +52,8 @@ pub(super) struct Lane {
     /// Heights of the runs' samples near outlines, the numbers of their runs, and whether they
     /// are there or lost.
     edge: Vec<(f64, usize, bool)>,
+    /// It falls apart into so many runs that it tells nothing.
+    is_unclear: bool,
 }
 
 impl Lane {
@@ -78,6 +83,7 @@ impl Lane {
             x_mm,
             runs: Vec::new(),
             edge: Vec::new(),
+            is_unclear: false,
         };
         for (region, samples) in &regions {
             let usual_mm = usual_mm(&mut gaps(samples), owners.pitch_mm());
@@ -89,6 +95,9 @@ impl Lane {
                 lane.add(*region, lit(run), usual_mm);
                 rest = beyond;
             }
+        }
+        if lane.runs.len() > MOST_RUNS {
+            (lane.runs, lane.edge, lane.is_unclear) = (Vec::new(), Vec::new(), true);
         }
         lane
     }
@@ -176,6 +185,9 @@ impl Lane {
     /// Whether a region has samples there, whichever, but for a run: where one goes over into
     /// another, none is missing.
     fn is_covered(&self, y_mm: f64, within_mm: f64, but_for: Option<&Run>) -> bool {
+        if self.is_unclear {
+            return true;
+        }
         let holds = |run: &Run| y_mm >= run.first_mm - within_mm && y_mm <= run.last_mm + within_mm;
         let others = |run: &&Run| !but_for.is_some_and(|one| core::ptr::eq(one, *run));
         self.runs.iter().filter(others).any(holds)

@@ -45,6 +45,7 @@ pub(crate) fn samples(
     lanes.sort_by(|a, b| a.x_mm.total_cmp(&b.x_mm));
     let mut all = Vec::new();
     for (k, lane) in lanes.iter().enumerate() {
+        monitor.check()?;
         lane.tell(&mut all);
         let before = (1..=BESIDE).map_while(|step| k.checked_sub(step));
         let after = k + 1..(k + 1 + BESIDE).min(lanes.len());

@@ -134,14 +134,20 @@ fn measure(
             let first = open.partition_point(|node| image.x_mm(node.column) < x_mm - near_mm);
             let last = open.partition_point(|node| image.x_mm(node.column) <= x_mm + near_mm);
             let open = &mut open[first..last];
+            let mut by_row: Vec<usize> = (0..open.len()).collect();
+            by_row.sort_by_key(|k| open[*k].row);
             for sample in column.samples() {
-                let is_near = |node: &&mut Open| {
+                let row_mm = |k: &usize| image.y_mm(open[*k].row);
+                let from = by_row.partition_point(|k| row_mm(k) < sample.y_mm - near_mm);
+                let to = by_row.partition_point(|k| row_mm(k) <= sample.y_mm + near_mm);
+                let mut owner = None;
+                for &k in &by_row[from..to.max(from)] {
+                    let node = &mut open[k];
                     let dx_mm = image.x_mm(node.column) - x_mm;
                     let dy_mm = image.y_mm(node.row) - sample.y_mm;
-                    dx_mm * dx_mm + dy_mm * dy_mm <= near_mm * near_mm
-                };
-                let mut owner = None;
-                for node in open.iter_mut().filter(is_near) {
+                    if dx_mm * dx_mm + dy_mm * dy_mm > near_mm * near_mm {
+                        continue;
+                    }
                     let owner =
                         owner.get_or_insert_with(|| owners.of(x_mm, sample.y_mm, sample.z_mm));
                     let face = &reconstruction.model.faces[node.face];

@@ -1,6 +1,7 @@
 //! The paths of outlines, with the samples beside each.
 
 use nurbs::PiecewiseCubic;
+use rayon::prelude::*;
 
 use super::course::Course;
 use super::deflect::Drawn;
@@ -26,6 +27,8 @@ pub(super) struct Beside {
     /// Its border runs back into itself.
     may_close: bool,
     is_closed: bool,
+    /// It comes back to its start at an angle.
+    has_cusp: bool,
     region: u16,
     /// 1 where the region lies to the left.
     pub(super) side: f64,
@@ -38,6 +41,9 @@ pub(super) struct Beside {
 pub(super) fn with_samples(borders: &[Drawn<'_>], outlines: &Outlines) -> Vec<Beside> {
     let mut all = Vec::new();
     for (border, drawn) in borders.iter().enumerate() {
+        if drawn.as_drawn {
+            continue;
+        }
         let (piece, side) = match (drawn.chain.left, drawn.chain.right) {
             (piece, 0) if piece != 0 => (piece, 1.0),
             (0, piece) if piece != 0 => (piece, -1.0),
@@ -60,29 +66,32 @@ pub(super) fn with_samples(borders: &[Drawn<'_>], outlines: &Outlines) -> Vec<Be
 /// Finds for each path where it is the likeliest; those that go on into each other become one
 /// where that is likelier, for its fewer numbers: on a staircase corners are seen where none are.
 pub(super) fn settled(all: Vec<Beside>) -> Vec<(Beside, Option<Found>)> {
-    let mut done: Vec<(Beside, Option<Found>)> = Vec::new();
-    let mut rest = all.into_iter().peekable();
-    while let Some(first) = rest.next() {
-        let mut run = vec![first];
-        while let Some(next) = rest.next_if(|next| run[run.len() - 1].goes_on_into(next)) {
-            run.push(next);
+    let mut runs: Vec<Vec<Beside>> = Vec::new();
+    for beside in all {
+        match runs.last_mut() {
+            Some(run) if run[run.len() - 1].goes_on_into(&beside) => run.push(beside),
+            _ => runs.push(vec![beside]),
         }
-        let apart: Vec<Option<Found>> = run.iter().map(|b| b.search().best()).collect();
-        if run.len() > 1 {
-            let costs = run.iter().zip(&apart).map(|(beside, found)| match found {
-                Some(found) => found.cost,
-                None => beside.search().cost_as_drawn(),
-            });
-            let whole = Beside::joined(&run);
-            let found = whole.search().best();
-            if found.as_ref().is_some_and(|found| found.cost < costs.sum()) {
-                done.push((whole, found));
-                continue;
-            }
-        }
-        done.extend(run.into_iter().zip(apart));
     }
-    done
+    let settled: Vec<Vec<_>> = runs.into_par_iter().map(settled_run).collect();
+    settled.into_iter().flatten().collect()
+}
+
+/// The same for paths that go on into each other.
+fn settled_run(run: Vec<Beside>) -> Vec<(Beside, Option<Found>)> {
+    let apart: Vec<Option<Found>> = run.iter().map(Beside::best).collect();
+    if run.len() > 1 {
+        let costs = run.iter().zip(&apart).map(|(beside, found)| match found {
+            Some(found) => found.cost,
+            None => beside.search().cost_as_drawn(),
+        });
+        let whole = Beside::joined(&run);
+        let found = whole.best();
+        if found.as_ref().is_some_and(|found| found.cost < costs.sum()) {
+            return vec![(whole, found)];
+        }
+    }
+    run.into_iter().zip(apart).collect()
 }
 
 impl Beside {
@@ -101,10 +110,14 @@ impl Beside {
                 high[d] = high[d].max(place[d] + NEAR);
             }
         }
+        let ends_meet = may_close && norm(minus(curve.end(), curve.start())) < CLOSED;
+        let (first, last) = curve.domain();
+        let goes_on = goes_on(curve.derivative(last, 1), curve.derivative(first, 1));
         Self {
             border,
             may_close,
-            is_closed: may_close && norm(minus(curve.end(), curve.start())) < CLOSED,
+            is_closed: ends_meet && goes_on,
+            has_cusp: ends_meet && !goes_on,
             curve,
             course,
             region,
@@ -113,6 +126,15 @@ impl Beside {
             high,
             samples: Vec::new(),
         }
+    }
+
+    /// The likeliest, if it can be told. A path that comes back to its start at an angle stays as
+    /// it was drawn: its end would have to move with its start.
+    fn best(&self) -> Option<Found> {
+        if self.has_cusp {
+            return None;
+        }
+        self.search().best()
     }
 
     fn search(&self) -> Search<'_> {
@@ -131,7 +153,7 @@ impl Beside {
         let out = next.curve.derivative(next.curve.domain().0, 1);
         self.border == next.border
             && norm(minus(next.curve.start(), self.curve.end())) < CLOSED
-            && dot(into, out) > BLUNT * norm(into) * norm(out)
+            && goes_on(into, out)
     }
 
     /// Paths that go on into each other as one.
@@ -154,6 +176,11 @@ impl Beside {
         whole.samples = run.iter().flat_map(|b| &b.samples).copied().collect();
         whole
     }
+}
+
+/// Whether a path may go on from one direction into another without a corner.
+fn goes_on(into: [f64; 2], out: [f64; 2]) -> bool {
+    dot(into, out) > BLUNT * norm(into) * norm(out)
 }
 
 /// Notes a sample with the path that it is nearest to.

@@ -11,6 +11,8 @@ const CHORD: f64 = 0.5;
 /// A path as chords, with the parameters of their ends.
 pub(crate) struct Course {
     chords: Vec<(f64, [f64; 2])>,
+    /// Lengths of the bundles.
+    reaches: Vec<f64>,
 }
 
 /// Chords that are looked at together, or not at all where all of them are too far away.
@@ -32,7 +34,17 @@ impl Course {
                 chords.push((path.breaks[k] + at, path.piece_value(k, at, 0)));
             }
         }
-        Self { chords }
+        let reaches = (0..chords.len() - 1).step_by(BUNDLE).map(|from| {
+            let bundle = &chords[from..=(from + BUNDLE).min(chords.len() - 1)];
+            let lengths = bundle
+                .windows(2)
+                .map(|pair| norm(minus(pair[1].1, pair[0].1)));
+            lengths.sum()
+        });
+        Self {
+            reaches: reaches.collect(),
+            chords,
+        }
     }
 
     /// Ends of the chords.
@@ -52,10 +64,7 @@ impl Course {
         let mut bundle = 0;
         while bundle + 1 < self.chords.len() {
             let end = (bundle + BUNDLE).min(self.chords.len() - 1);
-            let reach: f64 = self.chords[bundle..=end]
-                .windows(2)
-                .map(|pair| norm(minus(pair[1].1, pair[0].1)))
-                .sum();
+            let reach = self.reaches[bundle / BUNDLE];
             if norm(minus(point, self.chords[bundle].1)) <= reach + near {
                 for pair in self.chords[bundle..=end].windows(2) {
                     let ((from, a), (to, b)) = (pair[0], pair[1]);

@@ -24,6 +24,8 @@ pub(crate) struct Drawn<'a> {
     pub(crate) chain: &'a Chain,
     /// `None` where it may not be touched.
     pub(crate) paths: Option<&'a mut Vec<PiecewiseCubic<2>>>,
+    /// Samples are not asked where it runs.
+    pub(crate) as_drawn: bool,
 }
 
 /// A place where paths end: a junction, or a corner of a border after this path.

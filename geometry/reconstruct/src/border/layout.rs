@@ -88,6 +88,15 @@ impl Layout {
         bent
     }
 
+    /// A place of such a stretch on the path.
+    pub(crate) fn on_path(&self, along: f64) -> f64 {
+        if along > self.length {
+            along - self.length
+        } else {
+            along
+        }
+    }
+
     /// Where a place lies in such a stretch, from its start.
     pub(crate) fn within_stretch(&self, along: f64, [from, to]: [f64; 2]) -> Option<f64> {
         [along, along + self.length]
@@ -113,9 +122,13 @@ impl Layout {
         other
     }
 
-    /// The same path with a straight stretch more; `None` if that is too short.
+    /// The same path with a straight stretch more; `None` if that is too short, or goes on beyond
+    /// the end of a closed path.
     pub(crate) fn and(&self, stretch: [f64; 2]) -> Option<Self> {
-        (stretch[1] - stretch[0] >= STRAIGHT).then_some(())?;
+        let turns = if stretch[0] >= self.length { 1.0 } else { 0.0 };
+        let stretch = stretch.map(|at| at - turns * self.length);
+        let is_within = stretch[1] <= self.length;
+        (is_within && stretch[1] - stretch[0] >= STRAIGHT).then_some(())?;
         let mut other = self.clone();
         let after = self.straight.partition_point(|s| s[0] < stretch[0]);
         other.straight.insert(after, stretch);
@@ -333,7 +346,7 @@ impl Splines {
 
     /// Coefficients that may be chosen.
     pub(crate) fn freedom(&self) -> usize {
-        self.count() - self.conditions().len()
+        self.count().saturating_sub(self.conditions().len())
     }
 
     /// The functions that do not vanish at a place, or their derivatives.
@@ -359,7 +372,11 @@ impl Splines {
         if self.closed {
             let (first, last) = self.knots.domain();
             let scale = self.breaks[1] - self.breaks[0];
-            for (order, scale) in [1.0, scale, scale * scale].into_iter().enumerate() {
+            // Where a line ends or begins, the path may begin to bend at once.
+            let is_line = [self.is_line.first(), self.is_line.last()];
+            let orders = if is_line.contains(&Some(&true)) { 2 } else { 3 };
+            let scales = [1.0, scale, scale * scale].into_iter().take(orders);
+            for (order, scale) in scales.enumerate() {
                 let mut both = sum(first, order, scale);
                 both.extend(sum(last, order, -scale));
                 all.push(both);

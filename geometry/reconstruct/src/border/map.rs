@@ -91,6 +91,8 @@ struct Border<'a> {
     samples: Samples,
     segments: Vec<Segment>,
     level: usize,
+    /// Samples are not asked where it runs: it got into another's way where they said.
+    as_drawn: bool,
 }
 
 /// Builds the map. `placed[k]`, where given, are better samples of chain `k` than the
@@ -122,6 +124,7 @@ pub(crate) fn build(
                 },
                 segments: Vec::new(),
                 level: SMOOTH,
+                as_drawn: false,
             };
             border.divide(settings);
             border
@@ -135,6 +138,7 @@ pub(crate) fn build(
             .iter()
             .map(|b| b.draw(&junctions, settings))
             .collect();
+        let mut settled = Vec::new();
         if !settings.literal {
             let mut drawn: Vec<Drawn<'_>> = borders
                 .iter()
@@ -142,15 +146,20 @@ pub(crate) fn build(
                 .map(|(border, paths)| Drawn {
                     chain: border.chain,
                     paths: paths.as_mut().filter(|_| border.level < TRACED),
+                    as_drawn: border.as_drawn,
                 })
                 .collect();
-            let settled = settle(&mut drawn, &mut junctions, outlines);
+            settled = settle(&mut drawn, &mut junctions, outlines);
             part(&mut drawn, &mut junctions, &settled);
         }
         let bad = faults(cracks, &borders, &drawn, &junctions);
         let mut raised = false;
         for k in bad {
-            if borders[k].level < TRACED {
+            let is_settled = |settled: &Vec<bool>| settled.contains(&true);
+            if !borders[k].as_drawn && settled.get(k).is_some_and(is_settled) {
+                borders[k].as_drawn = true;
+                raised = true;
+            } else if borders[k].level < TRACED {
                 borders[k].level = if settings.literal {
                     TRACED
                 } else {

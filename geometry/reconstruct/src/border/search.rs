@@ -36,6 +36,11 @@ const SHORTER: [f64; 4] = [0.0, 3.0, 6.0, 12.0];
 const SHIFTS: [f64; 4] = [2.0, 5.0, 10.0, 20.0];
 /// With more straight stretches they stay as they were drawn.
 const STRETCHES: usize = 8;
+/// Times that an end of a straight stretch is shifted.
+const ROUNDS: usize = 16;
+/// Samples beside a path so long that trying others takes too long: straight stretches stay as
+/// they were drawn.
+const MANY: usize = 5000;
 /// Shortest arc of a conic, and how much of it at each end tells nothing of it; pitches.
 const ARC: f64 = 12.0;
 const END: f64 = 1.5;
@@ -43,6 +48,8 @@ const END: f64 = 1.5;
 const LIKE: f64 = 0.5;
 /// What follows a conic has pieces no longer than this, pitches.
 const PIECE: f64 = 3.0;
+/// Most of them: a long path bends little.
+const MOST_PIECES: f64 = 500.0;
 /// Places at which a conic is followed lie so far apart, pitches.
 const STEP: f64 = 0.5;
 
@@ -72,8 +79,16 @@ pub(crate) struct Found {
 }
 
 impl Search<'_> {
-    /// The path by as few numbers as the samples ask for; `None` where they do not tell.
+    /// The path by as few numbers as the samples ask for; `None` where they do not tell, or where
+    /// none is found that is as likely as what was drawn.
     pub(crate) fn best(&self) -> Option<Found> {
+        let found = self.sought()?;
+        let seen = self.seen_from(&found.path(self.side)?, NEAR + REDRAWN + FARTHEST);
+        let is_whole = seen.len() == self.samples.len();
+        (is_whole && Sightings::new(seen).cost() <= self.cost_as_drawn()).then_some(found)
+    }
+
+    fn sought(&self) -> Option<Found> {
         let drawn = Layout::of(self.curve, self.is_closed);
         if drawn.is_line() {
             return self.moved(&drawn, 1.0);
@@ -83,6 +98,9 @@ impl Search<'_> {
         // Bends are better known now than from what was drawn between nodes.
         let layout = best.layout.seen_from(&best.path(self.side)?);
         best = cheapest([self.of_layout(&layout), Some(best)])?;
+        if self.samples.len() > MANY {
+            return Some(self.drawn_by_conics(best));
+        }
         while best.layout.straight.len() < STRETCHES {
             let others = straighter(&best.layout, &best.path(self.side)?);
             let Some(better) = self.better(&best, &others) else {
@@ -90,11 +108,13 @@ impl Search<'_> {
             };
             best = better;
         }
-        while best.layout.straight.len() <= STRETCHES {
-            let Some(better) = self.better(&best, &shifted(&best.layout)) else {
-                break;
-            };
-            best = better;
+        if best.layout.straight.len() <= STRETCHES {
+            for _ in 0..ROUNDS {
+                let Some(better) = self.better(&best, &shifted(&best.layout)) else {
+                    break;
+                };
+                best = better;
+            }
         }
         Some(self.drawn_by_conics(best))
     }
@@ -123,7 +143,10 @@ impl Search<'_> {
             redraw(|along| self.curve.evaluate(first + along), &splines)?
         };
         self.is_beside(&base).then_some(())?;
-        let sightings = Sightings::enough(self.seen_from(&base))?;
+        let seen = self.seen_from(&base, NEAR + REDRAWN);
+        // What is drawn goes where the samples are, into notches, too.
+        (seen.len() == self.samples.len()).then_some(())?;
+        let sightings = Sightings::enough(seen)?;
         let (cost, sway) = Sway::of(&sightings, splines)?;
         (sway.farthest() <= FARTHEST).then_some(())?;
         let mut found = Found {
@@ -150,14 +173,15 @@ impl Search<'_> {
 
     /// What the path costs as it was drawn.
     pub(crate) fn cost_as_drawn(&self) -> f64 {
-        Sightings::new(self.seen_from(self.curve)).cost()
+        Sightings::new(self.seen_from(self.curve, NEAR)).cost()
     }
 
-    /// The samples as seen from a path near the one that was drawn.
-    fn seen_from(&self, path: &PiecewiseCubic<2>) -> Vec<Sighting> {
+    /// The samples as seen from a path near the one that was drawn, but for those farther away
+    /// than `near`.
+    fn seen_from(&self, path: &PiecewiseCubic<2>, near: f64) -> Vec<Sighting> {
         let course = Course::of(path);
         let seen = self.samples.iter().filter_map(|sample| {
-            let (at, left) = course.place(path, sample.place, NEAR + REDRAWN)?;
+            let (at, left) = course.place(path, sample.place, near)?;
             Some(Sighting {
                 along: at - path.domain().0,
                 inside: self.side * left,
@@ -185,7 +209,8 @@ impl Search<'_> {
     /// The same with its arcs of conics drawn as such.
     fn drawn_by_conics(&self, mut found: Found) -> Found {
         let drawn = || {
-            let splines = found.sway.splines().finer(PIECE)?;
+            let piece = PIECE.max(found.layout.length / MOST_PIECES);
+            let splines = found.sway.splines().finer(piece)?;
             let amounts = self.amounts(&found)?;
             found.sway.replaced(splines, &amounts)
         };
@@ -209,15 +234,7 @@ impl Search<'_> {
         (to - from >= ARC).then_some(())?;
         let first = path.domain().0;
         let steps = ((to - from - 2.0 * END) / STEP) as usize;
-        let at = |k: usize| {
-            let along = from + END + k as f64 * STEP;
-            first
-                + if along > layout.length {
-                    along - layout.length
-                } else {
-                    along
-                }
-        };
+        let at = |k: usize| first + layout.on_path(from + END + k as f64 * STEP);
         let places: Vec<[f64; 2]> = (0..=steps).map(|k| path.evaluate(at(k))).collect();
         let middle = at(steps / 2);
         let [x, y] = path.derivative(middle, 1);
