@@ -253,8 +253,11 @@ fn in_view(
     let is_relief = settings.reconstruct.method == Method::Relief;
     let of_samples = || {
         let kinds = kinds(part_image, &part.regions, columns, observer)?;
+        // Where a table was left out, a part ends at its foot, though samples go on there: they
+        // tell of silhouettes only.
+        let all_is_part = part.image.is_none();
         let beside = match columns {
-            Some(columns) if is_relief => {
+            Some(columns) if is_relief && all_is_part => {
                 outlines::samples(part_image, &part.regions, columns, observer)?
             }
             _ => Vec::new(),
