@@ -150,12 +150,6 @@ pub struct RangeImageReport {
     /// Median over the nodes of the standard deviation of those samples about it.
     #[serde(default)]
     pub noise_mm: Option<f64>,
-    /// Nodes next to outlines that lost their value once these were settled by the samples.
-    #[serde(default)]
-    pub dropped_nodes: usize,
-    /// Nodes next to outlines that got one then.
-    #[serde(default)]
-    pub filled_nodes: usize,
 }
 
 /// The surface regions.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use pipeline::{NodeRole, Outcome, Settings};
+use range_image::RangeImage;
 use reconstruct::{Face, Model, Surface};
 
 use crate::export::CadOptions;
@@ -28,7 +29,7 @@ impl Report {
             timestamp: inputs.timestamp.to_string(),
             scan: inputs.scan.clone(),
             settings: settings(inputs.settings, inputs.cad),
-            range_image: range_image(inputs),
+            range_image: range_image(inputs.image),
             regions: regions(inputs.outcome),
             background: background(inputs.outcome),
             crumbs: crumbs(inputs.outcome),
@@ -78,10 +79,8 @@ fn limits((low, high): (f64, f64)) -> [Option<f64>; 2] {
     [finite(low), finite(high)]
 }
 
-fn range_image(inputs: &Inputs<'_>) -> RangeImageReport {
-    let image = inputs.image;
+fn range_image(image: &RangeImage) -> RangeImageReport {
     let extent = image.z_extent_mm();
-    let settled = inputs.outcome.settled.as_ref();
     RangeImageReport {
         pitch_mm: image.pitch_mm(),
         columns: image.columns(),
@@ -91,8 +90,6 @@ fn range_image(inputs: &Inputs<'_>) -> RangeImageReport {
         z_max_mm: extent.map(|(_, high)| high),
         inlier_share: median(image.qualities().map(|quality| quality.inlier_share())),
         noise_mm: median(image.qualities().map(|quality| f64::from(quality.scale_mm))),
-        dropped_nodes: settled.map_or(0, |settled| settled.dropped),
-        filled_nodes: settled.map_or(0, |settled| settled.filled),
     }
 }
 

@@ -1,15 +1,13 @@
 //! The stages in their order.
 
 use range_image::{Cancelled, Column, RangeImage, RegionMap};
-use reconstruct::metrics::compare;
-use reconstruct::{Evidence, Fitted, Method, ReconstructError, Reconstruction};
+use reconstruct::{Fitted, Method, ReconstructError, Reconstruction};
 use regrid::RegridError;
 use segment::SegmentError;
 use shapes::Shape;
 
 use crate::columns::{Columns, InMemory, ReadAgainError};
 use crate::kinds::{RegionKind, kinds};
-use crate::outlines::{self, SettledNodes, settle_nodes};
 use crate::part::divide;
 use crate::{Background, Crumb, Kinds, NodeRole, View};
 use crate::{Observer, Settings, SettingsError, Stage};
@@ -30,10 +28,6 @@ pub struct Outcome {
     pub kinds: Vec<RegionKind>,
     /// The model made of them, and how well it fits.
     pub reconstruction: Reconstruction,
-    /// The part's range image with the nodes beside its outlines decided anew by these. The
-    /// reconstruction's metrics are against it. `None` where there were no samples to settle the
-    /// outlines by: then they are against the range image as it was.
-    pub settled: Option<SettledNodes>,
     /// The stages that ran, in order.
     pub stages: Vec<Stage>,
 }
@@ -250,44 +244,20 @@ fn in_view(
 
     observer.stage(Stage::Reconstruct);
     let part_image = part.image.as_ref().unwrap_or(image);
-    let is_relief = settings.reconstruct.method == Method::Relief;
-    let of_samples = || {
-        let kinds = kinds(part_image, &part.regions, columns, observer)?;
-        // Where a table was left out, a part ends at its foot, though samples go on there: they
-        // tell of silhouettes only.
-        let all_is_part = part.image.is_none();
-        let beside = match columns {
-            Some(columns) if is_relief && all_is_part => {
-                outlines::samples(part_image, &part.regions, columns, observer)?
-            }
-            _ => Vec::new(),
-        };
-        Ok::<_, PipelineError>((kinds, beside))
-    };
+    let of_kinds = || kinds(part_image, &part.regions, columns, observer);
     let fit = || Fitted::of(part_image, &part.regions, &settings.reconstruct, observer);
-    let (fitted, of_samples) = rayon::join(fit, of_samples);
-    let (fitted, (kinds, beside)) = (fitted?, of_samples?);
-    let mut shapes: Vec<Option<Shape>> = Vec::new();
-    if settings.kinds == Kinds::Auto && is_relief {
-        shapes.extend(kinds.iter().map(RegionKind::shape));
-    }
-    let evidence = Evidence {
-        shapes: &shapes,
-        outline_samples: &beside,
+    let takes_shapes =
+        settings.kinds == Kinds::Auto && settings.reconstruct.method == Method::Relief;
+    let (reconstruction, kinds) = if takes_shapes {
+        let (fitted, kinds) = rayon::join(fit, of_kinds);
+        let (fitted, kinds) = (fitted?, kinds?);
+        let shapes: Vec<Option<Shape>> = kinds.iter().map(RegionKind::shape).collect();
+        (fitted.reconstruct(&shapes, observer)?, kinds)
+    } else {
+        let free_form = || fit()?.reconstruct(&[], observer);
+        let (reconstruction, kinds) = rayon::join(free_form, of_kinds);
+        (reconstruction?, kinds?)
     };
-    let mut reconstruction = fitted.reconstruct(evidence, observer)?;
-    let mut settled = None;
-    if let Some(columns) = columns.filter(|_| !beside.is_empty()) {
-        let nodes = settle_nodes(
-            part_image,
-            &part.regions,
-            &reconstruction,
-            columns,
-            observer,
-        )?;
-        reconstruction.metrics = compare(&nodes.image, &reconstruction.restored);
-        settled = Some(nodes);
-    }
     Ok(Outcome {
         regions: part.regions,
         background: part.background,
@@ -295,7 +265,6 @@ fn in_view(
         crumbs: part.crumbs,
         kinds,
         reconstruction,
-        settled,
         stages: vec![Stage::Segment, Stage::Reconstruct],
     })
 }

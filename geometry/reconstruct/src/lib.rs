@@ -19,7 +19,6 @@ pub mod settings;
 mod accept;
 mod assemble;
 mod border;
-mod evidence;
 mod known;
 mod lift;
 mod noise;
@@ -30,7 +29,6 @@ mod run;
 mod testing;
 mod trim;
 
-pub use evidence::{Evidence, OutlineSample, Seen};
 pub use metrics::Metrics;
 pub use model::{Coedge, Edge, EdgeId, EdgeKind, Face, Loop, Model, Surface, Vertex, VertexId};
 pub use run::{Fitted, Reconstruction, RegionFit, reconstruct};

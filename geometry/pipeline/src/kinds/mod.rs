@@ -1,5 +1,6 @@
 //! What kind of surface each region is.
 
+mod neighbourhood;
 mod nodes;
 mod policy;
 mod samples;

@@ -7,12 +7,10 @@ use range_image::{Cancelled, Monitor};
 
 use super::cracks::{Chain, CrackMap, Use};
 use super::crossing::{Strand, conflicts};
-use super::deflect::Drawn;
+use super::deflect::{Drawn, part};
 use super::junctions::{Course, place_junctions};
 use super::path;
-use super::pins::part;
 use super::segments::{Price, Samples, Segment, sharpest};
-use super::settle::{Outlines, settle};
 use super::smooth::smooth;
 use crate::polygon::{distance_to_segment, minus, norm, signed_area};
 
@@ -91,8 +89,6 @@ struct Border<'a> {
     samples: Samples,
     segments: Vec<Segment>,
     level: usize,
-    /// Samples are not asked where it runs: it got into another's way where they said.
-    as_drawn: bool,
 }
 
 /// Builds the map. `placed[k]`, where given, are better samples of chain `k` than the
@@ -100,7 +96,6 @@ struct Border<'a> {
 pub(crate) fn build(
     cracks: &CrackMap,
     placed: &[Option<Vec<[f64; 2]>>],
-    outlines: &Outlines,
     settings: &BorderSettings,
     monitor: &dyn Monitor,
 ) -> Result<PlanarMap, Cancelled> {
@@ -124,7 +119,6 @@ pub(crate) fn build(
                 },
                 segments: Vec::new(),
                 level: SMOOTH,
-                as_drawn: false,
             };
             border.divide(settings);
             border
@@ -138,7 +132,6 @@ pub(crate) fn build(
             .iter()
             .map(|b| b.draw(&junctions, settings))
             .collect();
-        let mut settled = Vec::new();
         if !settings.literal {
             let mut drawn: Vec<Drawn<'_>> = borders
                 .iter()
@@ -146,20 +139,14 @@ pub(crate) fn build(
                 .map(|(border, paths)| Drawn {
                     chain: border.chain,
                     paths: paths.as_mut().filter(|_| border.level < TRACED),
-                    as_drawn: border.as_drawn,
                 })
                 .collect();
-            settled = settle(&mut drawn, &mut junctions, outlines);
-            part(&mut drawn, &mut junctions, &settled);
+            part(&mut drawn, &mut junctions);
         }
         let bad = faults(cracks, &borders, &drawn, &junctions);
         let mut raised = false;
         for k in bad {
-            let is_settled = |settled: &Vec<bool>| settled.contains(&true);
-            if !borders[k].as_drawn && settled.get(k).is_some_and(is_settled) {
-                borders[k].as_drawn = true;
-                raised = true;
-            } else if borders[k].level < TRACED {
+            if borders[k].level < TRACED {
                 borders[k].level = if settings.literal {
                     TRACED
                 } else {
@@ -390,25 +377,19 @@ fn strays(samples: &Samples, outline: &[[f64; 2]], tips: &[Tip]) -> bool {
     }
     let total = total.max(1e-9);
     let reach = 6.0 + 0.1 * drawn;
-    let is_near = |point: [f64; 2], near: f64| {
-        let from = length
-            .partition_point(|&l| l < near - reach)
-            .saturating_sub(1);
-        let to = length.partition_point(|&l| l <= near + reach);
-        outline[from..(to + 1).min(outline.len())]
-            .windows(2)
-            .any(|s| distance_to_segment(point, s[0], s[1]) <= FARTHEST)
-    };
     samples
         .smooth
         .iter()
         .zip(&samples.length)
         .any(|(point, at)| {
             let near = at / total * drawn;
-            // Without tips the border is closed, and its end is as near to its start.
-            let close = is_near(*point, near)
-                || (tips.is_empty()
-                    && (is_near(*point, near + drawn) || is_near(*point, near - drawn)));
+            let from = length
+                .partition_point(|&l| l < near - reach)
+                .saturating_sub(1);
+            let to = length.partition_point(|&l| l <= near + reach);
+            let close = outline[from..(to + 1).min(outline.len())]
+                .windows(2)
+                .any(|s| distance_to_segment(*point, s[0], s[1]) <= FARTHEST);
             let at_tip = |t: &Tip| norm(minus(*point, t.place)) <= t.moved + FARTHEST;
             !close && !tips.iter().any(at_tip)
         })

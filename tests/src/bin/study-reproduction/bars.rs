@@ -137,20 +137,6 @@ fn all(results: &Results) -> Vec<Bar> {
             |f| f.whole[0].snr_db,
         ),
         whole(
-            "`relief`, whole image against the image as regridded: lost and invented",
-            Bound::AtMost(0.0),
-            "nodes",
-            0,
-            |f| (f.as_regridded.lost_nodes + f.as_regridded.invented_nodes) as f64,
-        ),
-        whole(
-            "`relief`, whole image against the image as regridded: SNR",
-            Bound::AtLeast(80.0),
-            "dB",
-            1,
-            |f| f.as_regridded.snr_db,
-        ),
-        whole(
             "`relief`, whole image against the truth: lost and invented",
             Bound::AtMost(0.0),
             "nodes",

@@ -78,8 +78,6 @@ pub(crate) struct Figures {
     pub(crate) faces: usize,
     /// The restored image against the range image and against the truth.
     pub(crate) whole: [Metrics; 2],
-    /// Against the range image as regridded, before nodes beside outlines were decided anew.
-    pub(crate) as_regridded: Metrics,
     /// The range image against the truth.
     pub(crate) regridded: Metrics,
     pub(crate) trimming: Trimming,
@@ -124,10 +122,9 @@ pub(crate) fn run(scan: &Scan, method: Method, threads: usize) -> Result<Run> {
         regions,
         faces: model.faces.len(),
         whole: [
-            outcome.reconstruction.metrics,
+            compare(&image, &outcome.reconstruction.restored),
             compare(&truth.image, &restored),
         ],
-        as_regridded: compare(&image, &outcome.reconstruction.restored),
         regridded: compare(&truth.image, &truth.on_this_grid(&image)),
         trimming: trimming(scan, &outcome, &labels)?,
         vertices: model.vertices.len(),
