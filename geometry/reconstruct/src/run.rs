@@ -465,7 +465,7 @@ fn restore(
     for face in &model.faces {
         let Surface::Patches(surface) = &face.surface;
         let loops = core::iter::once(&face.outer).chain(&face.inner);
-        let curves = loops.flat_map(|l| &l.coedges).map(|c| &c.parameter_curve);
+        let curves = loops.map(|l| l.coedges.iter().map(|c| &c.parameter_curve));
         let trim = Trim::new(curves, image.pitch_mm(), |p| placement.to_pitches(p));
         trim.nodes(image.columns(), image.rows(), |column, row| {
             let z = surface.z(image.x_mm(column), image.y_mm(row));

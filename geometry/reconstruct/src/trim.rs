@@ -11,31 +11,37 @@ pub(crate) struct Trim {
 const CHORD: f64 = 0.25;
 
 impl Trim {
-    /// From the parameter curves of all loops; `to_pitches` maps millimetres to pitches
-    /// with node `(column, row)` at `(column, row)`.
-    pub(crate) fn new<'a>(
-        curves: impl Iterator<Item = &'a PiecewiseCubic<2>>,
+    /// From the parameter curves of each loop; `to_pitches` maps millimetres to pitches with node
+    /// `(column, row)` at `(column, row)`. A curve begins where the one before it ends, whatever
+    /// digits its own start has: in a gap between them a column would cross the loop once only.
+    pub(crate) fn new<'a, L>(
+        loops: impl IntoIterator<Item = L>,
         pitch_mm: f64,
         to_pitches: impl Fn([f64; 2]) -> [f64; 2],
-    ) -> Self {
+    ) -> Self
+    where
+        L: Iterator<Item = &'a PiecewiseCubic<2>>,
+    {
         let mut segments = Vec::new();
-        for curve in curves {
-            let mut before = to_pitches(curve.start());
-            for k in 0..curve.pieces.len() {
-                let width = curve.breaks[k + 1] - curve.breaks[k];
-                let straight = curve.pieces[k].iter().all(|c| c[2] == 0.0 && c[3] == 0.0);
-                let chords = if straight {
-                    1.0
-                } else {
-                    (width / pitch_mm / CHORD).ceil()
-                };
-                let count = chords.clamp(1.0, 1e5) as usize;
-                for p in 1..=count {
-                    let point = curve.piece_value(k, width * p as f64 / count as f64, 0);
-                    let point = to_pitches(point);
-                    segments.push([before, point]);
-                    before = point;
+        for curves in loops {
+            let mut points: Vec<[f64; 2]> = Vec::new();
+            for curve in curves {
+                for k in 0..curve.pieces.len() {
+                    let width = curve.breaks[k + 1] - curve.breaks[k];
+                    let straight = curve.pieces[k].iter().all(|c| c[2] == 0.0 && c[3] == 0.0);
+                    let chords = if straight {
+                        1.0
+                    } else {
+                        (width / pitch_mm / CHORD).ceil()
+                    };
+                    let count = chords.clamp(1.0, 1e5) as usize;
+                    let at = |p: usize| width * p as f64 / count as f64;
+                    points.extend((1..=count).map(|p| to_pitches(curve.piece_value(k, at(p), 0))));
                 }
+            }
+            if let Some(&last) = points.last() {
+                let before = core::iter::once(&last).chain(&points);
+                segments.extend(before.zip(&points).map(|(from, to)| [*from, *to]));
             }
         }
         Self { segments }
@@ -93,6 +99,25 @@ impl Trim {
 mod tests {
     use super::*;
 
+    /// The ends of curves that meet in a corner are computed, each in its own way.
+    #[test]
+    fn a_column_through_a_corner_is_not_lost() {
+        let line = |from: [f64; 2], to: [f64; 2]| PiecewiseCubic::line(from, to, 1.0).unwrap();
+        for (end, start) in [(-1e-12, 1e-12), (1e-12, -1e-12), (0.0, 0.0)] {
+            let curves = [
+                line([0.3, 0.4], [3.0 + end, 6.3]),
+                line([3.0 + start, 6.3], [6.4, 0.4]),
+                line([6.4, 0.4], [0.3, 0.4]),
+            ];
+            let trim = Trim::new([curves.iter()], 1.0, |p| p);
+            let mut inside = [0; 7];
+            trim.nodes(7, 7, |column, _| inside[column] += 1);
+            assert_eq!(inside, [0, 1, 4, 6, 4, 2, 1], "{end} {start}");
+            let area = trim.area(7, |_, _| 1.0);
+            assert!((area / (0.5 * 6.1 * 5.9) - 1.0).abs() < 0.05, "{area}");
+        }
+    }
+
     #[test]
     fn a_ring_holds_the_nodes_between_its_circles() {
         let circle = |radius: f64| {
@@ -107,9 +132,8 @@ mod tests {
             });
             quarters.collect::<Vec<_>>()
         };
-        let mut curves = circle(8.0);
-        curves.extend(circle(3.0));
-        let trim = Trim::new(curves.iter(), 1.0, |p| p);
+        let loops = [circle(8.0), circle(3.0)];
+        let trim = Trim::new(loops.iter().map(|curves| curves.iter()), 1.0, |p| p);
         let mut inside = vec![false; 21 * 21];
         trim.nodes(21, 21, |column, row| inside[column * 21 + row] = true);
         let area = trim.area(21, |_, _| 2.0);
