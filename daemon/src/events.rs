@@ -1,6 +1,6 @@
 //! Telling subscribers what happens, without ever waiting for one.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex};
 
 use relief_api::Event;
@@ -13,6 +13,8 @@ use crate::service::lock;
 const BACKLOG_BYTES: usize = 8 << 20;
 /// What an event takes beside its text.
 const OVERHEAD_BYTES: usize = 128;
+/// Events that there is room for while there is none.
+const EMPTY_CAPACITY: usize = 64;
 
 /// An event as it is sent: put into words once, however many listen.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,13 +37,17 @@ impl Told {
     }
 }
 
-/// What has been told lately.
+/// What has been told lately and somebody has still to hear.
 #[derive(Debug, Default)]
 struct Backlog {
     events: VecDeque<Arc<Told>>,
     bytes: usize,
     /// Number of the first of these events, counted from the start of the service.
     first: u64,
+    /// Number of the event that each subscriber is to hear next.
+    places: BTreeMap<u64, u64>,
+    /// The name of the next subscriber in `places`.
+    newcomer: u64,
 }
 
 impl Backlog {
@@ -55,23 +61,33 @@ impl Backlog {
         self.events.push_back(Arc::new(told));
         // The newest stays, whatever its size.
         while self.bytes > limit_bytes && self.events.len() > 1 {
-            if let Some(oldest) = self.events.pop_front() {
-                self.bytes -= oldest.bytes();
-                self.first += 1;
-            }
+            self.pop();
+        }
+    }
+
+    fn pop(&mut self) {
+        if let Some(oldest) = self.events.pop_front() {
+            self.bytes -= oldest.bytes();
+            self.first += 1;
+        }
+    }
+
+    /// Lets go what all have heard; what nobody listens to is heard by all.
+    fn trim(&mut self) {
+        let next = self.next();
+        let heard = self.places.values().min().copied().unwrap_or(next);
+        while self.first < heard.min(next) {
+            self.pop();
+        }
+        if self.events.is_empty() {
+            // Not to hold for good the room that one burst has taken.
+            self.events.shrink_to(EMPTY_CAPACITY);
         }
     }
 
     fn get(&self, number: u64) -> Option<Arc<Told>> {
         let index = usize::try_from(number.checked_sub(self.first)?).ok()?;
         self.events.get(index).cloned()
-    }
-
-    /// Nobody listens any more.
-    fn clear(&mut self) {
-        self.first = self.next();
-        self.events.clear();
-        self.bytes = 0;
     }
 }
 
@@ -102,12 +118,15 @@ impl Hub {
     /// Tells all subscribers; returns at once.
     pub(crate) fn tell(&self, event: Event) {
         if !self.has_listeners() {
-            lock(&self.backlog).clear();
             return;
         }
         let told = Told::new(&event);
         let next = {
             let mut backlog = lock(&self.backlog);
+            // The last one may just have gone.
+            if backlog.places.is_empty() {
+                return;
+            }
             backlog.push(told, self.limit_bytes);
             backlog.next()
         };
@@ -121,10 +140,14 @@ impl Hub {
 
     /// Hears everything told from now on.
     pub(crate) fn subscribe(&self) -> Subscriber {
-        // In this order: what is told in between is heard.
+        // In this order: what is told once there is a place wakes it.
         let wake = self.wake.subscribe();
+        let mut backlog = lock(&self.backlog);
+        let (name, next) = (backlog.newcomer, backlog.next());
+        backlog.newcomer += 1;
+        backlog.places.insert(name, next);
         Subscriber {
-            next: lock(&self.backlog).next(),
+            name,
             backlog: Arc::clone(&self.backlog),
             wake,
         }
@@ -145,8 +168,8 @@ pub(crate) enum Heard {
 pub(crate) struct Subscriber {
     backlog: Arc<Mutex<Backlog>>,
     wake: watch::Receiver<u64>,
-    /// Number of the event to hear next.
-    next: u64,
+    /// In the backlog's places.
+    name: u64,
 }
 
 impl Subscriber {
@@ -163,15 +186,25 @@ impl Subscriber {
     }
 
     fn look(&mut self) -> Option<Heard> {
-        let backlog = lock(&self.backlog);
-        if self.next < backlog.first {
-            let missed = backlog.first - self.next;
-            self.next = backlog.first;
+        let mut backlog = lock(&self.backlog);
+        let next = backlog.places.get(&self.name).copied()?;
+        if next < backlog.first {
+            let (first, missed) = (backlog.first, backlog.first - next);
+            backlog.places.insert(self.name, first);
             return Some(Heard::Lagged(missed));
         }
-        let told = backlog.get(self.next)?;
-        self.next += 1;
+        let told = backlog.get(next)?;
+        backlog.places.insert(self.name, next + 1);
+        backlog.trim();
         Some(Heard::Event(told))
+    }
+}
+
+impl Drop for Subscriber {
+    fn drop(&mut self) {
+        let mut backlog = lock(&self.backlog);
+        backlog.places.remove(&self.name);
+        backlog.trim();
     }
 }
 
@@ -230,12 +263,34 @@ mod tests {
         let last = Told::new(&event(1_000, 200_000));
         assert_eq!(slow.next().await, Some(Heard::Event(Arc::new(last))));
         // Nothing is kept for nobody.
+        hub.tell(event(1_001, 10));
+        assert_ne!(lock(&hub.backlog).bytes, 0);
         drop(slow);
+        assert_eq!(lock(&hub.backlog).bytes, 0);
         hub.tell(event(1_001, 10));
         assert_eq!(lock(&hub.backlog).bytes, 0);
         let mut late = hub.subscribe();
         hub.tell(event(1_002, 10));
         let heard = Told::new(&event(1_002, 10));
         assert_eq!(late.next().await, Some(Heard::Event(Arc::new(heard))));
+    }
+
+    #[tokio::test]
+    async fn what_all_have_heard_is_let_go() {
+        let hub = Hub::with_limit(1_000_000);
+        let (mut quick, mut slow) = (hub.subscribe(), hub.subscribe());
+        for number in 0..3 {
+            hub.tell(event(number, 10));
+        }
+        let kept = || lock(&hub.backlog).events.len();
+        for _ in 0..3 {
+            quick.next().await.unwrap();
+        }
+        assert_eq!(kept(), 3);
+        for heard in 1..=3 {
+            slow.next().await.unwrap();
+            assert_eq!(kept(), 3 - heard);
+        }
+        assert_eq!(lock(&hub.backlog).bytes, 0);
     }
 }

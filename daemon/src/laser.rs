@@ -59,6 +59,8 @@ struct Known {
     ended_meanwhile: bool,
     /// Counts what the service did, so that an answer to an older question is told.
     acts: u64,
+    /// The scanner is being told to begin: what it answers meanwhile may be from before it does.
+    starting: bool,
 }
 
 impl Laser {
@@ -89,6 +91,7 @@ impl Laser {
                 stopping: 0,
                 ended_meanwhile: false,
                 acts: 0,
+                starting: false,
             }),
         };
         if laser.state() == Some(LaserState::On) {
@@ -149,6 +152,8 @@ impl Laser {
     /// off; one that was lost, or has a fault, must be asked first.
     pub(crate) fn scan_ended(&self, state: ScanState, reason: Option<&str>) {
         let mut known = lock(&self.known);
+        known.acts += 1;
+        known.starting = false; // Where a defect kept the start from its end.
         known.next_scan = None;
         known.reason = None;
         if known.stopping > 0 {
@@ -168,15 +173,18 @@ impl Laser {
         known.scan = None;
     }
 
+    /// Notes what comes of what the service or its scan did.
     fn note(&self, laser: LaserState, cause: &str) {
-        lock(&self.known).note(laser, cause);
+        let mut known = lock(&self.known);
+        known.acts += 1;
+        known.note(laser, cause);
     }
 
     /// The same of what the scanner answered, unless the service has acted since it asked:
     /// an answer from before says nothing about what is now.
     fn note_answer(&self, acts: u64, laser: LaserState, cause: &str) {
         let mut known = lock(&self.known);
-        if known.acts == acts {
+        if known.acts == acts && !known.starting {
             known.note(laser, cause);
         }
     }
@@ -185,9 +193,20 @@ impl Laser {
     fn begin(&self) {
         let mut known = lock(&self.known);
         known.acts += 1;
+        known.starting = true;
         known.ended_meanwhile = false;
         known.scan = known.next_scan.take();
         known.note(LaserState::On, "a scan begins");
+    }
+
+    /// It has been told, and has begun unless there was an error.
+    fn begun(&self, error: Option<&ScannerError>) {
+        let mut known = lock(&self.known);
+        known.acts += 1;
+        known.starting = false;
+        if let Some(error) = error {
+            known.note(LaserState::Unknown, &error.to_string());
+        }
     }
 
     /// A scan that was cut short is about to be taken up.
@@ -341,9 +360,7 @@ impl Scanner for Watched {
     fn start_scan(&self, plan: &ScanPlan) -> Result<ScanStream, ScannerError> {
         self.laser.begin();
         let started = self.scanner.start_scan(plan);
-        if let Err(error) = &started {
-            self.laser.note(LaserState::Unknown, &error.to_string());
-        }
+        self.laser.begun(started.as_ref().err());
         started
     }
 
@@ -533,6 +550,32 @@ mod tests {
         );
         laser.note(LaserState::On, "the scanner says that it is on");
         assert_eq!(laser.latest().unwrap().scan, None);
+    }
+
+    #[test]
+    fn an_answer_to_an_older_question_does_not_count() {
+        use LaserState::{Off, On, Unknown};
+        let folder = tempfile::tempdir().unwrap();
+        let laser = Laser::open(&LocalDisk, folder.path(), THE_SCANNER).unwrap();
+        let acts = || lock(&laser.known).acts;
+        let off = |asked| laser.note_answer(asked, Off, "the scanner says that it is off");
+        laser.begin();
+        let asked = acts(); // While it begins.
+        off(asked);
+        laser.begun(None);
+        off(asked);
+        let asked = acts();
+        laser.scan_paused("the cable was pulled");
+        off(asked);
+        let asked = acts();
+        laser.scan_goes_on();
+        off(asked);
+        let asked = acts();
+        laser.scan_ended(ScanState::Failed, None);
+        off(asked);
+        assert_eq!(states(&laser), [On, Unknown, On, Unknown]);
+        off(acts());
+        assert_eq!(states(&laser).last(), Some(&Off));
     }
 
     #[test]

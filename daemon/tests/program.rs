@@ -19,7 +19,8 @@ const LIMIT: Duration = Duration::from_secs(60);
 /// A service in a folder of its own, with this test in systemd's place.
 struct Started {
     child: Child,
-    systemd: UnixDatagram,
+    /// Until the test waits for the service's end.
+    systemd: Option<UnixDatagram>,
     folder: tempfile::TempDir,
 }
 
@@ -67,9 +68,13 @@ impl Started {
             .unwrap();
         Self {
             child,
-            systemd,
+            systemd: Some(systemd),
             folder,
         }
+    }
+
+    fn systemd(&self) -> &UnixDatagram {
+        self.systemd.as_ref().unwrap()
     }
 
     /// Waits until systemd is told this.
@@ -77,7 +82,7 @@ impl Started {
         let start = Instant::now();
         let mut buffer = [0; 4096];
         while start.elapsed() < LIMIT {
-            let count = self.systemd.recv(&mut buffer).unwrap();
+            let count = self.systemd().recv(&mut buffer).unwrap();
             let told = String::from_utf8_lossy(&buffer[..count]).into_owned();
             if told.lines().any(|line| line == wanted) {
                 return told;
@@ -92,6 +97,8 @@ impl Started {
 
     /// Its exit code, and what it said.
     fn end(&mut self) -> (Option<i32>, String) {
+        // Nobody reads it any more, and a service that sends to a full socket would wait for ever.
+        drop(self.systemd.take());
         let mut said = String::new();
         let mut stderr = self.child.stderr.take().unwrap();
         stderr.read_to_string(&mut said).unwrap();
@@ -143,14 +150,14 @@ fn a_stopped_process_does_not_feed_the_watchdog() {
     started.heard("READY=1");
     started.heard("WATCHDOG=1");
     started.signal(Signal::STOP);
-    started.systemd.set_read_timeout(Some(LIMIT)).unwrap();
+    started.systemd().set_read_timeout(Some(LIMIT)).unwrap();
     // What was sent before it stopped.
-    started.systemd.set_nonblocking(true).unwrap();
+    started.systemd().set_nonblocking(true).unwrap();
     std::thread::sleep(Duration::from_millis(300));
-    while started.systemd.recv(&mut [0; 4096]).is_ok() {}
+    while started.systemd().recv(&mut [0; 4096]).is_ok() {}
     std::thread::sleep(Duration::from_millis(600));
-    assert!(started.systemd.recv(&mut [0; 4096]).is_err());
-    started.systemd.set_nonblocking(false).unwrap();
+    assert!(started.systemd().recv(&mut [0; 4096]).is_err());
+    started.systemd().set_nonblocking(false).unwrap();
     started.signal(Signal::CONT);
     started.heard("WATCHDOG=1");
 }

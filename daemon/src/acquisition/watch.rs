@@ -29,11 +29,14 @@ pub(crate) fn watch(service: &Arc<Service>, station: &Station) {
 
 fn look(service: &Service, station: &Station) {
     // Each time, since cables are swapped; the driver knows it from when it connected.
-    let result = station.identify().and_then(|identity| {
-        station.note_identity(&identity);
-        station.scanner.status()
-    });
-    // A scan may have begun while this waited for its answer; then the scan knows better.
+    let identified = station.identify();
+    let identified = identified.map(|identity| station.note_identity(&identity));
+    // A scan may have begun while this waited for its answer; then the scan knows better, and
+    // the scanner is not asked otherwise.
+    if station.is_scanning() {
+        return;
+    }
+    let result = identified.and_then(|()| station.scanner.status());
     if station.is_scanning() {
         return;
     }

@@ -172,7 +172,8 @@ pub struct ReconstructConfig {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DeliverablesConfig {
-    /// IGES entities of the surfaces: 114 (parametric splines) or 128 (rational B-splines).
+    /// IGES entities of the surfaces: 114 (parametric splines), 128 (rational B-splines), or 190
+    /// (planes, cylinders, cones, spheres and tori by their numbers, other faces as 128).
     #[serde(deserialize_with = "entities", skip_serializing_if = "Option::is_none")]
     pub entities: Option<u16>,
     /// What the STEP file beside the IGES file follows, or that there is none.
@@ -218,8 +219,9 @@ fn entities<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<
         None => Ok(None),
         Some(114) => Ok(Some(114)),
         Some(128) => Ok(Some(128)),
+        Some(190) => Ok(Some(190)),
         Some(other) => Err(serde::de::Error::custom(format!(
-            "{other} is no surface entity that can be written: use 114 or 128"
+            "{other} is no surface entity that can be written: use 114, 128 or 190"
         ))),
     }
 }

@@ -269,6 +269,8 @@ impl Service {
                 source,
             });
         }
+        // Left there by a job that failed or was cancelled.
+        self.forget_grid(id);
         Ok(scan)
     }
 }

@@ -368,13 +368,15 @@ impl Store {
         };
         let (waiting, logged) = self.with(read)?;
         let mut found = Vec::new();
-        for bytes in &waiting {
+        for bytes in waiting.iter().rev() {
             found.push(decode::<Message>(&self.path, bytes)?.delivery);
         }
-        for bytes in &logged {
+        for bytes in logged.iter().rev() {
             found.push(decode::<Delivery>(&self.path, bytes)?);
         }
-        // Times are of one length and in UTC.
+        // Times are of one length and in UTC. Of those made within one millisecond, whose order
+        // this keeps, the later numbers are the newer ones, and what still waits is newer than
+        // what has ended.
         found.sort_by(|a, b| b.created_at.cmp(&a.created_at));
         Ok(found)
     }
@@ -498,6 +500,28 @@ mod tests {
         );
         assert_eq!(store.deliveries("a").unwrap(), []);
         assert_eq!(store.waiting("b").unwrap(), [1, 2, 3]);
+    }
+
+    #[test]
+    fn messages_of_one_millisecond_are_told_newest_first() {
+        let (_folder, store) = open();
+        let of_one_time = ["c", "a", "d", "b"].map(|id| Outgoing {
+            message: Message {
+                delivery: Delivery {
+                    id: id.into(),
+                    ..outgoing("lab", 7).message.delivery
+                },
+                body: "{}".into(),
+            },
+            webhook: "lab".into(),
+        });
+        for ended in &of_one_time[..2] {
+            store.log_delivery("lab", &ended.message.delivery).unwrap();
+        }
+        store.put_messages(&of_one_time[2..]).unwrap();
+        let told = store.deliveries("lab").unwrap();
+        let ids: Vec<&str> = told.iter().map(|delivery| &*delivery.id).collect();
+        assert_eq!(ids, ["b", "d", "a", "c"]);
     }
 
     #[test]

@@ -72,6 +72,14 @@ fn alone(lock: &Mutex<()>) -> Option<MutexGuard<'_, ()>> {
     }
 }
 
+/// The one tried last, of deliveries that are listed newest first.
+fn latest(mut deliveries: Vec<Delivery>) -> Option<Delivery> {
+    let last_try = |delivery: &Delivery| delivery.tried.last().map(|tried| tried.at.clone());
+    deliveries.retain(|delivery| !delivery.tried.is_empty());
+    // Of two tried within one millisecond the last one found counts, which is to be the newer.
+    deliveries.into_iter().rev().max_by_key(last_try)
+}
+
 impl Hook {
     fn hears(&self, event: WebhookEvent) -> bool {
         self.receiver().config.events.contains(&event)
@@ -218,11 +226,7 @@ impl Service {
     pub(crate) fn list_webhooks(&self) -> Result<Vec<Webhook>, ServiceError> {
         let mut list = Vec::new();
         for hook in self.webhooks.all() {
-            let mut deliveries = self.store.deliveries(&hook.name)?;
-            let last_try =
-                |delivery: &Delivery| delivery.tried.last().map(|tried| tried.at.clone());
-            deliveries.retain(|delivery| !delivery.tried.is_empty());
-            let latest = deliveries.into_iter().max_by_key(last_try);
+            let latest = latest(self.store.deliveries(&hook.name)?);
             let config = &hook.receiver().config;
             let state = lock(&hook.state);
             list.push(Webhook {
@@ -401,6 +405,35 @@ mod tests {
         for other in [of("b", "left"), of("a", "right")] {
             assert_ne!(told.delivery.id, other.delivery.id);
         }
+    }
+
+    #[test]
+    fn of_two_tried_in_one_millisecond_the_newer_is_the_latest() {
+        let tried = |id: &str, at: Option<&str>| -> Delivery {
+            let tried: Vec<_> = at
+                .map(|at| serde_json::json!({ "at": at, "milliseconds": 1 }))
+                .into_iter()
+                .collect();
+            serde_json::from_value(serde_json::json!({
+                "id": id,
+                "event": "test",
+                "state": "delivered",
+                "created_at": "2026-11-22T10:00:00.000Z",
+                "attempts": tried.len(),
+                "tried": tried,
+            }))
+            .unwrap()
+        };
+        let (earlier, later) = ("2026-11-22T10:00:00.001Z", "2026-11-22T10:00:00.002Z");
+        let newest_first = vec![
+            tried("untried", None),
+            tried("d", Some(earlier)),
+            tried("c", Some(later)),
+            tried("b", Some(later)),
+            tried("a", Some(earlier)),
+        ];
+        assert_eq!(latest(newest_first).unwrap().id, "c");
+        assert_eq!(latest(vec![tried("untried", None)]), None);
     }
 
     #[test]

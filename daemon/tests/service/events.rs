@@ -95,7 +95,9 @@ const NOTE_BYTES: usize = 250_000;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_reader_that_does_not_read_holds_up_nobody() {
-    let rig = Rig::new().await;
+    // Longer than the scans take on a slow disk, so that no idle reader is cut off.
+    let patient = |config: &mut reliefd::Config| config.http.stall_timeout_ms = 600_000;
+    let rig = Rig::start(tempfile::tempdir().unwrap(), patient).await;
     let mut idle = Vec::new();
     for _ in 0..4 {
         idle.push(rig.client.events().await);

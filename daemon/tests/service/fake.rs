@@ -12,6 +12,8 @@ use scanner_driver::{
     Scanner, ScannerError, StreamControl, StreamItem,
 };
 
+use crate::rig::GUARD;
+
 /// Micrometres per count, of table and profile.
 const COUNT_UM: u32 = 1;
 pub(crate) const COLUMNS: u32 = 60;
@@ -126,6 +128,16 @@ impl FakeScanner {
         self.state.lock().unwrap().laser_on
     }
 
+    /// Waits until the laser is off: the thread that delivers turns it off once it sees that
+    /// nobody wants its columns, which may be after the scan has ended for the service.
+    pub(crate) fn laser_goes_off(&self) {
+        let state = self.state.lock().unwrap();
+        let waited = self
+            .changed
+            .wait_timeout_while(state, GUARD, |state| state.laser_on);
+        assert!(!waited.unwrap().1.timed_out(), "the laser stays on");
+    }
+
     pub(crate) fn acknowledged(&self) -> Vec<u32> {
         self.acknowledged.lock().unwrap().clone()
     }
@@ -157,8 +169,9 @@ impl FakeScanner {
                     needs_person,
                     columns: first,
                 };
-                let _ = sender.send(StreamItem::Paused(pause));
+                // First, so that whoever hears of the pause can end it.
                 scanner.change(|state| state.is_paused = needs_person);
+                let _ = sender.send(StreamItem::Paused(pause));
                 scanner.wait_for_resume();
                 let _ = sender.send(StreamItem::Resumed);
             }

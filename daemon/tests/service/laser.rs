@@ -122,12 +122,7 @@ async fn a_scan_without_a_place_to_keep_it_ends_with_the_laser_off() {
     let scan = rig.start_scan("nowhere").await;
     let scan = ended(&mut events, &scan.id).await;
     assert_eq!(scan.state, ScanState::Failed);
-    let off = async {
-        while rig.scanner.laser_is_on() {
-            tokio::time::sleep(Duration::from_millis(5)).await;
-        }
-    };
-    tokio::time::timeout(GUARD, off).await.expect("laser off");
+    rig.scanner.laser_goes_off();
     known_as(&rig.client, LaserState::Off).await;
     rig.daemon.shutdown().await;
 }
@@ -192,7 +187,10 @@ async fn scanning(dead_man_ms: u32) -> Running {
 }
 
 fn start(folder: &Path) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_reliefd"))
+    // What a shell runs in its background inherits that these are ignored; a service does not.
+    Command::new("env")
+        .arg("--default-signal=QUIT,INT")
+        .arg(env!("CARGO_BIN_EXE_reliefd"))
         .arg("--config")
         .arg(folder.join("c.toml"))
         // Where a core dump is removed with all else.
@@ -283,16 +281,18 @@ async fn killed_in_any_way_the_service_leaves_the_laser_to_the_dead_man() {
         let client = up(&at).await;
         known_as(&client, LaserState::On).await;
         let logged = running.logged();
-        let unknown: Vec<&LaserEntry> = logged
-            .iter()
-            .filter(|entry| entry.laser == LaserState::Unknown)
-            .collect();
-        // In between the scanner may have been asked.
-        let ([.., dead, taken_up], Some(on)) = (unknown.as_slice(), logged.last()) else {
+        // In between the scanner may have been asked, and more be said of the pause.
+        let unknown = |cause: &str| {
+            let is_it = |entry: &LaserEntry| {
+                entry.laser == LaserState::Unknown && entry.cause.contains(cause)
+            };
+            logged.iter().position(is_it)
+        };
+        let (Some(dead), Some(taken_up)) = (unknown("dead-man"), unknown("taken up")) else {
             panic!("{logged:?}");
         };
-        assert!(dead.cause.contains("dead-man"), "{dead:?}");
-        assert!(taken_up.cause.contains("taken up"), "{taken_up:?}");
+        assert!(dead < taken_up, "{logged:?}");
+        let (taken_up, on) = (&logged[taken_up], logged.last().unwrap());
         assert!(on.scan.is_some() && on.scan == taken_up.scan, "{logged:?}");
         running.signal(Signal::SIGTERM);
         assert!(running.child.wait().unwrap().success());

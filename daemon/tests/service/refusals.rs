@@ -11,6 +11,13 @@ async fn refused(client: &Client, method: &str, path: &str, body: Option<&str>) 
     client.request(method, path, body).await.problem()
 }
 
+fn is_ready(event: &Event) -> Option<()> {
+    match event {
+        Event::Scanner(scanner) if scanner.link == ScannerLink::Ready => Some(()),
+        _ => None,
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn wrong_requests_are_refused_with_a_way_out() {
     let rig = Rig::new().await;
@@ -129,6 +136,12 @@ async fn one_scan_at_a_time() {
 #[tokio::test(flavor = "multi_thread")]
 async fn trouble_with_the_scanner_is_told_in_its_own_words() {
     let rig = Rig::new().await;
+    let mut events = rig.client.events().await;
+    let status: Status = rig.client.get(path::STATUS).await;
+    if status.scanner.link != ScannerLink::Ready {
+        // So that what the first look at it has seen is not noted after the trouble.
+        events.until(is_ready).await;
+    }
     let port = || "/dev/ttyUSB7".to_owned();
     for (trouble, status, kind, text, key) in [
         (
@@ -316,10 +329,6 @@ async fn a_scanner_swapped_while_nothing_is_scanned_is_told_of_at_once() {
     .await;
     let mut events = rig.client.events().await;
     let status: Status = rig.client.get(path::STATUS).await;
-    let is_ready = |event: &Event| match event {
-        Event::Scanner(scanner) if scanner.link == ScannerLink::Ready => Some(()),
-        _ => None,
-    };
     if status.scanner.link != ScannerLink::Ready {
         events.until(is_ready).await;
     }

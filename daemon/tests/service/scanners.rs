@@ -291,7 +291,7 @@ async fn an_abort_of_all_turns_the_laser_off_beside_a_scanner_that_hangs() {
         (over.state, over.reason.as_deref()),
         (ScanState::Aborted, Some("aborted on request"))
     );
-    assert!(!rig.of("right").laser_is_on());
+    rig.of("right").laser_goes_off();
     assert!(!asked.is_finished(), "it waits for the scanner that hangs");
     drop(hung);
     let aborted = asked.await.unwrap();
@@ -414,11 +414,11 @@ async fn an_end_of_the_service_waits_for_no_scanner_to_turn_off_another() {
     let (left, other) = (Arc::clone(rig.of("left")), Arc::clone(rig.of("right")));
     let ending = tokio::spawn(rig.daemon.shutdown());
     ended_in_time(&mut events, &right).await;
-    assert!(!other.laser_is_on());
+    other.laser_goes_off();
     assert!(!ending.is_finished());
     drop(hung);
     ending.await.unwrap();
-    assert!(!left.laser_is_on());
+    left.laser_goes_off();
 }
 
 #[tokio::test(flavor = "multi_thread")]

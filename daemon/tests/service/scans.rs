@@ -183,7 +183,7 @@ async fn a_defect_in_mid_scan_turns_the_laser_off_and_keeps_the_columns() {
     left.store(1, Ordering::Relaxed);
     rig.scanner.allow(SYNCED + 1);
     let scan = ended(&mut events, &scan.id).await;
-    assert!(!rig.scanner.laser_is_on());
+    rig.scanner.laser_goes_off();
     assert_eq!(scan.state, ScanState::Failed);
     let reason = scan.reason.unwrap();
     assert!(reason.contains("a defect made for this test"), "{reason}");
@@ -207,7 +207,7 @@ async fn an_aborted_scan_is_kept_and_can_be_run() {
     assert!(rig.scanner.laser_is_on());
     let _: Scan = rig.client.ask(&path::scan_abort(&scan.id)).await;
     let scan = ended(&mut events, &scan.id).await;
-    assert!(!rig.scanner.laser_is_on());
+    rig.scanner.laser_goes_off();
     assert_eq!((scan.state, scan.columns), (ScanState::Aborted, 30));
     assert_eq!(scan.reason.as_deref(), Some("aborted on request"));
     assert_eq!(
@@ -268,7 +268,7 @@ async fn stopping_the_service_ends_its_scan_with_the_laser_off() {
         .await;
     let scanner = Arc::clone(&rig.scanner);
     let rig = rig.restart().await;
-    assert!(!scanner.laser_is_on());
+    scanner.laser_goes_off();
     while events.next().await.is_some() {}
     let list: ScanList = rig.client.get(path::SCANS).await;
     assert_eq!(list.scans.len(), 1);

@@ -79,7 +79,10 @@ fn a_lock_that_is_never_given_back_gets_no_food() {
     });
     heard.recv_timeout(LIMIT).unwrap();
     let held = lock.lock().unwrap();
-    assert!(is_silent(&heard));
+    while heard.try_recv().is_ok() {}
+    // Of a look that ended just before, what it saw is still to be told, however late.
+    let told = (0..2).filter(|_| heard.recv_timeout(A_WHILE).is_ok());
+    assert!(told.count() <= 1);
     drop(held);
     heard.recv_timeout(LIMIT).unwrap();
 }

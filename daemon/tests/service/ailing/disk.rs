@@ -16,6 +16,8 @@ struct Ailment {
     /// Files can be made and opened all the same, as on a full disk.
     only_writes: bool,
     free_bytes: Option<u64>,
+    /// It falls ill with this once a result gets its name in the spool.
+    from_result_on: Option<(&'static str, Errno)>,
     /// How often it has refused something.
     refusals: u32,
     /// It does not say what is free until it is healed.
@@ -33,6 +35,11 @@ impl Ailing {
         let mut ailment = self.0.lock().unwrap();
         ailment.error = Some(error);
         ailment.ending = ending;
+    }
+
+    /// The same from the moment on in which the next result gets its name in the spool.
+    pub(crate) fn refuse_from_result_on(&self, ending: &'static str, error: Errno) {
+        self.0.lock().unwrap().from_result_on = Some((ending, error));
     }
 
     /// From now on such files can be made, but nothing is written to them.
@@ -71,6 +78,15 @@ impl Ailing {
 impl Hindrance for Ailing {
     fn before(&self, deed: Deed, path: &Path) -> io::Result<()> {
         let mut ailment = self.0.lock().unwrap();
+        let in_spool = path
+            .parent()
+            .is_some_and(|folder| folder.ends_with("spool"));
+        if deed == Deed::Rename
+            && in_spool
+            && let Some((ending, error)) = ailment.from_result_on.take()
+        {
+            (ailment.ending, ailment.error) = (ending, Some(error));
+        }
         match ailment.error {
             Some(error)
                 if deed != Deed::Remove

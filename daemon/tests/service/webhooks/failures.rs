@@ -1,10 +1,10 @@
 //! Receivers that do not do what they should.
 
-use std::net::TcpListener;
 use std::time::Duration;
 
 use relief_api::{Delivery, DeliveryState, Status, WebhookEvent, path};
 use reliefd::config::Retry;
+use tokio::net::TcpSocket;
 
 use super::receiver::{Answer, Receiver};
 use super::{SECRET, log, settled, start, telling, until_delivered, webhook};
@@ -70,7 +70,7 @@ async fn a_receiver_that_hangs_holds_up_nobody_else() {
         let mut hanging = webhook(folder, "hanging", &hangs.url());
         hanging.timeout_ms = 25_000;
         let mut told = webhook(folder, "lab", &other.url());
-        told.timeout_ms = 500;
+        told.timeout_ms = 5_000;
         vec![hanging, told]
     })
     .await;
@@ -90,7 +90,7 @@ async fn a_receiver_that_hangs_holds_up_nobody_else() {
     let address = other.address;
     assert_eq!(
         error(&timed_out),
-        format!("{address} did not answer within 500 ms (timeout_ms)")
+        format!("{address} did not answer within 5000 ms (timeout_ms)")
     );
     // It has not ended yet when the service does.
     rig.daemon.shutdown().await;
@@ -98,10 +98,10 @@ async fn a_receiver_that_hangs_holds_up_nobody_else() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_receiver_that_is_away_is_told_when_it_is_back() {
-    let address = TcpListener::bind("127.0.0.1:0")
-        .unwrap()
-        .local_addr()
-        .unwrap();
+    // Nobody else gets the port meanwhile; connections are refused until somebody listens.
+    let away = TcpSocket::new_v4().unwrap();
+    away.bind("127.0.0.1:0".parse().unwrap()).unwrap();
+    let address = away.local_addr().unwrap();
     let rig = start(|folder| {
         let mut webhook = webhook(folder, "lab", &format!("http://{address}/"));
         webhook.events = vec![WebhookEvent::JobDone];
@@ -115,7 +115,9 @@ async fn a_receiver_that_is_away_is_told_when_it_is_back() {
         error(&waits),
         format!("{address} refuses the connection: is the receiver running?")
     );
-    let receiver = Receiver::at(address, []);
+    let listener = away.listen(16).unwrap().into_std().unwrap();
+    listener.set_nonblocking(false).unwrap();
+    let receiver = Receiver::on(listener, []);
     assert_eq!(receiver.next().id(), waits.id);
     until_delivered(&rig).await;
     rig.daemon.shutdown().await;

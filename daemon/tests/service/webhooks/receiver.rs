@@ -113,21 +113,24 @@ pub(crate) type Wrap = Box<dyn Fn(TcpStream) -> Box<dyn Talk> + Send + Sync>;
 pub(crate) trait Talk: Read + Write + Send {}
 impl<T: Read + Write + Send> Talk for T {}
 
+pub(crate) fn any_port() -> TcpListener {
+    TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap()
+}
+
 impl Receiver {
     pub(crate) fn new(answers: impl IntoIterator<Item = Answer>) -> Self {
-        Self::at((Ipv4Addr::LOCALHOST, 0).into(), answers)
+        Self::on(any_port(), answers)
     }
 
-    pub(crate) fn at(address: SocketAddr, answers: impl IntoIterator<Item = Answer>) -> Self {
-        Self::speaking(address, answers, Box::new(|stream| Box::new(stream)))
+    pub(crate) fn on(listener: TcpListener, answers: impl IntoIterator<Item = Answer>) -> Self {
+        Self::speaking(listener, answers, Box::new(|stream| Box::new(stream)))
     }
 
     pub(crate) fn speaking(
-        address: SocketAddr,
+        listener: TcpListener,
         answers: impl IntoIterator<Item = Answer>,
         wrap: Wrap,
     ) -> Self {
-        let listener = TcpListener::bind(address).unwrap();
         let address = listener.local_addr().unwrap();
         let script: Script = Arc::new(Mutex::new(answers.into_iter().collect()));
         let (sender, got) = mpsc::channel();

@@ -8,7 +8,7 @@ use relief_api::{Delivery, DeliveryState, path};
 use rustls::pki_types::PrivatePkcs8KeyDer;
 use rustls::{ServerConfig, ServerConnection, StreamOwned, crypto::ring};
 
-use super::receiver::{Answer, Receiver, Wrap};
+use super::receiver::{Answer, Receiver, Wrap, any_port};
 use super::{SECRET, start, webhook};
 
 /// The authority of a lab.
@@ -35,7 +35,7 @@ fn receiver(authority: &CertifiedIssuer<'static, KeyPair>, name: &str) -> Receiv
         let connection = ServerConnection::new(Arc::clone(&config)).unwrap();
         Box::new(StreamOwned::new(connection, stream))
     });
-    Receiver::speaking("127.0.0.1:0".parse().unwrap(), [], wrap)
+    Receiver::speaking(any_port(), [], wrap)
 }
 
 #[tokio::test(flavor = "multi_thread")]
