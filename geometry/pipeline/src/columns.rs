@@ -1,13 +1,14 @@
 //! Columns that can be gone through more than once.
 
 use range_image::Column;
+use regrid::Roi;
 
 /// What goes wrong when columns are read again.
 pub type ReadAgainError = Box<dyn core::error::Error + Send + Sync>;
 
 /// The columns of a scan, to be gone through as often as needed: the range image says where
-/// surfaces are, the samples then say exactly how they run. They may be in memory or not; they
-/// are gone through while another thread makes the model.
+/// surfaces are, the samples then say exactly how they run and where they end. They may be in memory
+/// or not; they are gone through while another thread makes the model, and once it is made.
 pub trait Columns: Sync {
     /// Hands every column to `take`, in their order, until one is refused with `false`.
     ///
@@ -19,6 +20,32 @@ pub trait Columns: Sync {
     /// known; they run along z otherwise.
     fn camera_mm(&self) -> Option<[f64; 2]> {
         None
+    }
+}
+
+/// Columns as far as they lie in the region of interest: what lies outside of it is not there.
+pub(crate) struct Within<'a> {
+    pub(crate) columns: &'a dyn Columns,
+    pub(crate) roi: Roi,
+}
+
+impl Columns for Within<'_> {
+    fn visit(&self, take: &mut dyn FnMut(&Column) -> bool) -> Result<(), ReadAgainError> {
+        if self.roi == Roi::default() {
+            return self.columns.visit(take);
+        }
+        let within = |value: f64, (low, high): (f64, f64)| low <= value && value <= high;
+        self.columns.visit(&mut |column| {
+            let is_there = within(column.x_mm(), self.roi.x_mm);
+            let samples = column.samples().iter().filter(|sample| {
+                is_there && within(sample.y_mm, self.roi.y_mm) && within(sample.z_mm, self.roi.z_mm)
+            });
+            take(&Column::new(column.x_mm(), samples.copied().collect()))
+        })
+    }
+
+    fn camera_mm(&self) -> Option<[f64; 2]> {
+        self.columns.camera_mm()
     }
 }
 

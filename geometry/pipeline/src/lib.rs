@@ -15,7 +15,9 @@ mod columns;
 mod extent;
 mod kinds;
 mod method;
+mod neighbourhood;
 mod observer;
+mod outlines;
 mod part;
 mod process;
 mod settings;
@@ -26,6 +28,7 @@ pub use extent::{Extent, finest_pitch_mm, no_surface, unusual_size};
 pub use kinds::{Basis, Kinds, RegionKind, UnknownKinds};
 pub use method::{Method, UnknownMethod};
 pub use observer::{Observer, Stage};
+pub use outlines::SettledNodes;
 pub use part::{Part, divide};
 pub use process::{
     Outcome, PipelineError, process, process_columns, process_in_view, process_scan,

@@ -1,13 +1,15 @@
 //! The stages in their order.
 
 use range_image::{Cancelled, Column, RangeImage, RegionMap};
-use reconstruct::{Fitted, Method, ReconstructError, Reconstruction};
+use reconstruct::metrics::compare;
+use reconstruct::{Evidence, Fitted, Method, ReconstructError, Reconstruction};
 use regrid::RegridError;
 use segment::SegmentError;
 use shapes::Shape;
 
-use crate::columns::{Columns, InMemory, ReadAgainError};
+use crate::columns::{Columns, InMemory, ReadAgainError, Within};
 use crate::kinds::{RegionKind, kinds};
+use crate::outlines::{self, Removed, SettledNodes, settle_nodes};
 use crate::part::divide;
 use crate::{Background, Crumb, Kinds, NodeRole, View};
 use crate::{Observer, Settings, SettingsError, Stage};
@@ -28,6 +30,10 @@ pub struct Outcome {
     pub kinds: Vec<RegionKind>,
     /// The model made of them, and how well it fits.
     pub reconstruction: Reconstruction,
+    /// The part's range image with the nodes beside its outlines decided anew by these. The
+    /// reconstruction's metrics are against it. `None` where there were no samples to settle the
+    /// outlines by: then they are against the range image as it was.
+    pub settled: Option<SettledNodes>,
     /// The stages that ran, in order.
     pub stages: Vec<Stage>,
 }
@@ -239,25 +245,59 @@ fn in_view(
         });
     }
 
+    let within = columns.map(|columns| Within { columns, roi });
+    let columns = within.as_ref().map(|within| within as &dyn Columns);
     let view = view.within(roi.x_mm, roi.y_mm);
     let part = divide(image, &view, settings, observer)?;
 
     observer.stage(Stage::Reconstruct);
     let part_image = part.image.as_ref().unwrap_or(image);
-    let of_kinds = || kinds(part_image, &part.regions, columns, observer);
-    let fit = || Fitted::of(part_image, &part.regions, &settings.reconstruct, observer);
-    let takes_shapes =
-        settings.kinds == Kinds::Auto && settings.reconstruct.method == Method::Relief;
-    let (reconstruction, kinds) = if takes_shapes {
-        let (fitted, kinds) = rayon::join(fit, of_kinds);
-        let (fitted, kinds) = (fitted?, kinds?);
-        let shapes: Vec<Option<Shape>> = kinds.iter().map(RegionKind::shape).collect();
-        (fitted.reconstruct(&shapes, observer)?, kinds)
-    } else {
-        let free_form = || fit()?.reconstruct(&[], observer);
-        let (reconstruction, kinds) = rayon::join(free_form, of_kinds);
-        (reconstruction?, kinds?)
+    let is_relief = settings.reconstruct.method == Method::Relief;
+    let of_samples = || {
+        let kinds = kinds(part_image, &part.regions, columns, observer)?;
+        let removed = part.image.is_some().then_some(Removed {
+            image,
+            roles: &part.roles,
+        });
+        let beside = match columns {
+            Some(columns) if is_relief => {
+                outlines::samples(part_image, &part.regions, removed, columns, observer)?
+            }
+            _ => Some(Vec::new()),
+        };
+        Ok::<_, PipelineError>((kinds, beside))
     };
+    let fit = || Fitted::of(part_image, &part.regions, &settings.reconstruct, observer);
+    let (fitted, of_samples) = rayon::join(fit, of_samples);
+    let (fitted, (kinds, beside)) = (fitted?, of_samples?);
+    let are_too_many = beside.is_none();
+    let beside = beside.unwrap_or_default();
+    let mut shapes: Vec<Option<Shape>> = Vec::new();
+    if settings.kinds == Kinds::Auto && is_relief {
+        shapes.extend(kinds.iter().map(RegionKind::shape));
+    }
+    let evidence = Evidence {
+        shapes: &shapes,
+        outline_samples: &beside,
+    };
+    let mut reconstruction = fitted.reconstruct(evidence, observer)?;
+    if are_too_many {
+        let told = "there are too many samples beside outlines to look at all of them: outlines run \
+                    by the nodes, half a pitch less sharp";
+        reconstruction.warnings.push(told.to_owned());
+    }
+    let mut settled = None;
+    if let Some(columns) = columns.filter(|_| !beside.is_empty()) {
+        let nodes = settle_nodes(
+            part_image,
+            &part.regions,
+            &reconstruction,
+            columns,
+            observer,
+        )?;
+        reconstruction.metrics = compare(&nodes.image, &reconstruction.restored);
+        settled = Some(nodes);
+    }
     Ok(Outcome {
         regions: part.regions,
         background: part.background,
@@ -265,6 +305,7 @@ fn in_view(
         crumbs: part.crumbs,
         kinds,
         reconstruction,
+        settled,
         stages: vec![Stage::Segment, Stage::Reconstruct],
     })
 }

@@ -91,7 +91,12 @@ fn a_range_image_alone_is_not_regridded() {
     let from_image = process(&image, &settings, &Unmonitored).unwrap();
     assert_eq!(from_image.stages, [Stage::Segment, Stage::Reconstruct]);
     assert_eq!(from_image.regions, with_columns.regions);
-    assert_eq!(from_image.reconstruction, with_columns.reconstruction);
+    // Samples tell more of the outline, and nothing of the surfaces.
+    let fits = |outcome: &Outcome| {
+        let each = outcome.reconstruction.regions.iter();
+        each.map(|fit| (fit.nodes, fit.rms_mm)).collect::<Vec<_>>()
+    };
+    assert_eq!(fits(&from_image), fits(&with_columns));
     let basis = |outcome: &Outcome| {
         outcome
             .kinds

@@ -4,10 +4,12 @@ use nurbs::{PatchSurface, PiecewiseCubic};
 use range_image::RangeImage;
 use shapes::Shape;
 
-use crate::border::map::PlanarMap;
+use crate::border::map::{MapEdge, PlanarMap};
 use crate::fit::Domain;
 use crate::lift::lift;
-use crate::model::{Coedge, Edge, EdgeId, EdgeKind, Face, Loop, Model, Surface, Vertex, VertexId};
+use crate::model::{
+    Coedge, Edge, EdgeId, EdgeKind, EdgeOrigin, Face, Loop, Model, Surface, Vertex, VertexId,
+};
 use crate::polygon::{dot, minus, norm};
 
 /// Places along an edge at which its two surfaces are compared.
@@ -103,8 +105,27 @@ pub(crate) struct Carrier {
     pub(crate) rms_mm: f64,
 }
 
-/// Joins the map and the surfaces; `carriers[k]` belongs to piece `k + 1`.
-pub(crate) fn model(map: &PlanarMap, carriers: Vec<Carrier>, placement: Placement) -> Model {
+/// What the edges of a map are; `carriers[k]` belongs to piece `k + 1`.
+pub(crate) fn kinds(map: &PlanarMap, carriers: &[Carrier], placement: Placement) -> Vec<EdgeKind> {
+    let side = |s: u32| carriers.get((s as usize).wrapping_sub(1));
+    let kind = |edge: &MapEdge| match (side(edge.sides[0]), side(edge.sides[1])) {
+        (Some(a), Some(b)) => {
+            let path = placement.path_to_mm(&edge.path);
+            kind_between(a, b, &path, placement.pitch_mm)
+        }
+        _ => EdgeKind::Silhouette,
+    };
+    map.edges.iter().map(kind).collect()
+}
+
+/// Joins the map and the surfaces; `carriers[k]` belongs to piece `k + 1`, and `kinds` and
+/// `origins` to the map's edges.
+pub(crate) fn model(
+    map: &PlanarMap,
+    carriers: Vec<Carrier>,
+    (kinds, origins): (&[EdgeKind], &[EdgeOrigin]),
+    placement: Placement,
+) -> Model {
     let vertices: Vec<Vertex> = map
         .vertices
         .iter()
@@ -116,20 +137,17 @@ pub(crate) fn model(map: &PlanarMap, carriers: Vec<Carrier>, placement: Placemen
     let edges: Vec<Edge> = map
         .edges
         .iter()
-        .map(|edge| {
+        .zip(kinds.iter().zip(origins))
+        .map(|(edge, (&kind, &origin))| {
             let mut path = placement.path_to_mm(&edge.path);
             let start = vertices[edge.start];
             path.pieces[0][0][0] = start.x_mm;
             path.pieces[0][1][0] = start.y_mm;
-            let side = |s: u32| carriers.get((s as usize).wrapping_sub(1));
-            let kind = match (side(edge.sides[0]), side(edge.sides[1])) {
-                (Some(a), Some(b)) => kind_between(a, b, &path, placement.pitch_mm),
-                _ => EdgeKind::Silhouette,
-            };
             Edge {
                 start: VertexId(edge.start),
                 end: VertexId(edge.end),
                 kind,
+                origin,
                 path,
             }
         })

@@ -19,8 +19,10 @@ pub mod settings;
 mod accept;
 mod assemble;
 mod border;
+mod evidence;
 mod known;
 mod lift;
+mod meeting;
 mod noise;
 mod pieces;
 mod refine;
@@ -29,7 +31,10 @@ mod run;
 mod testing;
 mod trim;
 
+pub use evidence::{Evidence, OutlineSample, Seen};
 pub use metrics::Metrics;
-pub use model::{Coedge, Edge, EdgeId, EdgeKind, Face, Loop, Model, Surface, Vertex, VertexId};
+pub use model::{
+    Coedge, Edge, EdgeId, EdgeKind, EdgeOrigin, Face, Loop, Model, Surface, Vertex, VertexId,
+};
 pub use run::{Fitted, Reconstruction, RegionFit, reconstruct};
 pub use settings::{Method, ReconstructError, ReconstructSettings, SettingsError};

@@ -45,6 +45,8 @@ pub struct Edge {
     pub end: VertexId,
     /// What the border is.
     pub kind: EdgeKind,
+    /// How it is known where it runs.
+    pub origin: EdgeOrigin,
     /// The path in the x-y plane, from `start` to `end`; one or more cubic pieces with
     /// arc length as parameter (Shim & Lee 1995, equation 7), to a few per cent where they
     /// are curved.
@@ -60,6 +62,17 @@ pub enum EdgeKind {
     Step,
     /// The surface is continuous, its normal is not.
     Crease,
+}
+
+/// How it is known where an edge runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum EdgeOrigin {
+    /// The samples beside it tell.
+    Measured,
+    /// The surfaces on its two sides intersect there.
+    Intersected,
+    /// It is drawn between the nodes of its two sides, and nothing tells more.
+    Assumed,
 }
 
 /// A trimmed surface.

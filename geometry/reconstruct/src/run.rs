@@ -1,19 +1,22 @@
 //! The whole road from regions to the model.
 
 use nurbs::{Observation, PatchSurface};
-use range_image::{Monitor, RangeImage, RegionMap};
+use range_image::{Cancelled, Monitor, RangeImage, RegionMap};
 use rayon::prelude::*;
 use shapes::Shape;
 
 use crate::accept::is_as_good;
-use crate::assemble::{Carrier, Placement, domains, model};
+use crate::assemble::{Carrier, Placement, domains, kinds, model};
 use crate::border::cracks::trace;
 use crate::border::intersection::intersections;
 use crate::border::map::{BorderSettings, PlanarMap, build};
+use crate::border::settle::{Outlines, Placed};
+use crate::evidence::Evidence;
 use crate::fit::{Demand, Domain, FitError, patches_from_spline, patches_through_nodes};
 use crate::known;
+use crate::meeting::meet;
 use crate::metrics::{Metrics, compare, psnr_db};
-use crate::model::{Model, Surface};
+use crate::model::{EdgeKind, EdgeOrigin, Model, Surface};
 use crate::noise::ImageNoise;
 use crate::pieces::{PieceLimits, PieceMap};
 use crate::settings::{Method, ReconstructError, ReconstructSettings};
@@ -26,6 +29,9 @@ pub struct Reconstruction {
     pub model: Model,
     /// z of the trimmed faces at the nodes of the range image; masked outside all faces.
     pub restored: RangeImage,
+    /// Which face that is, counted from 1, column by column as [`RangeImage::raw_z_mm`]; 0
+    /// outside all faces.
+    pub face_at: Vec<u32>,
     /// How each region that gave a face was met, in the order of labels.
     pub regions: Vec<RegionFit>,
     /// The restored image against the range image.
@@ -84,7 +90,7 @@ pub fn reconstruct(
     settings: &ReconstructSettings,
     monitor: &dyn Monitor,
 ) -> Result<Reconstruction, ReconstructError> {
-    Fitted::of(image, map, settings, monitor)?.reconstruct(&[], monitor)
+    Fitted::of(image, map, settings, monitor)?.reconstruct(Evidence::default(), monitor)
 }
 
 /// Regions with a free-form surface each, the first half of the road: what kinds of surface they
@@ -151,19 +157,19 @@ impl<'a> Fitted<'a> {
         Ok(all)
     }
 
-    /// Draws the borders, and makes the model. Regions of which a shape is known, by label from 1
-    /// on, get that in place of the free-form surface, where their nodes are met by it as well.
-    /// By the letter of the paper none is.
+    /// Draws the borders, and makes the model. Regions of which a shape is known get that in
+    /// place of the free-form surface, where their nodes are met by it as well, and outlines run
+    /// where the samples beside them say.
     ///
     /// # Errors
     /// [`ReconstructError`] when a surface cannot be fitted, or the caller cancels.
     pub fn reconstruct(
         mut self,
-        shapes: &[Option<Shape>],
+        evidence: Evidence<'_>,
         monitor: &dyn Monitor,
     ) -> Result<Reconstruction, ReconstructError> {
         let (image, settings) = (self.image, self.settings);
-        let shapes = self.take_over(shapes, monitor)?;
+        let shapes = self.take_over(evidence.shapes, monitor)?;
         let borders = BorderSettings {
             literal: settings.method == Method::ShimLee,
             corner_cosine: libm::cos(settings.corner_angle_rad),
@@ -174,7 +180,19 @@ impl<'a> Fitted<'a> {
         let cracks = trace(&self.pieces);
         let placed = intersections(&cracks, &self.surfaces, placement);
         monitor.progress(0.4);
-        let planar = build(&cracks, &placed, &borders, monitor)?;
+        let outlines = Outlines {
+            samples: evidence
+                .outline_samples
+                .iter()
+                .map(|sample| Placed {
+                    region: sample.region,
+                    place: placement.to_pitches(sample.place_mm),
+                    seen: sample.seen,
+                })
+                .collect(),
+            regions: self.pieces.regions.clone(),
+        };
+        let mut planar = build(&cracks, &placed, &outlines, &borders, monitor)?;
 
         let names = names(&self.pieces.regions);
         let mut carriers = Vec::with_capacity(self.nodes.len());
@@ -196,15 +214,22 @@ impl<'a> Fitted<'a> {
         for fit in &mut fits {
             fit.psnr_db = psnr_db(fit.rms_mm);
         }
-        let model = model(&planar, carriers, placement);
+        let kinds = kinds(&planar, &carriers, placement);
+        let origins = if settings.method == Method::Relief {
+            origins(&mut planar, &carriers, &kinds, placement, monitor)?
+        } else {
+            vec![EdgeOrigin::Assumed; kinds.len()]
+        };
+        let model = model(&planar, carriers, (&kinds, &origins), placement);
         monitor.check()?;
-        let restored = restore(image, &model, placement, &mut fits);
+        let (restored, face_at) = restore(image, &model, placement, &mut fits);
         monitor.progress(1.0);
         Ok(Reconstruction {
             metrics: compare(image, &restored),
             warnings: warnings(&self.pieces, &planar, self.map),
             model,
             restored,
+            face_at,
             regions: fits,
             filled_holes: (self.pieces.filled_holes, self.pieces.filled_nodes),
             unsmoothed_borders: planar.unsmoothed,
@@ -292,6 +317,27 @@ impl<'a> Fitted<'a> {
             reason: e.to_string(),
         })
     }
+}
+
+/// Puts creases where their surfaces intersect; gives how it is known where each edge runs.
+fn origins(
+    planar: &mut PlanarMap,
+    carriers: &[Carrier],
+    kinds: &[EdgeKind],
+    placement: Placement,
+    monitor: &dyn Monitor,
+) -> Result<Vec<EdgeOrigin>, Cancelled> {
+    let surfaces: Vec<&PatchSurface> = carriers.iter().map(|carrier| &carrier.surface).collect();
+    let is_crease: Vec<bool> = kinds.iter().map(|kind| *kind == EdgeKind::Crease).collect();
+    let is_met = meet(planar, &surfaces, &is_crease, placement, monitor)?;
+    let edges = planar.edges.iter().zip(is_met);
+    Ok(edges
+        .map(|(edge, is_met)| match (is_met, edge.is_settled) {
+            (true, _) => EdgeOrigin::Intersected,
+            (false, true) => EdgeOrigin::Measured,
+            (false, false) => EdgeOrigin::Assumed,
+        })
+        .collect())
 }
 
 fn check_input(image: &RangeImage, map: &RegionMap) -> Result<(), ReconstructError> {
@@ -452,17 +498,19 @@ fn names(regions: &[u16]) -> Vec<String> {
     names
 }
 
-/// z of the trimmed faces at the nodes of the image; their areas go to the account.
+/// z of the trimmed faces at the nodes of the image, and which face that is; their areas go to
+/// the account.
 fn restore(
     image: &RangeImage,
     model: &Model,
     placement: Placement,
     fits: &mut [RegionFit],
-) -> RangeImage {
+) -> (RangeImage, Vec<u32>) {
     let pitch_mm = image.pitch_mm();
     let (x_mm, y_mm) = (image.x_mm(0), image.y_mm(0));
     let mut restored = image.masked_like();
-    for face in &model.faces {
+    let mut face_at = vec![0; image.raw_z_mm().len()];
+    for (face, number) in model.faces.iter().zip(1..) {
         let Surface::Patches(surface) = &face.surface;
         let loops = core::iter::once(&face.outer).chain(&face.inner);
         let curves = loops.map(|l| l.coedges.iter().map(|c| &c.parameter_curve));
@@ -470,6 +518,7 @@ fn restore(
         trim.nodes(image.columns(), image.rows(), |column, row| {
             let z = surface.z(image.x_mm(column), image.y_mm(row));
             restored.set_z_mm(column, row, Some(z));
+            face_at[column * image.rows() + row] = number;
         });
         let area = trim.area(image.columns(), |column, row| {
             let at = (x_mm + column * pitch_mm, y_mm + row * pitch_mm);
@@ -480,7 +529,7 @@ fn restore(
             fit.area_mm2 += area * pitch_mm * pitch_mm;
         }
     }
-    restored
+    (restored, face_at)
 }
 
 fn warnings(pieces: &PieceMap, planar: &PlanarMap, map: &RegionMap) -> Vec<String> {

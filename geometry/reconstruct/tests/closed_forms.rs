@@ -6,7 +6,7 @@ use common::{
     Part, Point, contains, hausdorff, loop_points, one_way, outline, part_of, run, scene, surface_z,
 };
 use reconstruct::polygon::signed_area;
-use reconstruct::{EdgeKind, Method};
+use reconstruct::{EdgeKind, EdgeOrigin, Method, Model};
 
 /// A house in oblique view: two walls and two roof planes that meet in four
 /// creases; eight corners, one of them inside.
@@ -95,6 +95,108 @@ fn the_house_keeps_its_corners_outlines_and_areas() {
                 .filter(|e| e.kind == EdgeKind::Crease)
                 .count();
             assert_eq!(creases, 4);
+            let met = done.model.edges.iter();
+            let met = met.filter(|e| e.origin == EdgeOrigin::Intersected).count();
+            if method == Method::Relief {
+                assert_eq!(met, 4);
+                // Its four planes meet in one corner, but for the noise; creases are led there over
+                // six pitches.
+                let (sin, cos) = libm::sincos(0.13 * f64::from(k));
+                let corner = [cos * 5.0 - sin * 6.0, sin * 5.0 + cos * 6.0];
+                let apart_mm = creases_apart_mm(&done.model, corner, 7.0 * pitch);
+                assert!(apart_mm < 3e-4, "{apart_mm}");
+                assert!(creases_apart_mm(&done.model, corner, 0.0) < 0.02);
+            } else {
+                assert_eq!(met, 0);
+            }
+        }
+    }
+}
+
+/// How far the two curves of a crease are apart at most, of all whose surfaces intersect there,
+/// farther than so far from a place.
+fn creases_apart_mm(model: &Model, from: Point, beyond_mm: f64) -> f64 {
+    let mut greatest = 0.0_f64;
+    for (id, edge) in model.edges.iter().enumerate() {
+        assert!(edge.origin != EdgeOrigin::Intersected || edge.kind == EdgeKind::Crease);
+        if edge.origin != EdgeOrigin::Intersected {
+            continue;
+        }
+        let loops = model
+            .faces
+            .iter()
+            .flat_map(|f| core::iter::once(&f.outer).chain(&f.inner));
+        let uses = loops.flat_map(|l| &l.coedges).filter(|c| c.edge.0 == id);
+        let curves: Vec<_> = uses
+            .map(|c| {
+                if c.reversed {
+                    c.space_curve.reversed()
+                } else {
+                    c.space_curve.clone()
+                }
+            })
+            .collect();
+        assert_eq!(curves.len(), 2);
+        let (first, last) = curves[0].domain();
+        for k in 0..=200 {
+            let at = first + (last - first) * f64::from(k) / 200.0;
+            let [p, q] = [&curves[0], &curves[1]].map(|curve| curve.evaluate(at));
+            if libm::hypot(p[0] - from[0], p[1] - from[1]) >= beyond_mm {
+                greatest = greatest.max((p[2] - q[2]).abs());
+            }
+            assert!((p[0] - q[0]).abs() < 1e-9 && (p[1] - q[1]).abs() < 1e-9);
+        }
+    }
+    greatest
+}
+
+/// A corner of a cube, seen along its diagonal: three planes that meet in the origin.
+#[test]
+fn three_faces_meet_in_one_corner() {
+    for turn in [0.1, 0.37, 0.8] {
+        let ray = move |k: usize| {
+            let (sin, cos) = libm::sincos(turn + k as f64 * core::f64::consts::TAU / 6.0);
+            [cos, sin]
+        };
+        let at = |k: usize| ray(k).map(|c| 40.0 * c);
+        let parts: Vec<Part> = (0..3)
+            .map(|k| {
+                let down = ray(2 * k);
+                let outline = [[0.0; 2], at((2 * k + 5) % 6), at(2 * k), at(2 * k + 1)];
+                Part::new(&outline, move |x, y| {
+                    20.0 - 0.7 * (x * down[0] + y * down[1])
+                })
+            })
+            .collect();
+        let (image, map) = scene(&parts, 0.5, (170, 170), 0.05);
+        let done = run(&image, &map, Method::Relief);
+        let model = &done.model;
+        let met = model
+            .edges
+            .iter()
+            .filter(|e| e.origin == EdgeOrigin::Intersected);
+        assert_eq!(met.clone().count(), 3, "{turn}");
+        let apart_mm = creases_apart_mm(model, [0.0; 2], 0.0);
+        assert!(apart_mm < 3e-4, "{turn}: {apart_mm}");
+        let ends = met.clone().flat_map(|e| [e.start.0, e.end.0]);
+        let corner = ends
+            .clone()
+            .find(|v| ends.clone().filter(|w| w == v).count() == 3);
+        let corner = model.vertices[corner.expect("the three have a common end")];
+        let off_mm = libm::hypot(corner.x_mm, corner.y_mm);
+        assert!(off_mm < 0.02, "{turn}: {off_mm}");
+        // Each lies where the true one does, the last pitch before the outline apart.
+        for edge in met {
+            let (first, last) = edge.path.domain();
+            for k in 0..=100 {
+                let p = edge
+                    .path
+                    .evaluate(first + (last - first) * f64::from(k) / 100.0);
+                let across = (0..3).map(|k| ray(2 * k + 1));
+                let across = across.map(|ray| (p[0] * ray[1] - p[1] * ray[0]).abs());
+                let off_mm = across.fold(f64::INFINITY, f64::min);
+                assert!(off_mm < 0.02, "{turn}: {off_mm}");
+            }
         }
     }
 }

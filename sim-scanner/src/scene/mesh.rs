@@ -8,6 +8,7 @@ use parry3d_f64::shape::TriMesh;
 use thiserror::Error;
 
 use crate::Vec3;
+use crate::scene::FaceSurface;
 
 /// Most triangles taken from a file: more would need gigabytes for the hierarchy.
 pub const TRIANGLES_MAX: usize = 5_000_000;
@@ -41,12 +42,30 @@ pub enum StlError {
     Build(String),
 }
 
+/// How far behind a triangle's back a ray goes on, millimetres.
+const BEHIND_MM: f64 = 1e-7;
+/// Backs of triangles that a ray passes, at most.
+const BACKS_MOST: usize = 64;
+
+/// A face of a closed body, by triangles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeshFace {
+    /// Corners, counter-clockwise from outside, millimetres.
+    pub triangles_mm: Vec<[Vec3; 3]>,
+    /// What the triangles stand for, if it is known: rays then meet that.
+    pub surface: Option<FaceSurface>,
+}
+
 /// A mesh in the coordinates of its file.
 #[derive(Debug, Clone)]
 pub struct Mesh {
     triangles: TriMesh,
     groups: Vec<usize>,
     group_count: usize,
+    /// Of each group; empty where none is known.
+    surfaces: Vec<Option<FaceSurface>>,
+    /// Triangles are to be trusted with orientation.
+    is_oriented: bool,
 }
 
 impl Mesh {
@@ -113,6 +132,42 @@ impl Mesh {
         Ok(mesh)
     }
 
+    /// A closed body of faces that are known, each a group of its own whatever the angles
+    /// between its triangles. Rays go through the backs of triangles: those of a hollow lie
+    /// before the surface that they stand for.
+    ///
+    /// # Errors
+    /// As [`Mesh::new`].
+    pub fn of_faces(faces: &[MeshFace]) -> Result<Self, StlError> {
+        let found = faces.iter().map(|face| face.triangles_mm.len()).sum();
+        if found > TRIANGLES_MAX {
+            return Err(StlError::TooLarge { found });
+        }
+        let (mut vertices_mm, mut indices, mut groups) = (Vec::new(), Vec::new(), Vec::new());
+        for (group, face) in faces.iter().enumerate() {
+            for corners in &face.triangles_mm {
+                let [a, b, c] = *corners;
+                if let Some(corner) = corners.iter().position(|corner| !corner.is_finite()) {
+                    return Err(StlError::NotFinite {
+                        index: vertices_mm.len() + corner,
+                    });
+                }
+                if (b - a).cross(c - a).length_squared() > 0.0 {
+                    // The count is capped, so an index always fits.
+                    let first = u32::try_from(vertices_mm.len()).unwrap_or(u32::MAX);
+                    indices.push([first, first + 1, first + 2]);
+                    vertices_mm.extend(corners);
+                    groups.push(group);
+                }
+            }
+        }
+        let mut mesh = Self::grouped(vertices_mm, indices, groups)?;
+        mesh.group_count = faces.len();
+        mesh.surfaces = faces.iter().map(|face| face.surface).collect();
+        mesh.is_oriented = true;
+        Ok(mesh)
+    }
+
     fn grouped(
         vertices_mm: Vec<Vec3>,
         indices: Vec<[u32; 3]>,
@@ -128,6 +183,8 @@ impl Mesh {
             triangles,
             groups,
             group_count,
+            surfaces: Vec::new(),
+            is_oriented: false,
         })
     }
 
@@ -140,19 +197,38 @@ impl Mesh {
     /// Where a ray meets the mesh: distance, unit normal towards the ray's origin (files are
     /// not to be trusted with orientation), and the face group.
     pub(crate) fn enter(&self, origin: Vec3, direction: Vec3) -> Option<(f64, Vec3, usize)> {
-        let met = self.triangles.cast_local_ray_and_get_normal(
-            &Ray::new(origin, direction),
-            f64::INFINITY,
-            false,
-        )?;
-        let group = *self.groups.get(met.subshape as usize)?;
-        let normal = met.normal.normalize_or_zero();
-        let towards = if normal.dot(direction) <= 0.0 {
-            normal
-        } else {
-            -normal
-        };
-        Some((met.time_of_impact, towards, group))
+        let mut begin_mm = 0.0;
+        for _ in 0..BACKS_MOST {
+            let met = self.triangles.cast_local_ray_and_get_normal(
+                &Ray::new(origin + direction * begin_mm, direction),
+                f64::INFINITY,
+                false,
+            )?;
+            let distance_mm = begin_mm + met.time_of_impact;
+            if self.is_oriented && self.is_back(met.subshape, direction) {
+                begin_mm = distance_mm + BEHIND_MM;
+                continue;
+            }
+            let group = *self.groups.get(met.subshape as usize)?;
+            let surface = self.surfaces.get(group).copied().flatten();
+            let (distance_mm, normal) = surface
+                .and_then(|surface| surface.met_near(origin, direction, distance_mm))
+                .unwrap_or((distance_mm, met.normal.normalize_or_zero()));
+            let towards = if normal.dot(direction) <= 0.0 {
+                normal
+            } else {
+                -normal
+            };
+            return Some((distance_mm, towards, group));
+        }
+        None
+    }
+
+    /// Whether a ray in this direction meets a triangle from within the body.
+    fn is_back(&self, triangle: u32, direction: Vec3) -> bool {
+        let corners = self.triangles.triangle(triangle);
+        let normal = (corners.b - corners.a).cross(corners.c - corners.a);
+        normal.dot(direction) > 0.0
     }
 
     /// Lower and upper corner of the box around the mesh, millimetres.
@@ -260,5 +336,57 @@ mod tests {
         let nothing = b"solid none\nendsolid none\n".to_vec();
         let read = Mesh::read_stl(&mut std::io::Cursor::new(nothing));
         assert!(matches!(read, Err(StlError::Empty)), "{read:?}");
+    }
+
+    /// A ball of coarse triangles that stand for a sphere, turned inside out or not.
+    fn ball(is_hollow: bool) -> Mesh {
+        let at = |i: usize, j: usize| {
+            let (up, around) = (i as f64 / 12.0, j as f64 / 24.0);
+            let (sin, cos) = libm::sincos(core::f64::consts::PI * up);
+            let (y, x) = libm::sincos(core::f64::consts::TAU * around);
+            Vec3::new(sin * x, sin * y, cos) * 2.0
+        };
+        let cells = (0..12).flat_map(|i| (0..24).map(move |j| (i, j)));
+        let triangles = cells.flat_map(|(i, j)| {
+            let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+            [[a, b, c], [a, c, d]]
+        });
+        let turned = |[a, b, c]: [Vec3; 3]| if is_hollow { [a, c, b] } else { [a, b, c] };
+        let face = MeshFace {
+            triangles_mm: triangles.map(turned).collect(),
+            surface: Some(FaceSurface::Surface(crate::scene::Surface::Sphere {
+                centre_mm: Vec3::ZERO,
+                radius_mm: 2.0,
+            })),
+        };
+        Mesh::of_faces(&[face]).expect("triangles")
+    }
+
+    #[test]
+    fn a_known_face_is_met_where_it_is_and_not_where_its_triangles_are() {
+        let start = Vec3::new(0.31, -0.42, 9.0);
+        let z = libm::sqrt(4.0 - 0.31 * 0.31 - 0.42 * 0.42);
+        let (distance, normal, face) = ball(false).enter(start, Vec3::NEG_Z).expect("the top");
+        assert!((distance - (9.0 - z)).abs() < 1e-9);
+        assert!(normal.distance(Vec3::new(0.31, -0.42, z) / 2.0) < 1e-9);
+        assert_eq!(face, 0);
+        // From the outside a hollow is met at its far side, through the backs of the near one.
+        let (distance, normal, _) = ball(true).enter(start, Vec3::NEG_Z).expect("the floor");
+        assert!((distance - (9.0 + z)).abs() < 1e-9);
+        assert!(normal.z > 0.0);
+    }
+
+    #[test]
+    fn a_point_of_a_hollow_is_seen_though_it_lies_behind_its_triangles() {
+        let scene = crate::scene::Scene::new(
+            vec![crate::scene::Body::Mesh(Box::new(ball(true)))],
+            crate::scene::Material::PLASTER,
+        );
+        // From within: from outside the near side of the hollow hides it.
+        let within = Vec3::new(0.31, -0.42, 0.5);
+        let hit = scene.cast(within, Vec3::NEG_Z).expect("the floor");
+        assert!((hit.point_mm.length() - 2.0).abs() < 1e-9);
+        assert!(scene.sees(hit.point_mm, hit.normal, within));
+        assert!(!scene.sees(hit.point_mm, hit.normal, Vec3::new(0.31, -0.42, 9.0)));
     }
 }

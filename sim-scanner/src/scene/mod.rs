@@ -1,13 +1,15 @@
 //! What the laser meets: the object, and what stands around it.
 
 pub mod benches;
+mod exact;
 pub mod figures;
 mod mesh;
 mod solid;
 
 pub use benches::{cylinder_on_table, house_before_plane, house_on_table};
+pub use exact::FaceSurface;
 pub use figures::{cylinder, figure, groove, house};
-pub use mesh::{Mesh, StlError, TRIANGLES_MAX};
+pub use mesh::{Mesh, MeshFace, StlError, TRIANGLES_MAX};
 pub use solid::{ConvexSolid, Surface};
 
 use crate::Vec3;

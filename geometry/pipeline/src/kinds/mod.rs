@@ -1,6 +1,5 @@
 //! What kind of surface each region is.
 
-mod neighbourhood;
 mod nodes;
 mod policy;
 mod samples;

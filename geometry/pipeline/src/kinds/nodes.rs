@@ -5,7 +5,7 @@ use range_image::{NodeQuality, RangeImage, RegionMap};
 use shapes::{Sample, spread};
 
 use super::Bearing;
-use super::neighbourhood::depth;
+use crate::neighbourhood::depth;
 
 /// Distances from a region's border, in nodes, from which on nodes are taken: those at the
 /// border may rest on samples of both sides. Less where too few are left.

@@ -5,8 +5,8 @@ use range_image::{Column, Monitor, RangeImage, RegionMap};
 use shapes::{Sample, is_in_share};
 
 use super::Bearing;
-use super::neighbourhood::{DEEPEST, depth, rise};
 use crate::columns::Columns;
+use crate::neighbourhood::{DEEPEST, depth, rise};
 use crate::process::PipelineError;
 
 /// Samples that are enough to decide by; where there are fewer away from the border, those

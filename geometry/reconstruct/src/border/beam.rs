@@ -2,6 +2,8 @@
 
 use nurbs::BandedMatrix;
 
+use super::deflect::Deflection;
+
 /// How the ends of a beam are held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Ends {
@@ -138,19 +140,6 @@ impl Beam {
         forces.iter().all(|f| f.is_finite()).then_some(forces)
     }
 
-    /// The deflection at a place, or its first derivative.
-    pub(crate) fn at(&self, along: f64, order: usize) -> f64 {
-        let shares = self.forces.iter();
-        shares
-            .map(|(at, force)| force * self.influence(along, *at, order))
-            .sum()
-    }
-
-    /// Where pins push.
-    pub(crate) fn knots(&self) -> impl Iterator<Item = f64> {
-        self.forces.iter().map(|f| f.0)
-    }
-
     /// Deflection at a place, or its first derivative, by a force of 1 at another. Forces
     /// are those on a beam of length 1.
     fn influence(&self, along: f64, at: f64, order: usize) -> f64 {
@@ -184,6 +173,20 @@ impl Beam {
     }
 }
 
+impl Deflection for Beam {
+    fn at(&self, along: f64, order: usize) -> f64 {
+        let shares = self.forces.iter();
+        shares
+            .map(|(at, force)| force * self.influence(along, *at, order))
+            .sum()
+    }
+
+    /// Where pins push.
+    fn knots(&self) -> Vec<f64> {
+        self.forces.iter().map(|f| f.0).collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -200,7 +203,7 @@ mod tests {
     fn a_beam_that_nothing_touches_is_straight() {
         let pins = [pin(3.0, 0.5, 1.0), pin(5.0, -0.2, -1.0)];
         let beam = Beam::among(10.0, HINGED, &pins, 0.1, 1.0).unwrap();
-        assert_eq!(beam.knots().count(), 0);
+        assert_eq!(beam.knots().len(), 0);
         assert_eq!(beam.at(4.0, 0), 0.0);
     }
 
@@ -240,7 +243,7 @@ mod tests {
             let room = p.side * (p.place - beam.at(p.along, 0));
             assert!(room >= 0.02 - 2e-6, "{p:?} {room}");
         }
-        let knots = beam.knots().count();
+        let knots = beam.knots().len();
         assert!((4..40).contains(&knots), "{knots}");
     }
 

@@ -7,23 +7,18 @@ use nurbs::PatchSurface;
 
 use super::cracks::{Chain, CrackMap};
 use crate::assemble::Placement;
-use crate::polygon::norm;
+use crate::meeting::{Gap, Reach};
 
-/// Farthest a sample moves, pitches. Where surfaces meet farther away, or not at all,
-/// the border is a step.
-const REACH: f64 = 1.5;
-
-/// Least difference of the slopes of two surfaces that place their intersection.
-const LEAST_BEND: f64 = 0.15;
+/// Farthest a sample moves, pitches, and least difference of the slopes of two surfaces that
+/// place their intersection. Where surfaces meet farther away, or not at all, the border is a
+/// step.
+const REACH: Reach = Reach {
+    farthest: 1.5,
+    least_bend: 0.15,
+};
 
 /// Share of a border's samples that must find the intersection.
 const LEAST_SHARE: f64 = 0.8;
-
-/// Newton steps; surfaces are nearly plane over a pitch.
-const STEPS: usize = 4;
-
-/// Off the intersection by less than this, pitches, a sample counts as on it.
-const CLOSE: f64 = 1e-3;
 
 /// Samples on the intersections, in pitches, for the chains that are creases between two
 /// of the surfaces; `surfaces[k]` belongs to piece `k + 1`.
@@ -44,56 +39,20 @@ pub(crate) fn intersections(
 }
 
 fn placed(chain: &Chain, sides: [&PatchSurface; 2], placement: Placement) -> Option<Vec<[f64; 2]>> {
+    let gap = Gap { sides, placement };
     let found: Vec<[f64; 2]> = chain
         .middles
         .iter()
-        .filter_map(|&middle| nearest(middle, sides, placement))
+        .filter_map(|&middle| gap.nearest(middle, REACH))
         .collect();
     let enough = found.len() as f64 >= LEAST_SHARE * chain.middles.len() as f64;
     (enough && found.len() >= 2).then_some(found)
 }
 
-/// The point of the intersection nearest to a place, along the slope of the difference.
-fn nearest(
-    start: [f64; 2],
-    [left, right]: [&PatchSurface; 2],
-    placement: Placement,
-) -> Option<[f64; 2]> {
-    let mut place = start;
-    for _ in 0..STEPS {
-        let [x, y] = placement.to_mm(place);
-        let difference = |u, v| left.z_partial(x, y, u, v) - right.z_partial(x, y, u, v);
-        let (gap_mm, slope) = (difference(0, 0), [difference(1, 0), difference(0, 1)]);
-        let bend = norm(slope);
-        if bend < LEAST_BEND {
-            return None;
-        }
-        let step = gap_mm / (bend * placement.pitch_mm);
-        for d in 0..2 {
-            place[d] -= step * slope[d] / bend;
-        }
-        let moved = norm([place[0] - start[0], place[1] - start[1]]);
-        if moved.is_nan() || moved > REACH {
-            return None;
-        }
-        if step.abs() < CLOSE {
-            return Some(place);
-        }
-    }
-    None
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn plane(a: f64, b: f64, c: f64) -> PatchSurface {
-        let at = |i: usize| -30.0 + 20.0 * i as f64;
-        PatchSurface::through_thirds(vec![-30.0, 30.0], vec![-30.0, 30.0], |i, j| {
-            a + b * at(i) + c * at(j)
-        })
-        .unwrap()
-    }
+    use crate::meeting::testing::{PLACEMENT, plane};
 
     fn chain(middles: Vec<[f64; 2]>) -> CrackMap {
         CrackMap {
@@ -106,11 +65,6 @@ mod tests {
             ..CrackMap::default()
         }
     }
-
-    const PLACEMENT: Placement = Placement {
-        origin_mm: [-10.0, -10.0],
-        pitch_mm: 0.5,
-    };
 
     #[test]
     fn a_staircase_goes_to_the_line_where_planes_meet() {

@@ -5,12 +5,15 @@ use std::collections::BTreeSet;
 use nurbs::PiecewiseCubic;
 use range_image::{Cancelled, Monitor};
 
+use super::beside::Memory;
 use super::cracks::{Chain, CrackMap, Use};
 use super::crossing::{Strand, conflicts};
-use super::deflect::{Drawn, part};
+use super::deflect::Drawn;
 use super::junctions::{Course, place_junctions};
 use super::path;
+use super::pins::part;
 use super::segments::{Price, Samples, Segment, sharpest};
+use super::settle::{Outlines, settle};
 use super::smooth::smooth;
 use crate::polygon::{distance_to_segment, minus, norm, signed_area};
 
@@ -35,6 +38,8 @@ pub(crate) struct MapEdge {
     /// Piece on the left and on the right; 0 for nothing.
     pub(crate) sides: [u32; 2],
     pub(crate) path: PiecewiseCubic<2>,
+    /// Samples have told where it runs.
+    pub(crate) is_settled: bool,
 }
 
 /// Vertices, edges, and the loops of each piece, outer first; lengths in pitches.
@@ -82,6 +87,9 @@ const PLACED_PRICE: f64 = 0.01;
 /// Farthest the filtered border may lie from the drawn one, pitches. Filtering cuts a
 /// right angle by less; single nodes that stick out do not count.
 const FARTHEST: f64 = 1.25;
+/// The same where samples have told where the drawn one runs: they see more than the nodes do,
+/// which may all have strayed in the same place.
+const FARTHEST_TOLD: f64 = 2.0;
 
 /// A border with the samples and division its present level asks for.
 struct Border<'a> {
@@ -89,6 +97,8 @@ struct Border<'a> {
     samples: Samples,
     segments: Vec<Segment>,
     level: usize,
+    /// Samples are not asked where it runs: it got into another's way where they said.
+    as_drawn: bool,
 }
 
 /// Builds the map. `placed[k]`, where given, are better samples of chain `k` than the
@@ -96,6 +106,7 @@ struct Border<'a> {
 pub(crate) fn build(
     cracks: &CrackMap,
     placed: &[Option<Vec<[f64; 2]>>],
+    outlines: &Outlines,
     settings: &BorderSettings,
     monitor: &dyn Monitor,
 ) -> Result<PlanarMap, Cancelled> {
@@ -119,11 +130,13 @@ pub(crate) fn build(
                 },
                 segments: Vec::new(),
                 level: SMOOTH,
+                as_drawn: false,
             };
             border.divide(settings);
             border
         })
         .collect();
+    let mut memory = Memory::default();
     loop {
         monitor.check()?;
         let courses: Vec<Course<'_>> = borders.iter().map(Border::course).collect();
@@ -132,6 +145,7 @@ pub(crate) fn build(
             .iter()
             .map(|b| b.draw(&junctions, settings))
             .collect();
+        let mut settled = Vec::new();
         if !settings.literal {
             let mut drawn: Vec<Drawn<'_>> = borders
                 .iter()
@@ -139,14 +153,23 @@ pub(crate) fn build(
                 .map(|(border, paths)| Drawn {
                     chain: border.chain,
                     paths: paths.as_mut().filter(|_| border.level < TRACED),
+                    as_drawn: border.as_drawn,
                 })
                 .collect();
-            part(&mut drawn, &mut junctions);
+            settled = settle(&mut drawn, &mut junctions, outlines, &mut memory, monitor)?;
+            part(&mut drawn, &mut junctions, &settled);
         }
-        let bad = faults(cracks, &borders, &drawn, &junctions);
-        let mut raised = false;
+        let is_told = |k: usize| settled.get(k).is_some_and(|paths| paths.contains(&true));
+        let bad = faults(cracks, &borders, &drawn, &junctions, &is_told);
+        // Those that samples have led astray go back first: the others may hold beside them.
+        let astray = |k: &usize| !borders[*k].as_drawn && is_told(*k);
+        let astray: Vec<usize> = bad.iter().copied().filter(astray).collect();
+        let mut raised = !astray.is_empty();
+        for &k in &astray {
+            borders[k].as_drawn = true;
+        }
         for k in bad {
-            if borders[k].level < TRACED {
+            if astray.is_empty() && borders[k].level < TRACED {
                 borders[k].level = if settings.literal {
                     TRACED
                 } else {
@@ -157,7 +180,7 @@ pub(crate) fn build(
             }
         }
         if !raised {
-            return Ok(assemble(cracks, &borders, drawn, junctions));
+            return Ok(assemble(cracks, &borders, drawn, junctions, &settled));
         }
     }
 }
@@ -301,6 +324,7 @@ fn faults(
     borders: &[Border<'_>],
     drawn: &[Option<Vec<PiecewiseCubic<2>>>],
     junctions: &[[f64; 2]],
+    is_told: &dyn Fn(usize) -> bool,
 ) -> BTreeSet<usize> {
     let mut bad = BTreeSet::new();
     let mut strands = Vec::new();
@@ -328,7 +352,8 @@ fn faults(
                 moved: norm(minus(junctions[j], cracks.junctions[j])),
             })
             .collect();
-        if border.level < TRACED && strays(&border.samples, &outline, &tips) {
+        let farthest = if is_told(k) { FARTHEST_TOLD } else { FARTHEST };
+        if border.level < TRACED && strays(&border.samples, &outline, &tips, farthest) {
             bad.insert(k);
         }
         outlines.push(outline);
@@ -363,7 +388,7 @@ struct Tip {
 
 /// True when a drawn border leaves its samples, those aside that end short of a tip or
 /// run past it.
-fn strays(samples: &Samples, outline: &[[f64; 2]], tips: &[Tip]) -> bool {
+fn strays(samples: &Samples, outline: &[[f64; 2]], tips: &[Tip], farthest: f64) -> bool {
     let mut length = vec![0.0];
     for pair in outline.windows(2) {
         length.push(length[length.len() - 1] + norm(minus(pair[1], pair[0])));
@@ -377,20 +402,26 @@ fn strays(samples: &Samples, outline: &[[f64; 2]], tips: &[Tip]) -> bool {
     }
     let total = total.max(1e-9);
     let reach = 6.0 + 0.1 * drawn;
+    let is_near = |point: [f64; 2], near: f64| {
+        let from = length
+            .partition_point(|&l| l < near - reach)
+            .saturating_sub(1);
+        let to = length.partition_point(|&l| l <= near + reach);
+        outline[from..(to + 1).min(outline.len())]
+            .windows(2)
+            .any(|s| distance_to_segment(point, s[0], s[1]) <= farthest)
+    };
     samples
         .smooth
         .iter()
         .zip(&samples.length)
         .any(|(point, at)| {
             let near = at / total * drawn;
-            let from = length
-                .partition_point(|&l| l < near - reach)
-                .saturating_sub(1);
-            let to = length.partition_point(|&l| l <= near + reach);
-            let close = outline[from..(to + 1).min(outline.len())]
-                .windows(2)
-                .any(|s| distance_to_segment(*point, s[0], s[1]) <= FARTHEST);
-            let at_tip = |t: &Tip| norm(minus(*point, t.place)) <= t.moved + FARTHEST;
+            // Without tips the border is closed, and its end is as near to its start.
+            let close = is_near(*point, near)
+                || (tips.is_empty()
+                    && (is_near(*point, near + drawn) || is_near(*point, near - drawn)));
+            let at_tip = |t: &Tip| norm(minus(*point, t.place)) <= t.moved + farthest;
             !close && !tips.iter().any(at_tip)
         })
 }
@@ -400,6 +431,7 @@ fn assemble(
     borders: &[Border<'_>],
     drawn: Vec<Option<Vec<PiecewiseCubic<2>>>>,
     junctions: Vec<[f64; 2]>,
+    settled: &[Vec<bool>],
 ) -> PlanarMap {
     let mut map = PlanarMap {
         vertices: junctions.clone(),
@@ -407,8 +439,9 @@ fn assemble(
         ..PlanarMap::default()
     };
     let mut edges_of: Vec<core::ops::Range<usize>> = Vec::with_capacity(borders.len());
-    for (border, stretches) in borders.iter().zip(drawn) {
+    for (k, (border, stretches)) in borders.iter().zip(drawn).enumerate() {
         let stretches = stretches.unwrap_or_default();
+        let is_settled = |n: usize| settled.get(k).and_then(|of| of.get(n)) == Some(&true);
         let before = map.edges.len();
         if !stretches.is_empty() {
             let stops = stops(border, &stretches, &junctions);
@@ -432,6 +465,7 @@ fn assemble(
                     end: ids[n + 1],
                     sides,
                     path,
+                    is_settled: is_settled(n),
                 });
             }
         }

@@ -306,7 +306,7 @@ impl Builder {
 
 /// The coefficients of the cubic with these derivatives at its ends over a parameter of this
 /// length.
-pub(super) fn hermite(
+pub(crate) fn hermite(
     from: [f64; 2],
     out: [f64; 2],
     to: [f64; 2],

@@ -3,11 +3,11 @@
 use range_image::{RangeImage, RegionMap};
 
 /// Depths are told up to this.
-pub(super) const DEEPEST: u8 = 2;
+pub(crate) const DEEPEST: u8 = 2;
 
 /// How far the node lies from the border of its region, in nodes, as far as [`DEEPEST`]: 0
 /// where one of its eight neighbours is of another region or none.
-pub(super) fn depth(regions: &RegionMap, column: usize, row: usize) -> u8 {
+pub(crate) fn depth(regions: &RegionMap, column: usize, row: usize) -> u8 {
     let label = regions.label(column, row);
     let all_own = |far: usize| {
         let columns = column.checked_sub(far).map(|first| first..=column + far);
@@ -27,7 +27,7 @@ pub(super) fn depth(regions: &RegionMap, column: usize, row: usize) -> u8 {
 }
 
 /// How steeply z rises along x and y on the surface of a node's own region.
-pub(super) fn rise(image: &RangeImage, regions: &RegionMap, column: usize, row: usize) -> [f64; 2] {
+pub(crate) fn rise(image: &RangeImage, regions: &RegionMap, column: usize, row: usize) -> [f64; 2] {
     let label = regions.label(column, row);
     let z_mm = |c: Option<usize>, r: Option<usize>| {
         let (c, r) = (c?, r?);

@@ -1,0 +1,97 @@
+//! Outlines settled where the samples say.
+
+use nurbs::PiecewiseCubic;
+use range_image::{Cancelled, Monitor};
+
+use super::beside::{Memory, settled, with_samples};
+use super::deflect::{Drawn, Rule, deflect};
+use super::sway::Sway;
+use crate::evidence::Seen;
+
+/// A sample in pitches.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Placed {
+    pub(crate) region: u16,
+    pub(crate) place: [f64; 2],
+    pub(crate) seen: Seen,
+}
+
+/// Samples beside outlines, and the region of each piece.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Outlines {
+    pub(crate) samples: Vec<Placed>,
+    pub(crate) regions: Vec<u16>,
+}
+
+/// Farthest that a corner is moved, pitches.
+const CORNER_FARTHEST: f64 = 2.0;
+
+/// Moves the outlines, and `junctions` with them. Gives for each path of each border whether the
+/// samples told where it lies.
+///
+/// # Errors
+/// Cancelled.
+pub(crate) fn settle(
+    borders: &mut [Drawn<'_>],
+    junctions: &mut [[f64; 2]],
+    outlines: &Outlines,
+    memory: &mut Memory,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Vec<bool>>, Cancelled> {
+    let count = |b: &Drawn<'_>| b.paths.as_deref().map_or(0, Vec::len);
+    if outlines.samples.is_empty() {
+        return Ok(borders.iter().map(|b| vec![false; count(b)]).collect());
+    }
+    let done = settled(with_samples(borders, outlines, monitor)?, memory, monitor)?;
+    // Of each border, path by path; a border without outlines stays as it is.
+    let mut sways: Vec<Vec<Option<Sway>>> = borders.iter().map(|_| Vec::new()).collect();
+    let mut layouts = Vec::new();
+    for settled in done {
+        let (border, path) = (settled.border, sways[settled.border].len());
+        let Some(paths) = borders[border].paths.as_deref_mut() else {
+            continue;
+        };
+        if path == 0 {
+            paths.clear();
+        }
+        let Some(found) = settled.found else {
+            paths.push(settled.curve);
+            sways[border].push(None);
+            continue;
+        };
+        paths.push(found.base);
+        layouts.push(([border, path], found.layout));
+        // From inwards to the left.
+        sways[border].push(Some(if settled.side > 0.0 {
+            found.sway
+        } else {
+            found.sway.reversed()
+        }));
+    }
+    for (sways, border) in sways.iter_mut().zip(borders.iter()) {
+        sways.resize(count(border), None);
+    }
+    let rule = Rule {
+        farthest: CORNER_FARTHEST,
+        blunt: true,
+        deflection: |[border, path]: [usize; 2], _: &_, _: &_, _| sways[border][path].clone(),
+    };
+    deflect(borders, junctions, &rule);
+    for (of, layout) in layouts {
+        monitor.check()?;
+        if let Some(path) = path_of(borders, of)
+            && let Some(plainer) = layout.plainer(path)
+        {
+            *path = plainer;
+        }
+    }
+    let is_settled = |paths: &Vec<Option<Sway>>| paths.iter().map(Option::is_some).collect();
+    Ok(sways.iter().map(is_settled).collect())
+}
+
+fn path_of<'a>(
+    borders: &'a mut [Drawn<'_>],
+    [border, path]: [usize; 2],
+) -> Option<&'a mut PiecewiseCubic<2>> {
+    borders[border].paths.as_deref_mut()?.get_mut(path)
+}

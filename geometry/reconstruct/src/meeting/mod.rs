@@ -1,0 +1,336 @@
+//! Faces that meet: creases on the curves in which their surfaces intersect, corners where all
+//! faces around them have one height.
+//!
+//! Borders are drawn between nodes, and smoothed; along a crease that leaves the two surfaces
+//! apart by what the drawing is off times the difference of their slopes. Here the vertices of a
+//! crease are put where the surfaces meet, the crease is traced between them, and the other borders
+//! follow their vertices. What gets in another border's way stays as it was drawn.
+
+mod corner;
+mod gap;
+#[cfg(test)]
+pub(crate) mod testing;
+mod trace;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nurbs::{PatchSurface, PiecewiseCubic};
+use range_image::{Cancelled, Monitor};
+
+use crate::assemble::Placement;
+use crate::border::beam::Beam;
+use crate::border::crossing::{Conflict, Strand, conflicts};
+use crate::border::deflect::bent;
+use crate::border::map::{MapEdge, PlanarMap};
+use crate::polygon::{cross, minus, norm, signed_area};
+use corner::corner;
+pub(crate) use gap::{Gap, Reach};
+use trace::trace;
+
+/// How far a crease or a vertex is moved at most, and how much the surfaces bend there at least
+/// (3 degrees): what hardly bends is off by twenty times what the surfaces are.
+const REACH: Reach = Reach {
+    farthest: 0.75,
+    least_bend: 0.05,
+};
+
+/// A crease is looked at so often, pitches.
+const STEP: f64 = 0.5;
+
+/// Ends of a crease that are not looked at, pitches: its vertices are.
+const TIP: f64 = 1.0;
+
+/// Places of each piece of a path at which the area of a loop is taken.
+const PER_PIECE: usize = 8;
+
+/// How far the surfaces of a crease may be apart at its ends, millimetres. Where more than three
+/// faces meet they do not quite do so in one point; the crease is led to it.
+const CORNER_MM: f64 = 0.02;
+
+/// Ends at which the surfaces are this near lie on the crease, millimetres.
+const EXACT_MM: f64 = 1e-6;
+
+/// An outline that its vertex leads farther than this to its side, pitches, does not run where the
+/// samples tell any more: where they are few, at its ends, the nodes know it to half a pitch.
+const ASTRAY: f64 = 0.5;
+
+/// How much the area of a loop may shrink or grow.
+const LEAST_AREA: f64 = 0.5;
+const MOST_AREA: f64 = 2.0;
+
+/// Which borders and vertices stay as they were drawn.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Left {
+    edges: BTreeSet<usize>,
+    vertices: BTreeSet<usize>,
+}
+
+/// Puts creases where the surfaces of their sides intersect; gives which edges have come to lie
+/// there. `is_crease` says of an edge whether its surfaces go on across it; `surfaces[k]` belongs
+/// to piece `k + 1`. Outlines that follow their vertices far are not settled any more.
+pub(crate) fn meet(
+    map: &mut PlanarMap,
+    surfaces: &[&PatchSurface],
+    is_crease: &[bool],
+    placement: Placement,
+    monitor: &dyn Monitor,
+) -> Result<Vec<bool>, Cancelled> {
+    let gap = |(edge, is_crease): (&MapEdge, &bool)| {
+        let side = |k: usize| {
+            let piece = (edge.sides[k] as usize).checked_sub(1)?;
+            surfaces.get(piece).copied()
+        };
+        let sides = [side(0)?, side(1)?];
+        let gap = Gap { sides, placement };
+        (*is_crease && edge.sides[0] != edge.sides[1] && is_near(&gap, edge)).then_some(gap)
+    };
+    let mut around = vec![Vec::new(); map.vertices.len()];
+    for (e, edge) in map.edges.iter().enumerate() {
+        around[edge.start].push(e);
+        if edge.end != edge.start {
+            around[edge.end].push(e);
+        }
+    }
+    let drawn = Drawn {
+        gaps: map.edges.iter().zip(is_crease).map(gap).collect(),
+        conflicts: crossings(map, &map.vertices, &map.edges),
+        areas: areas(map, &map.edges),
+        around,
+        map,
+    };
+    let mut left = Left::default();
+    let mut traced = Traced::new();
+    // Each round leaves more of them alone, or is the last.
+    let (vertices, edges) = loop {
+        monitor.check()?;
+        if let Some(found) = drawn.moved(&mut left, &mut traced) {
+            break found;
+        }
+    };
+    let is_met = |e: usize| drawn.gaps[e].is_some() && !left.edges.contains(&e);
+    let is_met = (0..edges.len()).map(is_met).collect();
+    (map.vertices, map.edges) = (vertices, edges);
+    Ok(is_met)
+}
+
+/// Paths of creases by edge and ends, so that a round costs what has changed.
+type Traced = BTreeMap<(usize, [u64; 4]), Option<PiecewiseCubic<2>>>;
+
+/// The map as it was drawn.
+struct Drawn<'a> {
+    map: &'a PlanarMap,
+    /// Of each edge whose surfaces intersect along it.
+    gaps: Vec<Option<Gap<'a>>>,
+    /// Edges at each vertex.
+    around: Vec<Vec<usize>>,
+    conflicts: BTreeSet<Conflict>,
+    /// Of each loop.
+    areas: Vec<f64>,
+}
+
+/// Whether the surfaces intersect all along an edge and near to it.
+fn is_near(gap: &Gap<'_>, edge: &MapEdge) -> bool {
+    let (first, last) = edge.path.domain();
+    let (from, to) = if edge.start == edge.end {
+        (first, last)
+    } else {
+        let tip = TIP.min((last - first) / 4.0);
+        (first + tip, last - tip)
+    };
+    let steps = ((to - from) / STEP).ceil().max(1.0) as usize;
+    (0..=steps).all(|k| {
+        let at = from + (to - from) * k as f64 / steps as f64;
+        gap.nearest(edge.path.evaluate(at), REACH).is_some()
+    })
+}
+
+impl Drawn<'_> {
+    /// Vertices and edges with the creases on their intersections. `None` where some could not be
+    /// put there: they are left alone from then on.
+    fn moved(&self, left: &mut Left, traced: &mut Traced) -> Option<(Vec<[f64; 2]>, Vec<MapEdge>)> {
+        let known = left.clone();
+        let mut vertices = self.map.vertices.clone();
+        for (v, vertex) in vertices.iter_mut().enumerate() {
+            self.place(v, vertex, left);
+        }
+        if *left != known {
+            return None;
+        }
+        let mut edges = self.map.edges.clone();
+        for (e, edge) in edges.iter_mut().enumerate() {
+            let ends = [edge.start, edge.end].map(|v| vertices[v]);
+            if let Some(gap) = self.met(e, left) {
+                let key = [ends[0][0], ends[0][1], ends[1][0], ends[1][1]].map(f64::to_bits);
+                let path = traced
+                    .entry((e, key))
+                    .or_insert_with(|| crease(&gap, edge, ends));
+                match path {
+                    Some(path) => edge.path = path.clone(),
+                    None => {
+                        left.edges.insert(e);
+                    }
+                }
+                continue;
+            }
+            let by = [edge.start, edge.end].map(|v| minus(vertices[v], self.map.vertices[v]));
+            if by.iter().all(|by| norm(*by) == 0.0) {
+                continue;
+            }
+            let aside = [(edge.start, by[0]), (edge.end, by[1])];
+            let aside = aside.map(|(v, by)| cross(leaving(edge, v), by).abs());
+            edge.is_settled &= aside.iter().all(|aside| *aside <= ASTRAY);
+            match led(edge, ends, by) {
+                Some(path) => edge.path = path,
+                None => left.vertices.extend([edge.start, edge.end]),
+            }
+        }
+        if *left != known {
+            return None;
+        }
+        let leave = |e: usize, left: &mut Left| {
+            left.edges.insert(e);
+            let edge = &self.map.edges[e];
+            left.vertices.extend([edge.start, edge.end]);
+        };
+        let found = crossings(self.map, &vertices, &edges);
+        for (a, b) in found.difference(&self.conflicts) {
+            leave(*a, left);
+            leave(*b, left);
+        }
+        let loops = self.map.loops.iter().flatten();
+        let now = areas(self.map, &edges);
+        for (uses, (before, now)) in loops.zip(self.areas.iter().zip(now)) {
+            let share = now / before;
+            if !(LEAST_AREA..=MOST_AREA).contains(&share) {
+                uses.iter().for_each(|(e, _)| leave(*e, left));
+            }
+        }
+        (*left == known).then_some((vertices, edges))
+    }
+
+    /// The surfaces of an edge that is to lie where they intersect.
+    fn met(&self, e: usize, left: &Left) -> Option<Gap<'_>> {
+        self.gaps[e].filter(|_| !left.edges.contains(&e))
+    }
+
+    /// Puts a vertex where its creases meet, or leaves it, or one of them, alone.
+    fn place(&self, v: usize, vertex: &mut [f64; 2], left: &mut Left) {
+        let of_vertex = self.around[v].iter();
+        let meeting: Vec<(usize, Gap<'_>)> = of_vertex
+            .filter_map(|&e| Some((e, self.met(e, left)?)))
+            .collect();
+        // The crease whose surfaces are the farthest apart there.
+        let worst = |vertex: [f64; 2]| {
+            let off = |gap: &Gap<'_>| gap.at(vertex).0.abs();
+            let worst = meeting
+                .iter()
+                .max_by(|a, b| off(&a.1).total_cmp(&off(&b.1)));
+            worst.map(|(e, gap)| (*e, off(gap)))
+        };
+        if !meeting.is_empty() && !left.vertices.contains(&v) {
+            let creases: Vec<Gap<'_>> = meeting.iter().map(|(_, gap)| *gap).collect();
+            let of_vertex = self.around[v].iter();
+            let outlines: Vec<[f64; 2]> = of_vertex
+                .filter(|e| self.met(**e, left).is_none())
+                .map(|&e| leaving(&self.map.edges[e], v))
+                .collect();
+            let found = corner(
+                &creases,
+                &outlines,
+                *vertex,
+                REACH.farthest,
+                REACH.least_bend,
+            );
+            match (found, worst(*vertex)) {
+                (Some(place), _) => *vertex = place,
+                // Without it the others may have a corner.
+                (None, Some((e, _))) if meeting.len() > 1 => {
+                    left.edges.insert(e);
+                    return;
+                }
+                (None, _) => {
+                    left.vertices.insert(v);
+                }
+            }
+        }
+        // What is too far apart there cannot end there.
+        if let Some((e, off_mm)) = worst(*vertex)
+            && (off_mm.is_nan() || off_mm > CORNER_MM)
+        {
+            left.edges.insert(e);
+        }
+    }
+}
+
+/// Signed areas of all loops, square pitches.
+fn areas(map: &PlanarMap, edges: &[MapEdge]) -> Vec<f64> {
+    let area = |uses: &Vec<(usize, bool)>| {
+        let mut polygon = Vec::new();
+        for &(e, reversed) in uses {
+            let mut places = edges[e].path.sampled(PER_PIECE);
+            if reversed {
+                places.reverse();
+            }
+            polygon.extend(places);
+        }
+        polygon.extend(polygon.first().copied());
+        signed_area(&polygon)
+    };
+    map.loops.iter().flatten().map(area).collect()
+}
+
+/// The path of a crease between its vertices.
+fn crease(gap: &Gap<'_>, edge: &MapEdge, ends: [[f64; 2]; 2]) -> Option<PiecewiseCubic<2>> {
+    let mut on = ends;
+    for (k, end) in ends.into_iter().enumerate() {
+        let off_mm = gap.at(end).0.abs();
+        if off_mm.is_nan() || off_mm > EXACT_MM {
+            on[k] = gap.nearest(end, REACH)?;
+        }
+    }
+    let path = trace(gap, &edge.path, on, REACH)?;
+    if on == ends {
+        return Some(path);
+    }
+    bent::<Beam>(&path, None, [0, 1].map(|k| minus(ends[k], on[k])))
+}
+
+/// Unit vector along an edge where it leaves a vertex.
+fn leaving(edge: &MapEdge, vertex: usize) -> [f64; 2] {
+    let (first, last) = edge.path.domain();
+    let at = if edge.start == vertex { first } else { last };
+    let along = edge.path.derivative(at, 1);
+    let speed = norm(along);
+    if speed > 0.0 {
+        along.map(|c| c / speed)
+    } else {
+        [0.0; 2]
+    }
+}
+
+/// The path of an edge that follows its vertices: a straight one stays straight.
+fn led(
+    edge: &MapEdge,
+    [start, end]: [[f64; 2]; 2],
+    moves: [[f64; 2]; 2],
+) -> Option<PiecewiseCubic<2>> {
+    let is_straight = match edge.path.pieces.as_slice() {
+        [piece] => piece.iter().all(|c| c[2] == 0.0 && c[3] == 0.0),
+        _ => false,
+    };
+    if is_straight {
+        return PiecewiseCubic::line(start, end, norm(minus(end, start))).ok();
+    }
+    bent::<Beam>(&edge.path, None, moves)
+}
+
+/// Pairs of edges that cross, touch or fold back.
+fn crossings(map: &PlanarMap, vertices: &[[f64; 2]], edges: &[MapEdge]) -> BTreeSet<Conflict> {
+    debug_assert_eq!(map.edges.len(), edges.len());
+    let strands: Vec<Strand> = edges
+        .iter()
+        .enumerate()
+        .map(|(e, edge)| Strand::new(e, &edge.path, vertices[edge.start], vertices[edge.end]))
+        .collect();
+    conflicts(&strands)
+}
