@@ -1,5 +1,6 @@
 //! Writes a hand-made part as IGES or STEP, for judging with other programs:
-//! `cargo run -p cad-exchange --example write_sample -- part.igs 114`, or `part.step ap242`.
+//! `cargo run -p cad-exchange --example write_sample -- part.igs 114`, or `part.step ap242`; with a
+//! shape after that a rectangle of it, such as `part.igs 190 hollow-cone`.
 //! Prints what a judge should find, as JSON.
 
 #![allow(clippy::unwrap_used, clippy::disallowed_types)]
@@ -12,18 +13,28 @@ use cad_exchange::step::{self, LengthUnit, Schema};
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
 
-const USAGE: &str = "usage: write_sample FILE.igs [114|128], or FILE.step [ap242|ap214|inch]";
+const USAGE: &str = "usage: write_sample FILE.igs [114|128|190] [SHAPE], \
+                     or FILE.step [ap242|ap214|inch] [SHAPE]";
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let path = arguments.next().ok_or(USAGE)?;
     let kind = arguments.next();
-    let model = sample::model();
+    let (model, areas_mm2) = match arguments.next().as_deref() {
+        None => (sample::model(), sample::areas_mm2().to_vec()),
+        Some(name) => {
+            let model = sample::of_shape(name).ok_or(USAGE)?;
+            let options = step::WriteOptions::new("sample", "2026-11-21T09:30:00");
+            let summary = step::write(&model, &options, &mut std::io::sink())?;
+            (model, vec![summary.area_mm2])
+        }
+    };
     let mut out = BufWriter::new(File::create(&path)?);
     if path.ends_with(".igs") {
         let entities = match kind.as_deref() {
             None | Some("114") => Entities::Parametric114,
             Some("128") => Entities::Rational128,
+            Some("190") => Entities::Analytic,
             Some(_) => return Err(USAGE.into()),
         };
         let options = iges::WriteOptions {
@@ -53,7 +64,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let faces: Vec<String> = model
         .faces
         .iter()
-        .zip(sample::areas_mm2())
+        .zip(areas_mm2)
         .map(|(face, area)| format!("{{\"name\": \"{}\", \"area_mm2\": {area}}}", face.name))
         .collect();
     println!("{{\"faces\": [{}]}}", faces.join(", "));

@@ -6,4 +6,5 @@
 pub mod iges;
 pub mod step;
 
+mod brep;
 mod common;

@@ -12,18 +12,30 @@ fn samples() -> Vec<Vec<u8>> {
     let mut model = sample::model();
     // The smaller face alone keeps the test short.
     model.faces.remove(0);
-    let mut files: Vec<Vec<u8>> = [Entities::Parametric114, Entities::Rational128]
-        .into_iter()
-        .map(|entities| {
-            let options = WriteOptions {
-                entities,
-                ..WriteOptions::new("sample", "20261121.093000")
-            };
-            let mut file = Vec::new();
-            iges::write(&model, &options, &mut file).unwrap();
-            file
-        })
-        .collect();
+    let mut files: Vec<Vec<u8>> = [
+        Entities::Parametric114,
+        Entities::Rational128,
+        Entities::Analytic,
+    ]
+    .into_iter()
+    .map(|entities| {
+        let options = WriteOptions {
+            entities,
+            ..WriteOptions::new("sample", "20261121.093000")
+        };
+        let mut file = Vec::new();
+        iges::write(&model, &options, &mut file).unwrap();
+        file
+    })
+    .collect();
+    let options = WriteOptions {
+        entities: Entities::Analytic,
+        ..WriteOptions::new("sample", "20261121.093000")
+    };
+    let mut cone = Vec::new();
+    let model = sample::of_shape("hollow-cone").unwrap();
+    iges::write(&model, &options, &mut cone).unwrap();
+    files.push(cone);
     files.push(points());
     files
 }
@@ -78,7 +90,8 @@ fn the_samples_themselves_are_sound() {
         .iter()
         .map(|file| read(file).map(Result::ok))
         .collect();
-    assert_eq!(counts, [[None, Some(1)], [None, Some(1)], [Some(6), None]]);
+    let model = [None, Some(1)];
+    assert_eq!(counts, [model, model, model, model, [Some(6), None]]);
 }
 
 #[test]

@@ -8,7 +8,9 @@ mod sample;
 
 use cad_exchange::iges::{self, Entities, Summary, WriteOptions};
 use nurbs::{PatchSurface, PiecewiseCubic};
-use reconstruct::{Coedge, Edge, EdgeId, EdgeKind, Face, Loop, Model, Surface, Vertex, VertexId};
+use reconstruct::{
+    Coedge, Edge, EdgeId, EdgeKind, EdgeOrigin, Face, Loop, Model, Surface, Vertex, VertexId,
+};
 
 fn options(entities: Entities) -> WriteOptions {
     WriteOptions {
@@ -52,6 +54,7 @@ fn square(name: &str) -> Model {
             start: VertexId(k),
             end: VertexId((k + 1) % 4),
             kind: EdgeKind::Silhouette,
+            origin: EdgeOrigin::Assumed,
             path,
         });
     }
@@ -80,6 +83,7 @@ fn golden_files() {
     for (entities, name) in [
         (Entities::Parametric114, "square_114.igs"),
         (Entities::Rational128, "square_128.igs"),
+        (Entities::Analytic, "square_190.igs"),
     ] {
         let path = format!("{}/tests/golden/{name}", env!("CARGO_MANIFEST_DIR"));
         let (text, _) = written(&model, &options(entities));
@@ -143,7 +147,12 @@ fn parameters_of(directory: &[&str], data: &[&str], pointer: &str) -> Vec<String
 
 #[test]
 fn columns_counts_and_pointers() {
-    for entities in [Entities::Parametric114, Entities::Rational128] {
+    for (entities, expected) in [
+        (Entities::Parametric114, (2, 3, 4, 18, 2, 2)),
+        (Entities::Rational128, (2, 3, 4, 18, 2, 2)),
+        // The ramp is a plane, whose curves are in space alone.
+        (Entities::Analytic, (2, 3, 3, 14, 2, 2)),
+    ] {
         let (text, summary) = written(&sample::model(), &options(entities));
         assert!(text.lines().all(|line| line.len() == 80 && line.is_ascii()));
         let order: String = text
@@ -206,10 +215,20 @@ fn columns_counts_and_pointers() {
                     102 => (2..values.len())
                         .map(|k| (at(k), &[112, 126][..]))
                         .collect(),
-                    142 => vec![
-                        (at(2), &[114, 128][..]),
-                        (at(3), &[102, 112, 126]),
-                        (at(4), &[102, 112, 126]),
+                    142 => {
+                        let mut pointers =
+                            vec![(at(2), &[114, 128, 190][..]), (at(4), &[102, 112, 126])];
+                        if types[(at(2) as usize - 1) / 2] == 190 {
+                            assert_eq!(at(3), 0);
+                        } else {
+                            pointers.push((at(3), &[102, 112, 126]));
+                        }
+                        pointers
+                    }
+                    190 => vec![
+                        (at(1), &[116][..]),
+                        (at(2), &[123][..]),
+                        (at(3), &[123][..]),
                     ],
                     144 => {
                         let inner = at(3) as usize;
@@ -219,7 +238,9 @@ fn columns_counts_and_pointers() {
                         assert_eq!(number(1, 2), -(2 * face - 1));
                         let borders = (4..=4 + inner).map(|k| (at(k), &[142][..]));
                         let name = (at(7 + inner), &[406][..]);
-                        borders.chain([(at(1), &[114, 128][..]), name]).collect()
+                        borders
+                            .chain([(at(1), &[114, 128, 190][..]), name])
+                            .collect()
                     }
                     _ => Vec::new(),
                 }
@@ -237,6 +258,8 @@ fn columns_counts_and_pointers() {
                 144 => assert_eq!(status, "00000000"),
                 142 => assert_eq!(status, "00010500"),
                 114 | 128 | 406 => assert_eq!(status, "00010000"),
+                116 | 190 => assert_eq!(status, "00010000"),
+                123 => assert_eq!(status, "00010200"),
                 314 => assert_eq!(status, "00000200"),
                 _ => assert!(["00010000", "00010500"].contains(&status)),
             }
@@ -249,10 +272,10 @@ fn columns_counts_and_pointers() {
                 of(&[142]),
                 of(&[102]),
                 of(&[112, 126]),
-                of(&[114, 128]),
+                of(&[114, 128, 190]),
                 of(&[406])
             ),
-            (2, 3, 4, 18, 2, 2)
+            expected
         );
     }
 }

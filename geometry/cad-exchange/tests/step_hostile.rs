@@ -158,20 +158,22 @@ fn other_files_are_told_what_they_are() {
         "{told}"
     );
     assert!(refusal(&changed(&whole, "OPEN_SHELL", "CLOSED_SHELL")).contains("CLOSED_SHELL (#"));
-    let told = refusal(&changed(&whole, "PLANE(", "CYLINDRICAL_SURFACE("));
+    let told = refusal(&changed(&whole, "PLANE(", "SURFACE_OF_REVOLUTION("));
     assert!(
-        told.contains("expected B_SPLINE_SURFACE_WITH_KNOTS or PLANE"),
+        told.contains("expected B_SPLINE_SURFACE_WITH_KNOTS") && told.contains("TOROIDAL_SURFACE"),
         "{told}"
     );
+    let told = refusal(&changed(&whole, "PLANE(", "CYLINDRICAL_SURFACE("));
+    assert!(told.contains("it ends before its radius"), "{told}");
     let kept = changed(
         &whole,
         "ENDSEC;\nEND",
-        "#9999=TOROIDAL_SURFACE('',#1,1.,2.);\nENDSEC;\nEND",
+        "#9999=SURFACE_OF_REVOLUTION('',#1,#2);\nENDSEC;\nEND",
     );
     let unknown = read(&kept).unwrap().unknown;
     assert_eq!(
         unknown.into_iter().collect::<Vec<_>>(),
-        [("TOROIDAL_SURFACE".to_owned(), 1)]
+        [("SURFACE_OF_REVOLUTION".to_owned(), 1)]
     );
 }
 

@@ -43,6 +43,7 @@ fn height(surface: &StepSurface, [x, y, z]: [f64; 3]) -> f64 {
             z - origin_mm[2] + off / normal[2]
         }
         StepSurface::BSpline(spline) => z - spline.evaluate(x, y)[2],
+        other => panic!("{other:?}"),
     }
 }
 

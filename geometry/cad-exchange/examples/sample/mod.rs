@@ -12,8 +12,12 @@
 //!     0           20          40..45
 //! ```
 
+use nalgebra::Vector3;
 use nurbs::{PatchSurface, PiecewiseCubic};
-use reconstruct::{Coedge, Edge, EdgeId, EdgeKind, Face, Loop, Model, Surface, Vertex, VertexId};
+use reconstruct::{
+    Coedge, Edge, EdgeId, EdgeKind, EdgeOrigin, Face, Loop, Model, Surface, Vertex, VertexId,
+};
+use shapes::{Cone, Cylinder, Shape, Sphere, Torus};
 
 /// Centre and radius of the hole; its border is four cubics, round to 3e-4 of the radius.
 const HOLE: ([f64; 2], f64) = ([10.0, 15.0], 5.0);
@@ -87,6 +91,85 @@ pub(crate) fn model() -> Model {
     }
 }
 
+/// A rectangle of a graph over the x-y plane, said to be of a shape.
+pub(crate) fn rectangle(
+    x_mm: [f64; 2],
+    y_mm: [f64; 2],
+    shape: Shape,
+    z_mm: impl Fn(f64, f64) -> f64,
+) -> Model {
+    let corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[i, j]| [x_mm[i], y_mm[j]]);
+    let edges: Vec<Edge> = (0..4)
+        .map(|k| {
+            let (p, q) = (corners[k], corners[(k + 1) % 4]);
+            let length = (q[0] - p[0]).abs() + (q[1] - p[1]).abs();
+            let line = PiecewiseCubic::line(p, q, length).unwrap();
+            edge(k, (k + 1) % 4, EdgeKind::Silhouette, line)
+        })
+        .collect();
+    let breaks = |[low, high]: [f64; 2]| -> Vec<f64> {
+        let share = |k: u32| f64::from(k) / 64.0;
+        (0..=64).map(|k| low + (high - low) * share(k)).collect()
+    };
+    let surface = patches(&breaks(x_mm), &breaks(y_mm), z_mm);
+    let coedges = (0..4).map(|id| coedge(&surface, &edges, id, false, 0.0));
+    let face = Face {
+        name: "Rectangle".to_owned(),
+        region: 1,
+        outer: Loop {
+            coedges: coedges.collect(),
+        },
+        inner: Vec::new(),
+        surface: Surface::Patches(surface),
+        shape: Some(shape),
+    };
+    Model {
+        vertices: corners.map(|[x_mm, y_mm]| Vertex { x_mm, y_mm }).to_vec(),
+        edges,
+        faces: vec![face],
+    }
+}
+
+/// A rectangle of a cylinder, cone, sphere or torus; `hollow-` of these are seen from within.
+pub(crate) fn of_shape(name: &str) -> Option<Model> {
+    let (family, is_hollow) = match name.strip_prefix("hollow-") {
+        Some(family) => (family, true),
+        None => (name, false),
+    };
+    let axis = Vector3::new(0.2, 1.0, 0.1).normalize();
+    let shape = match family {
+        "cylinder" => Shape::Cylinder(Cylinder {
+            point_mm: Vector3::new(1.0, 0.0, 0.5),
+            axis,
+            radius_mm: 12.0,
+            is_hollow,
+        }),
+        "cone" => Shape::Cone(Cone {
+            apex_mm: Vector3::new(0.5, -30.0, 0.0),
+            axis,
+            half_angle_rad: 0.4,
+            is_hollow,
+        }),
+        "sphere" => Shape::Sphere(Sphere {
+            centre_mm: Vector3::new(1.0, 2.0, -3.0),
+            radius_mm: 15.0,
+            is_hollow,
+        }),
+        // Lying flat, the top of its tube or the bottom of a groove.
+        "torus" => Shape::Torus(Torus {
+            centre_mm: Vector3::new(-24.0, 0.0, 1.0),
+            axis: Vector3::z(),
+            radius_mm: 25.0,
+            tube_mm: 8.0,
+            is_hollow,
+        }),
+        _ => return None,
+    };
+    let near_mm = if is_hollow { -20.0 } else { 20.0 };
+    let z_mm = |x, y| shape.z_mm(x, y, near_mm).unwrap();
+    Some(rectangle([-3.0, 5.0], [-4.0, 4.0], shape, z_mm))
+}
+
 /// Areas of the faces in the order of [`model`], square millimetres: by Green's theorem,
 /// over the antiderivative in x of the surface element.
 pub(crate) fn areas_mm2() -> [f64; 2] {
@@ -116,6 +199,7 @@ fn edge(start: usize, end: usize, kind: EdgeKind, path: PiecewiseCubic<2>) -> Ed
         start: VertexId(start),
         end: VertexId(end),
         kind,
+        origin: EdgeOrigin::Assumed,
         path,
     }
 }

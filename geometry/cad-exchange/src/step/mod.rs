@@ -10,7 +10,8 @@ mod read;
 mod write;
 
 pub use read::{
-    MAX_FILE_BYTES, ReadError, StepEdge, StepEdgeUse, StepFace, StepModel, StepSurface, read_model,
+    MAX_FILE_BYTES, ReadError, StepEdge, StepEdgeUse, StepFace, StepFrame, StepModel, StepSurface,
+    read_model,
 };
 pub use write::{
     DEFAULT_PALETTE, FaceDefect, LengthUnit, Schema, Summary, WriteError, WriteOptions, write,

@@ -4,6 +4,7 @@
 //!
 //! Files come from anywhere: nothing is allocated by a count before the values are there.
 
+mod analytic;
 mod error;
 mod file;
 mod global;
@@ -13,6 +14,7 @@ mod points;
 mod transform;
 mod values;
 
+pub use analytic::{AnalyticSurface, SurfaceFrame};
 pub use error::ReadError;
 pub use lines::MAX_FILE_BYTES;
 pub use model::{SplineCurve, TrimmedCurve, TrimmedFace, TrimmedModel, TrimmedSurface, read_model};

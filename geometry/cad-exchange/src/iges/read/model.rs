@@ -1,10 +1,11 @@
-//! Trimmed faces as [`crate::iges::write()`] writes them: 144 on 142 on 114 and 112, or on
-//! 128 and 126.
+//! Trimmed faces as [`crate::iges::write()`] writes them: 144 on 142 on 114 and 112, on 128 and
+//! 126, or on 190 to 198 and 126.
 
 use std::io::Read;
 
 use nurbs::{BSplineCurve, BSplineSurface, KnotVector, PatchSurface, PiecewiseCubic};
 
+use super::analytic::{AnalyticSurface, SURFACES, analytic, is_analytic};
 use super::error::ReadError;
 use super::file::{Entity, File, Record};
 
@@ -49,6 +50,8 @@ pub enum TrimmedSurface {
     Patches(PatchSurface),
     /// Entity 128.
     BSpline(BSplineSurface),
+    /// Entities 190 to 198.
+    Analytic(AnalyticSurface),
 }
 
 /// A curve of either family.
@@ -83,8 +86,8 @@ impl<const D: usize> SplineCurve<D> {
 /// A part of a border, given twice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrimmedCurve {
-    /// In the parameter plane of the surface.
-    pub parameter_curve: SplineCurve<2>,
+    /// In the parameter plane of the surface; `None` on a surface by its numbers.
+    pub parameter_curve: Option<SplineCurve<2>>,
     /// In space.
     pub space_curve: SplineCurve<3>,
 }
@@ -128,7 +131,7 @@ pub fn read_model(source: impl Read) -> Result<TrimmedModel, ReadError> {
 
 fn face(file: &File, entity: &Entity) -> Result<TrimmedFace, ReadError> {
     let mut record = placed(file, entity)?;
-    let carrier = record.pointer("its surface", &[114, 128])?;
+    let carrier = record.pointer("its surface", &SURFACES)?;
     if record.integer("the kind of its outer border")? != 1 {
         return Err(record.defect("the border of the surface itself is not read as a border"));
     }
@@ -210,13 +213,27 @@ fn trimming_loop(
 ) -> Result<Vec<TrimmedCurve>, ReadError> {
     let mut record = placed(file, entity)?;
     record.integer("how it came about")?;
-    if record.pointer("its surface", &[114, 128])? != carrier {
+    if record.pointer("its surface", &SURFACES)? != carrier {
         return Err(record.defect("it lies on another surface than the face it bounds"));
     }
-    let flat = record.pointer("its parameter curve", &[102, 112, 126])?;
+    let flat: Option<Vec<SplineCurve<2>>> = if is_analytic(carrier) {
+        if record.integer("its parameter curve")? != 0 {
+            return Err(record.defect("parameter curves on surfaces by their numbers are not read"));
+        }
+        None
+    } else {
+        let flat = record.pointer("its parameter curve", &[102, 112, 126])?;
+        Some(curves(file, flat)?)
+    };
     let spatial = record.pointer("its space curve", &[102, 112, 126])?;
-    let flat: Vec<SplineCurve<2>> = curves(file, flat)?;
     let spatial: Vec<SplineCurve<3>> = curves(file, spatial)?;
+    let Some(flat) = flat else {
+        let alone = |space_curve| TrimmedCurve {
+            parameter_curve: None,
+            space_curve,
+        };
+        return Ok(spatial.into_iter().map(alone).collect());
+    };
     if flat.len() != spatial.len() {
         return Err(record.defect(format!(
             "it has {} curves in the parameter plane, but {} in space",
@@ -227,7 +244,7 @@ fn trimming_loop(
     let pairs = flat.into_iter().zip(spatial);
     Ok(pairs
         .map(|(parameter_curve, space_curve)| TrimmedCurve {
-            parameter_curve,
+            parameter_curve: Some(parameter_curve),
             space_curve,
         })
         .collect())
@@ -317,10 +334,10 @@ fn parameter(start: f64, linear_at: usize) -> [f64; 16] {
 
 fn surface(file: &File, entity: &Entity) -> Result<TrimmedSurface, ReadError> {
     let mut record = placed(file, entity)?;
-    if entity.entity == 114 {
-        patches(&mut record).map(TrimmedSurface::Patches)
-    } else {
-        bspline_surface(&mut record).map(TrimmedSurface::BSpline)
+    match entity.entity {
+        114 => patches(&mut record).map(TrimmedSurface::Patches),
+        128 => bspline_surface(&mut record).map(TrimmedSurface::BSpline),
+        _ => analytic(file, entity, &mut record).map(TrimmedSurface::Analytic),
     }
 }
 

@@ -1,11 +1,13 @@
 //! The writer: a model in, five sections out.
 //!
-//! Each face becomes, in this order: its surface (114 or 128); for each loop the curves
+//! By [`Entities::Analytic`] faces are written on the edges that they share ([`analytic`]); else
+//! each face becomes, in this order: its surface (114 or 128); for each loop the curves
 //! of its edges in the parameter plane and in space (112 or 126), a composite of each
 //! (102) where there are several, and the curve on the surface that pairs them (142);
 //! its name (406 form 15); and the trimmed surface (144) over all of these. Colours (314)
 //! come first. So every pointer points back, and one pass numbers everything.
 
+mod analytic;
 mod colour;
 mod error;
 mod fields;
@@ -22,6 +24,7 @@ pub use crate::common::{DEFAULT_PALETTE, FaceDefect};
 pub use error::WriteError;
 pub use options::{Entities, WriteOptions};
 
+use crate::brep::{Brep, Sharing};
 use crate::common::{ROUNDING_PART, SMOOTH_MM, check, without_kinks};
 use colour::Colours;
 use shapes::{Joined, curve_status, plain_entry};
@@ -59,9 +62,9 @@ pub struct Summary {
 
 /// Writes a model as an IGES 5.3 file of trimmed surfaces.
 ///
-/// The same model and options give the same bytes. Curves are written as they are, but
-/// for slight kinks, which are rounded within half the resolution: readers would split
-/// the edge there. Nothing is written unless the whole
+/// The same model and options give the same bytes. Curves are written as they are
+/// ([`Entities::Analytic`] puts them on what both faces are), but for slight kinks, which are
+/// rounded within half the resolution: readers would split the edge there. Nothing is written unless the whole
 /// model can be.
 ///
 /// # Errors
@@ -74,7 +77,16 @@ pub fn write(
     out: &mut impl io::Write,
 ) -> Result<Summary, WriteError> {
     options.validate()?;
-    let resolution_mm = check(model, options.resolution_mm)?.max(options.resolution_mm);
+    let gap_mm = check(model, options.resolution_mm)?;
+    let shared = (options.entities == Entities::Analytic).then(|| {
+        let sharing = Sharing {
+            sharing_mm: options.sharing_mm,
+            resolution_mm: options.resolution_mm,
+        };
+        Brep::of(model, sharing)
+    });
+    let shared_mm = shared.as_ref().map_or(0.0, |brep| brep.topology.gap_mm);
+    let resolution_mm = (gap_mm + shared_mm).max(options.resolution_mm);
     let mut sheet = Sheet::default();
     let colours = Colours::define(&mut sheet, model, options)?;
     for (index, face) in model.faces.iter().enumerate() {
@@ -84,7 +96,22 @@ pub fn write(
             level: face.region,
             resolution_mm,
         };
-        write_face(&mut sheet, style, face, index + 1, colour)?;
+        let (surface, borders) = match &shared {
+            Some(Brep { carriers, topology }) => {
+                let (of, loops) = ((face, &carriers[index]), &topology.uses[index]);
+                analytic::bounded_surface(&mut sheet, style, of, topology, loops)?
+            }
+            None => bounded_surface(&mut sheet, style, face)?,
+        };
+        write_face(
+            &mut sheet,
+            style,
+            face,
+            index + 1,
+            colour,
+            surface,
+            &borders,
+        )?;
     }
     let start = format!("{}: trimmed surfaces from a range scan", options.system);
     let global = global_fields(model, options, resolution_mm);
@@ -97,23 +124,32 @@ pub fn write(
     })
 }
 
+/// The surface of a face and its borders, the outer one first: entities 142.
+fn bounded_surface(
+    sheet: &mut Sheet,
+    style: Style,
+    face: &Face,
+) -> Result<(Pointer, Vec<Pointer>), WriteError> {
+    let Surface::Patches(patches) = &face.surface;
+    let surface = shapes::surface(sheet, style.entities, style.level, patches)?;
+    let borders = std::iter::once(&face.outer)
+        .chain(&face.inner)
+        .map(|border| write_loop(sheet, style, surface, border))
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok((surface, borders))
+}
+
+/// Entity 144 and the name of the face; `borders` begin with the outer one.
 fn write_face(
     sheet: &mut Sheet,
     style: Style,
     face: &Face,
     number: usize,
     colour: ColourField,
+    surface: Pointer,
+    borders: &[Pointer],
 ) -> Result<(), WriteError> {
     let level = style.level;
-    let Surface::Patches(patches) = &face.surface;
-    let surface = shapes::surface(sheet, style.entities, level, patches)?;
-    let outer = write_loop(sheet, style, surface, &face.outer)?;
-    let inner = face
-        .inner
-        .iter()
-        .map(|border| write_loop(sheet, style, surface, border))
-        .collect::<Result<Vec<_>, _>>()?;
-
     let mut name = sheet.begin(Entry {
         form: 15,
         line_font: 0,
@@ -132,9 +168,8 @@ fn write_face(
     trimmed.pointer(surface);
     // The outer border is given, not that of the surface.
     trimmed.integer(1);
-    trimmed.integer(inner.len());
-    trimmed.pointer(outer);
-    for border in inner {
+    trimmed.integer(borders.len().saturating_sub(1));
+    for &border in borders {
         trimmed.pointer(border);
     }
     // No associativities, one property.

@@ -11,6 +11,9 @@ pub enum Entities {
     Parametric114,
     /// B-splines of the same shape, 128 and 126, for readers without the former.
     Rational128,
+    /// Planes, cylinders, cones, spheres and tori by their numbers, 190 to 198, other faces as
+    /// B-splines, 128; on edges that neighbours share (126).
+    Analytic,
 }
 
 /// Everything about a file that is not in the model. Characters beyond printable ASCII
@@ -36,6 +39,10 @@ pub struct WriteOptions {
     /// Least gap between what should meet, millimetres: readers take it as the tolerance
     /// of every vertex and edge. A larger gap in the model is written instead.
     pub resolution_mm: f64,
+    /// With [`Entities::Analytic`], a crease is one curve of both its faces as far as the curves
+    /// that they make of it are as near as this, millimetres; the mean of both is written there.
+    /// A face is written by its numbers if its edges lie as near to that, too; else as a B-spline.
+    pub sharing_mm: f64,
     /// Colours of the faces: region `r` gets `palette[r % palette.len()]`.
     pub palette: Vec<[u8; 3]>,
 }
@@ -55,6 +62,7 @@ impl WriteOptions {
             timestamp: timestamp.into(),
             model_timestamp: None,
             resolution_mm: 1e-4,
+            sharing_mm: 0.05,
             palette: DEFAULT_PALETTE.to_vec(),
         }
     }
@@ -86,6 +94,13 @@ impl WriteOptions {
                 option: "resolution_mm",
                 value: self.resolution_mm.to_string(),
                 expected: "a gap between 1e-9 and 1 mm",
+            });
+        }
+        if !(0.0..=1.0).contains(&self.sharing_mm) {
+            return Err(WriteError::Option {
+                option: "sharing_mm",
+                value: self.sharing_mm.to_string(),
+                expected: "a distance between 0 and 1 mm",
             });
         }
         if self.palette.is_empty() {

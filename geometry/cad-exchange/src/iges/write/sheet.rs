@@ -28,6 +28,8 @@ pub(super) enum Status {
     DependentInParameterPlane,
     /// A definition that others refer to (use flag 02).
     Definition,
+    /// The same as part of the entity that points to it.
+    DependentDefinition,
 }
 
 impl Status {
@@ -37,6 +39,7 @@ impl Status {
             Self::Dependent => "00010000",
             Self::DependentInParameterPlane => "00010500",
             Self::Definition => "00000200",
+            Self::DependentDefinition => "00010200",
         }
     }
 }

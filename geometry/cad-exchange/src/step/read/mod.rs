@@ -15,7 +15,7 @@ mod syntax;
 mod text;
 
 pub use error::ReadError;
-pub use model::{StepEdge, StepEdgeUse, StepFace, StepModel, StepSurface, read_model};
+pub use model::{StepEdge, StepEdgeUse, StepFace, StepFrame, StepModel, StepSurface, read_model};
 
 /// Largest file that is read, bytes; it is held in memory as a whole, its values in up to
 /// thirty times as much.

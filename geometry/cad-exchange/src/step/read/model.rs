@@ -8,7 +8,7 @@ use nurbs::{BSplineCurve, BSplineSurface};
 use super::exchange::{self, Exchange, Fields};
 use super::known::KNOWN;
 use super::properties::{self, Context, Validation};
-use super::shapes::Shapes;
+use super::shapes::{SURFACES, Shapes};
 use super::syntax::Value;
 use super::{ReadError, text};
 
@@ -61,8 +61,10 @@ pub struct StepFace {
     pub name: String,
     /// Its colour, red, green and blue of 0 to 255, where it has one.
     pub colour: Option<[u8; 3]>,
-    /// The untrimmed surface; the face's normal is that of the surface.
+    /// The untrimmed surface.
     pub surface: StepSurface,
+    /// The face's normal is that of the surface; else it is the opposite.
+    pub same_sense: bool,
     /// The outer border.
     pub outer: Vec<StepEdgeUse>,
     /// Holes.
@@ -78,6 +80,17 @@ pub struct StepEdgeUse {
     pub reversed: bool,
 }
 
+/// Where a surface around an axis lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepFrame {
+    /// A point of the axis, or the centre.
+    pub origin_mm: [f64; 3],
+    /// Unit direction of the axis.
+    pub axis: [f64; 3],
+    /// Unit direction from which angles around the axis are counted.
+    pub x: [f64; 3],
+}
+
 /// The carrier of a face.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StepSurface {
@@ -89,6 +102,38 @@ pub enum StepSurface {
         normal: [f64; 3],
         /// A direction in it.
         x: [f64; 3],
+    },
+    /// `CYLINDRICAL_SURFACE`, its normal outwards.
+    Cylinder {
+        /// Where it is.
+        frame: StepFrame,
+        /// Its radius.
+        radius_mm: f64,
+    },
+    /// `CONICAL_SURFACE`, its normal outwards. It opens along the axis.
+    Cone {
+        /// Where it is.
+        frame: StepFrame,
+        /// Its radius at the origin of the frame.
+        radius_mm: f64,
+        /// Angle between axis and surface.
+        half_angle_rad: f64,
+    },
+    /// `SPHERICAL_SURFACE`, its normal outwards.
+    Sphere {
+        /// Where it is.
+        frame: StepFrame,
+        /// Its radius.
+        radius_mm: f64,
+    },
+    /// `TOROIDAL_SURFACE`, its normal out of the tube.
+    Torus {
+        /// Where it is.
+        frame: StepFrame,
+        /// Radius of the circle amid the tube.
+        radius_mm: f64,
+        /// Radius of the tube.
+        tube_mm: f64,
     },
     /// `B_SPLINE_SURFACE_WITH_KNOTS`.
     BSpline(BSplineSurface),
@@ -246,9 +291,7 @@ impl<'a, 'b> Topology<'a, 'b> {
         let name = fields.text("its name")?;
         let bounds = fields.ids("its bounds")?;
         let surface = fields.id("its surface")?;
-        if !fields.logical("its sense")? {
-            return Err(fields.defect("a face against the sense of its surface is not read"));
-        }
+        let same_sense = fields.logical("its sense")?;
         let (mut outer, mut inner) = (None, Vec::new());
         for bound in bounds {
             let (is_outer, border) = self.bound(bound)?;
@@ -261,11 +304,12 @@ impl<'a, 'b> Topology<'a, 'b> {
         let Some(outer) = outer else {
             return Err(fields.defect("it has no outer bound"));
         };
-        self.claim(surface, &["B_SPLINE_SURFACE_WITH_KNOTS", "PLANE"])?;
+        self.claim(surface, &SURFACES)?;
         Ok(StepFace {
             name,
             colour: self.colours.get(&id).copied(),
             surface: self.shapes.surface(surface)?,
+            same_sense,
             outer,
             inner,
         })

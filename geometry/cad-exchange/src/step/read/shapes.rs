@@ -3,7 +3,17 @@
 use nurbs::{BSplineCurve, BSplineSurface, KnotVector, MAX_DEGREE};
 
 use super::exchange::{Exchange, Fields};
-use super::{ReadError, StepSurface};
+use super::{ReadError, StepFrame, StepSurface};
+
+/// Surfaces that are read.
+pub(super) const SURFACES: [&str; 6] = [
+    "B_SPLINE_SURFACE_WITH_KNOTS",
+    "CONICAL_SURFACE",
+    "CYLINDRICAL_SURFACE",
+    "PLANE",
+    "SPHERICAL_SURFACE",
+    "TOROIDAL_SURFACE",
+];
 
 /// Reads shapes of a file whose unit is so many millimetres.
 pub(super) struct Shapes<'a, 'b> {
@@ -52,25 +62,59 @@ impl Shapes<'_, '_> {
     }
 
     pub(super) fn surface(&self, id: u64) -> Result<StepSurface, ReadError> {
-        let known = ["B_SPLINE_SURFACE_WITH_KNOTS", "PLANE"];
-        let fields = self.exchange.fields(id, &known)?;
-        if fields.keyword() == "PLANE" {
-            self.plane(fields)
-        } else {
-            self.spline(fields).map(StepSurface::BSpline)
+        let mut fields = self.exchange.fields(id, &SURFACES)?;
+        let keyword = fields.keyword();
+        if keyword == "B_SPLINE_SURFACE_WITH_KNOTS" {
+            return self.spline(fields).map(StepSurface::BSpline);
         }
+        fields.skip("its name")?;
+        let frame = self.frame(fields.id("its placement")?)?;
+        let mut radius_mm = |what| self.length_mm(&mut fields, what);
+        Ok(match keyword {
+            "CYLINDRICAL_SURFACE" => StepSurface::Cylinder {
+                frame,
+                radius_mm: radius_mm("its radius")?,
+            },
+            "SPHERICAL_SURFACE" => StepSurface::Sphere {
+                frame,
+                radius_mm: radius_mm("its radius")?,
+            },
+            "TOROIDAL_SURFACE" => StepSurface::Torus {
+                frame,
+                radius_mm: radius_mm("its major radius")?,
+                tube_mm: radius_mm("its minor radius")?,
+            },
+            "CONICAL_SURFACE" => StepSurface::Cone {
+                frame,
+                radius_mm: radius_mm("its radius")?,
+                half_angle_rad: half_angle_rad(&mut fields)?,
+            },
+            _ => StepSurface::Plane {
+                origin_mm: frame.origin_mm,
+                normal: frame.axis,
+                x: frame.x,
+            },
+        })
     }
 
-    fn plane(&self, mut fields: Fields<'_, '_>) -> Result<StepSurface, ReadError> {
-        fields.skip("its name")?;
-        let placement = fields.id("its placement")?;
+    fn frame(&self, placement: u64) -> Result<StepFrame, ReadError> {
         let mut placement = self.exchange.fields(placement, &["AXIS2_PLACEMENT_3D"])?;
         placement.skip("its name")?;
-        Ok(StepSurface::Plane {
+        Ok(StepFrame {
             origin_mm: self.point(placement.id("its location")?)?,
-            normal: self.triple(placement.id("its axis")?, "DIRECTION", 1.0)?,
+            axis: self.triple(placement.id("its axis")?, "DIRECTION", 1.0)?,
             x: self.triple(placement.id("its x")?, "DIRECTION", 1.0)?,
         })
+    }
+
+    /// A length above zero.
+    fn length_mm(&self, fields: &mut Fields<'_, '_>, what: &'static str) -> Result<f64, ReadError> {
+        let length_mm = fields.real(what)? * self.unit_mm;
+        if length_mm > 0.0 && length_mm.is_finite() {
+            Ok(length_mm)
+        } else {
+            Err(fields.defect(format!("{what} is no length above zero")))
+        }
     }
 
     fn spline(&self, mut fields: Fields<'_, '_>) -> Result<BSplineSurface, ReadError> {
@@ -98,6 +142,16 @@ impl Shapes<'_, '_> {
         let v = knots(&fields, v_degree, width, &v_multiplicities, &v_breaks)?;
         let points = self.points(&rows.concat())?;
         BSplineSurface::new(u, v, points).map_err(|defect| fields.defect(defect.to_string()))
+    }
+}
+
+/// The half angle of a cone, which is acute.
+fn half_angle_rad(fields: &mut Fields<'_, '_>) -> Result<f64, ReadError> {
+    let angle_rad = fields.real("its half angle")?;
+    if angle_rad > 0.0 && angle_rad < core::f64::consts::FRAC_PI_2 {
+        Ok(angle_rad)
+    } else {
+        Err(fields.defect("its half angle is not acute"))
     }
 }
 

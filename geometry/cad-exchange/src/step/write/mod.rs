@@ -6,19 +6,14 @@
 //! which a reader can check what it made of the file. Every reference points back, and one
 //! pass numbers everything.
 
-mod bend;
-mod corners;
 mod data;
 mod error;
-mod groups;
 mod measure;
 mod options;
 mod product;
-mod seam;
 mod shapes;
 mod spell;
 mod style;
-mod topology;
 
 use std::io;
 
@@ -28,13 +23,13 @@ pub use crate::common::{DEFAULT_PALETTE, FaceDefect};
 pub use error::WriteError;
 pub use options::{LengthUnit, Schema, WriteOptions};
 
+use crate::brep::{Brep, Carrier, Sharing, Topology, Use};
 use crate::common::check;
 use data::{Data, Id};
 use measure::Moments;
 use product::Units;
 use shapes::Shapes;
 use style::Styles;
-use topology::{Topology, Use};
 
 /// What was written. Millimetres, whatever the file's unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,7 +79,11 @@ pub fn write(
 ) -> Result<Summary, WriteError> {
     options.validate()?;
     let gap_mm = check(model, options.resolution_mm)?;
-    let topology = topology::topology(model, options);
+    let sharing = Sharing {
+        sharing_mm: options.sharing_mm,
+        resolution_mm: options.resolution_mm,
+    };
+    let Brep { carriers, topology } = Brep::of(model, sharing);
     let moments = Moments::of(model);
     let uncertainty_mm = (gap_mm + topology.gap_mm).max(options.resolution_mm);
 
@@ -92,7 +91,7 @@ pub fn write(
     let shapes = Shapes { unit: options.unit };
     let shape = product::product(&mut data, options);
     let units = product::units(&mut data, options.unit, uncertainty_mm);
-    let faces = write_faces(&mut data, &shapes, model, &topology);
+    let faces = write_faces(&mut data, &shapes, model, &carriers, &topology);
     write_shells(
         &mut data, &shapes, &units, options, shape, &topology, &faces,
     );
@@ -147,7 +146,13 @@ fn header(options: &WriteOptions) -> String {
 }
 
 /// Vertices, edges and faces; the faces in the order of the model.
-fn write_faces(data: &mut Data, shapes: &Shapes, model: &Model, topology: &Topology) -> Vec<Id> {
+fn write_faces(
+    data: &mut Data,
+    shapes: &Shapes,
+    model: &Model,
+    carriers: &[Carrier],
+    topology: &Topology,
+) -> Vec<Id> {
     let vertices: Vec<Id> = topology
         .vertices
         .iter()
@@ -173,22 +178,24 @@ fn write_faces(data: &mut Data, shapes: &Shapes, model: &Model, topology: &Topol
             })
         })
         .collect();
-    let faces = model.faces.iter().zip(&topology.uses);
+    let faces = model.faces.iter().zip(carriers).zip(&topology.uses);
     faces
-        .map(|(face, loops)| write_face(data, shapes, face, loops, &edges))
+        .map(|((face, carrier), loops)| write_face(data, shapes, face, carrier, loops, &edges))
         .collect()
 }
 
-/// `ADVANCED_FACE` (ISO 10303-511). Every surface has its normal on the side of +z, as the
-/// model's faces have: outer loops run counter-clockwise as seen from there.
+/// `ADVANCED_FACE` (ISO 10303-511). Every face has its normal on the side of +z, as the model's
+/// have: outer loops run counter-clockwise as seen from there. So have planes and splines; the
+/// others have theirs outwards.
 fn write_face(
     data: &mut Data,
     shapes: &Shapes,
     face: &Face,
+    carrier: &Carrier,
     loops: &[Vec<Use>],
     edges: &[Id],
 ) -> Id {
-    let surface = shapes.surface(data, &face.surface);
+    let surface = shapes.surface(data, carrier, &face.surface);
     let bounds: Vec<Id> = loops
         .iter()
         .enumerate()
@@ -225,7 +232,7 @@ fn write_face(
         v.text(&face.name);
         v.ids(&bounds);
         v.id(surface);
-        v.word(".T.");
+        v.word(if carrier.same_sense() { ".T." } else { ".F." });
     })
 }
 

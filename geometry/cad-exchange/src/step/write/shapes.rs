@@ -1,15 +1,13 @@
 //! Points, curves and surfaces (ISO 10303-42, clause 4).
 
-use nurbs::{BSplineSurface, KnotVector, PatchSurface};
+use nurbs::{KnotVector, PatchSurface};
 use reconstruct::Surface;
+use shapes::Family;
 
 use super::data::{Data, Id, Values};
 use super::options::LengthUnit;
-use super::topology::Strand;
+use crate::brep::{Analytic, Carrier, Strand};
 use crate::common::SMOOTH_MM;
-
-/// A surface whose control points are this near to one plane is that plane.
-const FLAT_MM: f64 = 1e-6;
 
 /// Writes shapes in the unit of the file.
 pub(super) struct Shapes {
@@ -56,23 +54,47 @@ impl Shapes {
         })
     }
 
-    /// The carrier of a face, its normal on the side of +z: `PLANE` where it is one, else
-    /// `B_SPLINE_SURFACE_WITH_KNOTS`.
-    pub(super) fn surface(&self, data: &mut Data, surface: &Surface) -> Id {
-        match surface {
-            Surface::Patches(patches) => self.patches(data, patches),
+    /// What a face lies on: an `elementary_surface`, or `B_SPLINE_SURFACE_WITH_KNOTS`.
+    pub(super) fn surface(&self, data: &mut Data, carrier: &Carrier, surface: &Surface) -> Id {
+        let Surface::Patches(patches) = surface;
+        match carrier {
+            Carrier::Plane(flat) => {
+                let placement = self.placement(data, flat.origin_mm, flat.normal, flat.x);
+                data.add("PLANE", |v| {
+                    v.text("");
+                    v.id(placement);
+                })
+            }
+            Carrier::Round(analytic) => self.analytic(data, analytic),
+            Carrier::Spline => self.patches(data, patches),
         }
+    }
+
+    /// A surface by its numbers.
+    fn analytic(&self, data: &mut Data, carrier: &Analytic) -> Id {
+        let placement = self.placement(data, carrier.origin_mm, carrier.axis, carrier.x);
+        let keyword = match carrier.shape.family() {
+            Family::Plane => "PLANE",
+            Family::Cylinder => "CYLINDRICAL_SURFACE",
+            Family::Cone => "CONICAL_SURFACE",
+            Family::Sphere => "SPHERICAL_SURFACE",
+            Family::Torus => "TOROIDAL_SURFACE",
+        };
+        data.add(keyword, |v| {
+            v.text("");
+            v.id(placement);
+            for &length_mm in &carrier.lengths_mm {
+                v.real(length_mm / self.unit.mm());
+            }
+            carrier
+                .angle_rad
+                .into_iter()
+                .for_each(|angle| v.real(angle));
+        })
     }
 
     fn patches(&self, data: &mut Data, patches: &PatchSurface) -> Id {
         let spline = patches.to_bspline(SMOOTH_MM);
-        if let Some((origin_mm, normal, x)) = plane(&spline) {
-            let placement = self.placement(data, origin_mm, normal, x);
-            return data.add("PLANE", |v| {
-                v.text("");
-                v.id(placement);
-            });
-        }
         let points: Vec<Id> = spline
             .points()
             .iter()
@@ -139,56 +161,4 @@ fn multiplicities(values: &mut Values<'_>, knots: &KnotVector) {
         .map(<[f64]>::len)
         .collect();
     values.integers(&runs);
-}
-
-/// A point, the unit normal on the side of +z and a unit vector in it of the plane that
-/// holds all control points, if there is one. Shapes between control points are no
-/// further from it than these are.
-fn plane(spline: &BSplineSurface) -> Option<([f64; 3], [f64; 3], [f64; 3])> {
-    let (columns, rows) = (
-        spline.u_knots().control_count(),
-        spline.v_knots().control_count(),
-    );
-    let origin = spline.point(0, 0)?;
-    let [along_x, along_y] = [spline.point(columns - 1, 0)?, spline.point(0, rows - 1)?];
-    let slope_x = (along_x[2] - origin[2]) / (along_x[0] - origin[0]);
-    let slope_y = (along_y[2] - origin[2]) / (along_y[1] - origin[1]);
-    let flat = spline.points().iter().all(|point| {
-        let z = origin[2] + slope_x * (point[0] - origin[0]) + slope_y * (point[1] - origin[1]);
-        (point[2] - z).abs() <= FLAT_MM
-    });
-    let unit = |vector: [f64; 3]| {
-        let length = vector.iter().map(|c| c * c).sum::<f64>().sqrt();
-        vector.map(|c| c / length)
-    };
-    flat.then(|| {
-        (
-            origin,
-            unit([-slope_x, -slope_y, 1.0]),
-            unit([1.0, 0.0, slope_x]),
-        )
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_plane_is_known_by_its_control_points() {
-        let graph = |bump: f64| {
-            let z = move |i: usize, j: usize| {
-                let middle = if (i, j) == (4, 4) { bump } else { 0.0 };
-                0.75 * i as f64 + middle
-            };
-            PatchSurface::through_thirds(vec![0.0, 3.0, 6.0], vec![0.0, 3.0, 6.0], z)
-                .unwrap()
-                .to_bspline(SMOOTH_MM)
-        };
-        let (origin, normal, x) = plane(&graph(0.0)).unwrap();
-        assert_eq!(origin, [0.0; 3]);
-        let near = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
-        assert!(near(normal, [-0.6, 0.0, 0.8]) && near(x, [0.8, 0.0, 0.6]));
-        assert_eq!(plane(&graph(1e-3)), None);
-    }
 }

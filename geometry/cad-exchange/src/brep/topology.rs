@@ -9,58 +9,61 @@ use std::collections::BTreeMap;
 
 use nurbs::PiecewiseCubic;
 use reconstruct::{Coedge, EdgeKind, Loop, Model};
+use shapes::Shape;
 
 use super::bend::bent;
 use super::corners::Corners;
 use super::groups::Groups;
-use super::options::WriteOptions;
 use super::seam::{Seam, distance};
+use super::{Sharing, onto};
 use crate::common::{ROUNDING_PART, SMOOTH_MM, without_kinks};
 
 /// The use of an edge by a loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Use {
+pub(crate) struct Use {
     /// Index into [`Topology::edges`].
-    pub(super) edge: usize,
+    pub(crate) edge: usize,
     /// The loop runs from the edge's start to its end.
-    pub(super) forward: bool,
+    pub(crate) forward: bool,
 }
 
 /// A curve between two vertices, millimetres.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Strand {
+pub(crate) struct Strand {
     /// Indices into [`Topology::vertices`].
-    pub(super) ends: [usize; 2],
-    pub(super) curve: PiecewiseCubic<3>,
+    pub(crate) ends: [usize; 2],
+    pub(crate) curve: PiecewiseCubic<3>,
 }
 
 /// What is written once, however many faces it belongs to.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Topology {
+pub(crate) struct Topology {
     /// Millimetres.
-    pub(super) vertices: Vec<[f64; 3]>,
-    pub(super) edges: Vec<Strand>,
+    pub(crate) vertices: Vec<[f64; 3]>,
+    pub(crate) edges: Vec<Strand>,
     /// By face, loop (the outer one first) and coedge.
-    pub(super) uses: Vec<Vec<Vec<Use>>>,
+    pub(crate) uses: Vec<Vec<Vec<Use>>>,
     /// Indices of faces that hang together, each in ascending order.
-    pub(super) shells: Vec<Vec<usize>>,
+    pub(crate) shells: Vec<Vec<usize>>,
     /// Edges of two faces.
-    pub(super) shared: usize,
+    pub(crate) shared: usize,
     /// Those of them that are cut where the two curves part.
-    pub(super) partly_shared: usize,
+    pub(crate) partly_shared: usize,
     /// Creases whose two curves are too far apart to be shared.
-    pub(super) parted: usize,
-    /// How far a written curve or vertex is from where a face of the model has it.
-    pub(super) gap_mm: f64,
+    pub(crate) parted: usize,
+    /// How far a written curve is from the shape of a face, or from where the face has it if it is
+    /// of none.
+    pub(crate) gap_mm: f64,
 }
 
 /// Indices of a face, of a loop of it (the outer one first) and of a coedge of that.
 pub(super) type Place = (usize, usize, usize);
 
-/// The topology of a checked model.
-pub(super) fn topology(model: &Model, options: &WriteOptions) -> Topology {
-    let (seams, parted) = seams(model, options.sharing_mm);
-    let corners = Corners::new(model, &seams);
+/// The topology of a checked model; `shapes` are those of its faces, where they are known, which
+/// vertices and edges are then put on.
+pub(super) fn topology(model: &Model, shapes: &[Option<Shape>], sharing: Sharing) -> Topology {
+    let (seams, parted) = seams(model, sharing.sharing_mm);
+    let corners = Corners::new(model, &seams, shapes);
     let mut hung = Groups::new(model.faces.len());
     for (place, seam) in &seams {
         hung.join(place.0, seam.other.0);
@@ -75,7 +78,8 @@ pub(super) fn topology(model: &Model, options: &WriteOptions) -> Topology {
     };
     let mut builder = Builder {
         out: &mut out,
-        rounding_mm: ROUNDING_PART * options.resolution_mm,
+        shapes,
+        rounding_mm: ROUNDING_PART * sharing.resolution_mm,
         written: BTreeMap::new(),
     };
     let mut uses = Vec::new();
@@ -125,6 +129,8 @@ fn seams(model: &Model, sharing_mm: f64) -> (BTreeMap<Place, Seam>, usize) {
 /// Writes down strands, shared ones once.
 struct Builder<'a> {
     out: &'a mut Topology,
+    /// Of each face.
+    shapes: &'a [Option<Shape>],
     rounding_mm: f64,
     /// What the second user of a seam has to know.
     written: BTreeMap<Place, Written>,
@@ -150,16 +156,21 @@ impl Builder<'_> {
     ) -> Vec<Use> {
         let (first, last) = curve.domain();
         let (range, edge, forward) = if let Some(seam) = seam {
+            let both = [place.0, seam.other.0].into_iter();
+            let shapes: Option<Vec<Shape>> = both.map(|face| self.shapes[face]).collect();
             let cut = |whole: bool, vertex: usize, at: [f64; 3], out: &mut Topology| {
                 if whole {
                     return vertex;
                 }
-                out.vertices.push(at);
+                let on = shapes.as_ref().and_then(|shapes| onto::point(at, shapes));
+                out.vertices.push(on.unwrap_or(at));
                 out.vertices.len() - 1
             };
             let start = cut(seam.range.0 == first, ends[0], seam.curve.start(), self.out);
             let end = cut(seam.range.1 == last, ends[1], seam.curve.end(), self.out);
-            let edge = self.strand(&seam.curve, [start, end], &seam.sides);
+            let [of_first, of_other] = &seam.sides;
+            let sides = [(place.0, of_first), (seam.other.0, of_other)];
+            let edge = self.strand(&seam.curve, [start, end], &sides);
             let mirrored = [
                 (seam.range.1 < last).then_some(seam.range.1),
                 (seam.range.0 > first).then_some(seam.range.0),
@@ -172,7 +183,7 @@ impl Builder<'_> {
             let [from, to] = mirrored;
             ((from.unwrap_or(first), to.unwrap_or(last)), edge, false)
         } else {
-            let edge = self.strand(curve, ends, std::slice::from_ref(curve));
+            let edge = self.strand(curve, ends, &[(place.0, curve)]);
             return vec![Use {
                 edge,
                 forward: true,
@@ -184,39 +195,49 @@ impl Builder<'_> {
             cuts.reverse();
         }
         let mut chain = Vec::new();
-        chain.extend(self.rest(curve, (first, range.0), [ends[0], cuts[0]]));
+        chain.extend(self.rest(place.0, curve, (first, range.0), [ends[0], cuts[0]]));
         chain.push(shared);
-        chain.extend(self.rest(curve, (range.1, last), [cuts[1], ends[1]]));
+        chain.extend(self.rest(place.0, curve, (range.1, last), [cuts[1], ends[1]]));
         chain
     }
 
     /// The part of a face's own curve between two parameters, if there is one.
     fn rest(
         &mut self,
+        face: usize,
         curve: &PiecewiseCubic<3>,
         (from, to): (f64, f64),
         ends: [usize; 2],
     ) -> Option<Use> {
         let part = curve.restricted(from, to)?;
-        let edge = self.strand(&part, ends, std::slice::from_ref(&part));
+        let edge = self.strand(&part, ends, &[(face, &part)]);
         Some(Use {
             edge,
             forward: true,
         })
     }
 
-    /// Adds a curve that is led to its vertices and has no kinks for which readers would
-    /// split it, and notes how far it is from what the faces have.
+    /// Adds a curve that is led to its vertices and onto the shapes of its faces, and has no kinks
+    /// for which readers would split it, and notes how far it is from what the faces have.
+    /// `sides` are these faces, with the curves that they make of it.
     fn strand(
         &mut self,
         curve: &PiecewiseCubic<3>,
         ends: [usize; 2],
-        sides: &[PiecewiseCubic<3>],
+        sides: &[(usize, &PiecewiseCubic<3>)],
     ) -> usize {
         let [start, end] = ends.map(|vertex| self.out.vertices[vertex]);
-        let curve = without_kinks(&bent(curve, start, end), SMOOTH_MM, self.rounding_mm);
-        for side in sides {
-            self.out.gap_mm = self.out.gap_mm.max(distance(side, &curve));
+        // Between a shape and a spline the mean is the least off both.
+        let shapes: Option<Vec<Shape>> = sides.iter().map(|(face, _)| self.shapes[*face]).collect();
+        let on = shapes.and_then(|shapes| onto::curve(curve, &shapes));
+        let led = bent(on.as_ref().unwrap_or(curve), start, end);
+        let curve = without_kinks(&led, SMOOTH_MM, self.rounding_mm);
+        for (face, side) in sides {
+            let off_mm = match &self.shapes[*face] {
+                Some(shape) => onto::off(&curve, shape),
+                None => distance(side, &curve),
+            };
+            self.out.gap_mm = self.out.gap_mm.max(off_mm);
         }
         self.out.edges.push(Strand { ends, curve });
         self.out.edges.len() - 1

@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 
 use reconstruct::{Coedge, Model, VertexId};
+use shapes::Shape;
 
 use super::groups::Groups;
+use super::onto;
 use super::seam::Seam;
 use super::topology::{Place, coedge, loops_of};
 
@@ -17,7 +19,12 @@ pub(super) struct Corners {
 }
 
 impl Corners {
-    pub(super) fn new(model: &Model, seams: &BTreeMap<Place, Seam>) -> Self {
+    /// `shapes` are those of the faces, where they are known.
+    pub(super) fn new(
+        model: &Model,
+        seams: &BTreeMap<Place, Seam>,
+        shapes: &[Option<Shape>],
+    ) -> Self {
         let mut nodes: BTreeMap<(VertexId, usize), usize> = BTreeMap::new();
         let mut points: Vec<[f64; 3]> = Vec::new();
         for (face, loops) in model.faces.iter().map(loops_of).enumerate() {
@@ -51,12 +58,28 @@ impl Corners {
                 number_of[node] = number;
             }
         }
+        // Where all faces are known, their corner is.
+        let mut shapes_at: Vec<Option<Vec<Shape>>> = vec![Some(Vec::new()); groups.len()];
+        for (&(_, face), &node) in &nodes {
+            let at = &mut shapes_at[number_of[node]];
+            *at = at.take().zip(shapes[face]).map(|(mut of, shape)| {
+                of.push(shape);
+                of
+            });
+        }
+        let points = groups.iter().zip(&shapes_at).map(|(group, shapes)| {
+            let point = middle(group, &points);
+            let on = shapes
+                .as_ref()
+                .and_then(|shapes| onto::point(point, shapes));
+            on.unwrap_or(point)
+        });
         Self {
+            points: points.collect(),
             numbers: nodes
                 .into_iter()
                 .map(|(key, node)| (key, number_of[node]))
                 .collect(),
-            points: groups.iter().map(|group| middle(group, &points)).collect(),
         }
     }
 
