@@ -1,0 +1,176 @@
+//! What the user may say, and what follows from it.
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use compare::{Alignment, CompareSettings, Tolerance};
+use regrid::RegridSettings;
+use scan_files::Units;
+
+use crate::command::part::{Limits, limits};
+use crate::failure::Failure;
+
+/// Hold a scan against its nominal, without a service
+///
+/// Reads a scan file as `convert` does, and the nominal from an STL file in millimetres. The scan
+/// is brought onto the nominal by best fit, from wherever it lies, or compared as placed; its
+/// deviations are distances along the nominal's normals, positive where there is more material.
+/// What lies significantly beyond the tolerance is told with place, size and depth. Exit code 0
+/// when there is nothing, 1 when there is, or when it did not succeed.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// The scan file
+    #[arg(value_name = "SCAN")]
+    pub(super) scan: PathBuf,
+    /// The nominal: an STL file, seen from +z as the scan is
+    #[arg(value_name = "NOMINAL.stl")]
+    pub(super) nominal: PathBuf,
+    /// Bring the scan onto the nominal by best fit, or compare both as placed
+    #[arg(long, value_name = "HOW", value_enum, default_value_t = AlignName::BestFit)]
+    align: AlignName,
+    /// Deviations allowed to either side, millimetres; default: none that is significant
+    #[arg(long, value_name = "MM", conflicts_with_all = ["upper_mm", "lower_mm"])]
+    tolerance_mm: Option<f64>,
+    /// Greatest deviation allowed, millimetres
+    #[arg(
+        long,
+        value_name = "MM",
+        requires = "lower_mm",
+        allow_hyphen_values = true
+    )]
+    upper_mm: Option<f64>,
+    /// Least deviation allowed, millimetres; usually negative
+    #[arg(
+        long,
+        value_name = "MM",
+        requires = "upper_mm",
+        allow_hyphen_values = true
+    )]
+    lower_mm: Option<f64>,
+    /// Points farther than this from the nominal belong to something else, millimetres;
+    /// default: 2, ten times the noise, or three times the tolerance, whatever is most
+    #[arg(long, value_name = "MM")]
+    limit_mm: Option<f64>,
+    /// Diameter of the smallest patch whose mean deviation is told, millimetres; default: 5.5
+    /// times the distance of samples
+    #[arg(long, value_name = "MM")]
+    patch_mm: Option<f64>,
+    /// Probability, at most, that anything is told of a part that meets its tolerance
+    #[arg(long, value_name = "P", default_value_t = 0.01)]
+    false_alarm: f64,
+    /// Write a report as JSON, too
+    #[arg(long, value_name = "FILE.json")]
+    pub(super) report: Option<PathBuf>,
+    /// Draw a map of the deviations with a histogram, too
+    #[arg(long, value_name = "FILE.png")]
+    pub(super) map: Option<PathBuf>,
+    /// Distance of the grid's nodes, millimetres; default: after the scan's density
+    #[arg(long, value_name = "MM")]
+    pub(super) pitch_mm: Option<f64>,
+    /// Unit of the coordinates in the scan file; default: millimetres, or what the file says
+    #[arg(long, value_name = "UNIT", value_enum)]
+    units: Option<UnitName>,
+    /// Unit of the coordinates in the nominal's file, which does not say
+    #[arg(long, value_name = "UNIT", value_enum, default_value_t = UnitName::Mm)]
+    nominal_units: UnitName,
+    /// Ignore samples with x outside of these limits, millimetres; one may be left out, as
+    /// in `-50,`
+    #[arg(long, value_name = "MIN,MAX", value_parser = limits, allow_hyphen_values = true)]
+    roi_x_mm: Option<Limits>,
+    /// The same for y (up)
+    #[arg(long, value_name = "MIN,MAX", value_parser = limits, allow_hyphen_values = true)]
+    roi_y_mm: Option<Limits>,
+    /// The same for z (towards the camera)
+    #[arg(long, value_name = "MIN,MAX", value_parser = limits, allow_hyphen_values = true)]
+    roi_z_mm: Option<Limits>,
+    /// Seed of every random draw
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Threads to use; 0 for all processors. The result does not depend on it
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum AlignName {
+    BestFit,
+    AsPlaced,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum UnitName {
+    Mm,
+    M,
+    Inch,
+}
+
+impl Args {
+    pub(super) fn units(&self) -> Option<Units> {
+        self.units.map(|units| match units {
+            UnitName::Mm => Units::Millimetre,
+            UnitName::M => Units::Metre,
+            UnitName::Inch => Units::Inch,
+        })
+    }
+
+    /// Millimetres in a unit of the nominal's file.
+    pub(super) fn nominal_unit_mm(&self) -> f64 {
+        match self.nominal_units {
+            UnitName::Mm => 1.0,
+            UnitName::M => 1000.0,
+            UnitName::Inch => 25.4,
+        }
+    }
+
+    /// How the scan is compared.
+    pub(super) fn settings(&self) -> Result<CompareSettings, Failure> {
+        if let Some(tolerance_mm) = self.tolerance_mm
+            && !(tolerance_mm > 0.0 && tolerance_mm <= 1000.0)
+        {
+            return Err(Failure::Usage(format!(
+                "--tolerance-mm {tolerance_mm}: must be above 0 and at most 1000"
+            )));
+        }
+        let sides = self.lower_mm.zip(self.upper_mm);
+        let sides = sides.or(self.tolerance_mm.map(|both| (-both, both)));
+        let settings = CompareSettings {
+            alignment: match self.align {
+                AlignName::BestFit => Alignment::BestFit,
+                AlignName::AsPlaced => Alignment::AsPlaced,
+            },
+            tolerance: sides.map(|(lower_mm, upper_mm)| Tolerance { lower_mm, upper_mm }),
+            limit_mm: self.limit_mm,
+            patch_mm: self.patch_mm,
+            false_alarm: self.false_alarm,
+            ..CompareSettings::default()
+        };
+        settings
+            .validate()
+            .map_err(|error| Failure::Usage(error.to_string()))?;
+        Ok(settings)
+    }
+
+    /// How the scan is regridded: as it would be for `convert`, but for what the user says.
+    pub(super) fn regrid(&self, mut settings: RegridSettings) -> Result<RegridSettings, Failure> {
+        if let Some(pitch_mm) = self.pitch_mm {
+            settings.pitch_mm = pitch_mm;
+        }
+        if let Some(seed) = self.seed {
+            settings.seed = seed;
+        }
+        for (place, given) in [
+            (&mut settings.roi.x_mm, self.roi_x_mm),
+            (&mut settings.roi.y_mm, self.roi_y_mm),
+            (&mut settings.roi.z_mm, self.roi_z_mm),
+        ] {
+            if let Some(limits) = given {
+                *place = limits.mm();
+            }
+        }
+        settings.threads = self.threads;
+        settings
+            .validate()
+            .map_err(|error| Failure::Usage(error.to_string()))?;
+        Ok(settings)
+    }
+}

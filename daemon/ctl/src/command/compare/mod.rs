@@ -1,0 +1,9 @@
+//! `relief compare`.
+
+mod args;
+mod nominal;
+mod run;
+mod summary;
+
+pub(crate) use args::Args;
+pub(crate) use run::run;

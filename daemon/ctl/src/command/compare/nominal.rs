@@ -1,0 +1,280 @@
+//! The nominal from its file.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
+
+use compare::{FACETS_MAX, Nominal, NominalError};
+
+use crate::failure::Failure;
+
+/// Length of a binary file's header, its count of facets included, and of each facet.
+const HEADER_BYTES: u64 = 84;
+const FACET_BYTES: u64 = 50;
+/// Longest file: twice as long as the longest text with the most facets.
+const MOST_BYTES: u64 = 1 << 30;
+
+/// Reads an STL file, text or binary, with lengths of `unit_mm`.
+pub(super) fn read(path: &Path, unit_mm: f64) -> Result<Nominal, Failure> {
+    let name = path.display().to_string();
+    let failed = |why: &str| Failure::Failed(format!("{name}: {why}"));
+    if path.is_dir() {
+        return Err(failed("is a directory; name an STL file in it"));
+    }
+    let cannot = |error| Failure::at(format!("cannot read {name}"), &error);
+    let file = File::open(path).map_err(cannot)?;
+    let bytes = file.metadata().map_err(cannot)?.len();
+    let mut source = BufReader::new(file);
+    let mut head = Vec::new();
+    source
+        .by_ref()
+        .take(HEADER_BYTES)
+        .read_to_end(&mut head)
+        .map_err(cannot)?;
+    if bytes > MOST_BYTES {
+        return Err(failed(
+            "is longer than 1 GiB, the most that is read: decimate the mesh first",
+        ));
+    }
+    if head.is_empty() {
+        return Err(failed("is empty"));
+    }
+    if let Some(format) = other_format(&head) {
+        return Err(failed(&format!(
+            "is {format}, which is not read as a nominal; only STL is: export the model as STL, \
+             with a chord error well below the tolerance"
+        )));
+    }
+    let is_text = head.trim_ascii_start().starts_with(b"solid") && !is_binary(&head, bytes);
+    let mut solid = if is_text {
+        source.rewind().map_err(cannot)?;
+        let mut line = Vec::new();
+        source.read_until(b'\n', &mut line).map_err(cannot)?;
+        Reheaded::new(&mut source, b"solid \n".to_vec(), line.len())
+    } else {
+        check_length(&head, bytes).map_err(|why| failed(&why))?;
+        head.iter_mut().take(80).for_each(|byte| *byte = 0);
+        let length = head.len();
+        Reheaded::new(&mut source, head, length)
+    };
+    let (vertices, facets) = facets(&mut solid, unit_mm).map_err(|why| failed(&why))?;
+    Nominal::new(&vertices, &facets).map_err(|error| match error {
+        NominalError::Empty => failed("holds no facet"),
+        other => failed(&other.to_string()),
+    })
+}
+
+/// Whether the number of facets fits the file's length: some binary files begin with `solid`, too.
+fn is_binary(head: &[u8], bytes: u64) -> bool {
+    announced(head).is_some_and(|count| HEADER_BYTES + FACET_BYTES * count == bytes)
+}
+
+fn announced(head: &[u8]) -> Option<u64> {
+    let count = head.get(80..84)?.try_into().ok()?;
+    Some(u64::from(u32::from_le_bytes(count)))
+}
+
+/// A binary file must hold what its header announces.
+fn check_length(head: &[u8], bytes: u64) -> Result<(), String> {
+    let Some(count) = announced(head) else {
+        return Err(format!(
+            "is no STL file: {bytes} bytes are less than the header of a binary one, and it does \
+             not begin with `solid`"
+        ));
+    };
+    let needed = HEADER_BYTES + FACET_BYTES * count;
+    if bytes < needed {
+        return Err(format!(
+            "is cut off, or no STL file: its header announces {count} facets, which take {needed} \
+             bytes; there are {bytes}"
+        ));
+    }
+    Ok(())
+}
+
+/// A file with another beginning. The library takes for text what begins with `solid` and a space:
+/// some text files have no space there, and some binary ones begin just so.
+struct Reheaded<'a, R> {
+    rest: &'a mut R,
+    rest_from: u64,
+    head: Vec<u8>,
+    at: usize,
+}
+
+impl<'a, R: Read + Seek> Reheaded<'a, R> {
+    /// `head` in the place of the first `instead_of` bytes, behind which the file is.
+    fn new(rest: &'a mut R, head: Vec<u8>, instead_of: usize) -> Self {
+        Self {
+            rest,
+            rest_from: instead_of as u64,
+            head,
+            at: 0,
+        }
+    }
+}
+
+impl<R: Read + Seek> Read for Reheaded<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let mut left = self.head.get(self.at..).unwrap_or(&[]);
+        if left.is_empty() {
+            return self.rest.read(buffer);
+        }
+        let read = left.read(buffer)?;
+        self.at += read;
+        Ok(read)
+    }
+}
+
+impl<R: Read + Seek> Seek for Reheaded<'_, R> {
+    /// Goes to the beginning, which is all that the library asks for.
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        if to != SeekFrom::Start(0) {
+            return Err(io::ErrorKind::Unsupported.into());
+        }
+        self.at = 0;
+        self.rest.seek(SeekFrom::Start(self.rest_from))?;
+        Ok(0)
+    }
+}
+
+type Indexed = (Vec<[f64; 3]>, Vec<[usize; 3]>);
+
+/// Vertices, each once, and facets as indices of them.
+fn facets(source: &mut (impl Read + Seek), unit_mm: f64) -> Result<Indexed, String> {
+    let damaged = |facet: usize, error: &std::io::Error| {
+        format!("is damaged, or no STL file: facet {facet}: {error}")
+    };
+    let reader = stl_io::create_stl_reader(source).map_err(|error| damaged(1, &error))?;
+    let (mut vertices, mut facets) = (Vec::new(), Vec::new());
+    let mut known: HashMap<[u32; 3], usize> = HashMap::new();
+    for (number, triangle) in (1..).zip(reader) {
+        let triangle = triangle.map_err(|error| damaged(number, &error))?;
+        if number > FACETS_MAX {
+            return Err(format!(
+                "has more than {FACETS_MAX} facets, the most that are read: decimate the mesh first"
+            ));
+        }
+        facets.push(triangle.vertices.map(|vertex| {
+            // Adding 0 makes one of both zeros.
+            let place = [vertex[0], vertex[1], vertex[2]].map(|c: f32| c + 0.0);
+            *known.entry(place.map(f32::to_bits)).or_insert_with(|| {
+                vertices.push(place.map(|c| f64::from(c) * unit_mm));
+                vertices.len() - 1
+            })
+        }));
+    }
+    Ok((vertices, facets))
+}
+
+/// What a file is that is no STL.
+fn other_format(head: &[u8]) -> Option<&'static str> {
+    let text = head.trim_ascii_start();
+    let is_iges = head.get(72) == Some(&b'S') && head.get(73..80).is_some_and(is_number);
+    let known: [(&[u8], &str); 7] = [
+        (b"ISO-10303-21", "a STEP file"),
+        (b"ply", "a PLY file"),
+        (b"PK\x03\x04", "a ZIP archive or 3MF file"),
+        (b"\x1f\x8b", "compressed with gzip"),
+        (b"v ", "a Wavefront OBJ file"),
+        (b"# ", "a text file, perhaps Wavefront OBJ"),
+        (b"OFF", "an OFF file"),
+    ];
+    let found = known.iter().find(|(start, _)| text.starts_with(start));
+    found
+        .map(|(_, format)| *format)
+        .or(is_iges.then_some("an IGES file"))
+}
+
+fn is_number(text: &[u8]) -> bool {
+    let digits = text.trim_ascii();
+    !digits.is_empty() && digits.iter().all(u8::is_ascii_digit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fmt::Write as _;
+
+    fn told(content: &[u8]) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("part.stl");
+        std::fs::write(&path, content).unwrap();
+        match read(&path, 1.0) {
+            Ok(nominal) => format!(
+                "{} facets; {}",
+                nominal.facets(),
+                nominal.remarks().join("; ")
+            ),
+            Err(failure) => failure.to_string().split_once(": ").unwrap().1.to_owned(),
+        }
+    }
+
+    fn text(facets: &[[[f64; 3]; 3]]) -> Vec<u8> {
+        let mut text = "solid part\n".to_owned();
+        for facet in facets {
+            text.push_str("facet normal 0 0 0\nouter loop\n");
+            for [x, y, z] in facet {
+                writeln!(text, "vertex {x} {y} {z}").unwrap();
+            }
+            text.push_str("endloop\nendfacet\n");
+        }
+        text.push_str("endsolid part\n");
+        text.into_bytes()
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_nominal_is_told() {
+        let [a, b, c, d] = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        let square = text(&[[a, b, c], [a, c, d]]);
+        assert!(
+            told(&square).starts_with("2 facets; the mesh is open: 4 edges"),
+            "{}",
+            told(&square)
+        );
+        let nameless = String::from_utf8(square.clone()).unwrap();
+        let nameless = nameless.replace("solid part", "solid");
+        assert!(
+            told(nameless.as_bytes()).starts_with("2 facets"),
+            "{}",
+            told(nameless.as_bytes())
+        );
+        let mut binary = b"solid by a program that writes binary files".to_vec();
+        binary.resize(80, b' ');
+        binary.extend(1_u32.to_le_bytes());
+        binary.extend([0; 12]);
+        for coordinate in [a, b, c].as_flattened() {
+            binary.extend((*coordinate as f32).to_le_bytes());
+        }
+        binary.extend([0; 2]);
+        assert!(told(&binary).starts_with("1 facets"), "{}", told(&binary));
+        assert_eq!(told(b""), "is empty");
+        assert!(told(b"solid x\nendsolid x\n").contains("holds no facet"));
+        assert!(told(&text(&[[a, b, b]])).contains("none of its 1 facets has an area"));
+        let flat = told(&text(&[[a, b, c], [a, c, d], [a, b, a]]));
+        assert!(
+            flat.contains("1 of 3 facets have no area and were left out, the first is number 3")
+        );
+        let turned = told(&text(&[[a, b, c], [a, d, c]]));
+        assert!(
+            turned.contains("disagree on which side is outside"),
+            "{turned}"
+        );
+        assert!(turned.contains("(0.500, 0.500, 0.000) mm"), "{turned}");
+        let endless = told(&text(&[[a, b, [f64::INFINITY; 3]]]));
+        assert!(endless.contains("facet 1"), "{endless}");
+        assert!(told(b"ISO-10303-21;\nHEADER;").contains("is a STEP file, which is not read"));
+        let mut binary = vec![0; 84];
+        binary[80] = 3;
+        assert!(told(&binary).contains("announces 3 facets, which take 234 bytes; there are 84"));
+        assert!(told(b"x y z\n1 2 3\n").contains("is no STL file"));
+        let broken = String::from_utf8(square)
+            .unwrap()
+            .replace("vertex 1 1 0", "vertex 1 one 0");
+        assert!(
+            told(broken.as_bytes()).contains("facet 1"),
+            "{}",
+            told(broken.as_bytes())
+        );
+    }
+}

@@ -1,0 +1,232 @@
+//! The comparison itself.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+
+use compare::{CompareError, Comparison, Nominal};
+use deliverables::{ComparisonReport, write_atomically};
+use pipeline::Extent;
+use range_image::{Column, Monitor, RangeImage};
+use regrid::{RegridError, Roi};
+use serde::Serialize;
+
+use super::{Args, nominal, summary};
+use crate::command::places;
+use crate::failure::Failure;
+use crate::input;
+use crate::output;
+use crate::progress::Progress;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+pub(super) struct Compared {
+    /// Whether nothing lies significantly beyond the limits.
+    pub(super) passed: bool,
+    /// The map that was drawn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) map: Option<PathBuf>,
+    pub(super) report: ComparisonReport,
+}
+
+/// Shows on standard error how far it is; ends it on Ctrl-C.
+struct Shown {
+    stop: AtomicBool,
+    bar: Mutex<Option<Progress>>,
+}
+
+impl Monitor for Shown {
+    fn is_cancelled(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    fn progress(&self, fraction: f64) {
+        if let Ok(mut bar) = self.bar.lock()
+            && let Some(bar) = bar.as_mut()
+        {
+            bar.at(fraction, "");
+        }
+    }
+}
+
+impl Shown {
+    fn begin(&self, title: &str) {
+        self.end("done");
+        if let Ok(mut bar) = self.bar.lock() {
+            *bar = Some(Progress::share(title));
+        }
+    }
+
+    fn end(&self, message: &str) {
+        if let Ok(mut bar) = self.bar.lock()
+            && let Some(bar) = bar.take()
+        {
+            bar.finish(message);
+        }
+    }
+}
+
+/// Compares; Ctrl-C ends it without leaving half a file.
+pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
+    let shown = Arc::new(Shown {
+        stop: AtomicBool::new(false),
+        bar: Mutex::new(None),
+    });
+    let worker = Arc::clone(&shown);
+    let mut work = tokio::task::spawn_blocking(move || {
+        let compared = compare_files(&args, &worker);
+        worker.end(if compared.is_ok() { "done" } else { "failed" });
+        compared
+    });
+    let joined = tokio::select! {
+        joined = &mut work => joined,
+        _ = tokio::signal::ctrl_c() => {
+            shown.stop.store(true, Ordering::Relaxed);
+            work.await
+        }
+    };
+    let compared = joined.map_err(|error| Failure::at("the comparison broke off", &error))??;
+    for warning in &compared.report.warnings {
+        eprintln!("relief: note: {warning}");
+    }
+    output::either(json, &compared, summary::told)?;
+    if compared.passed {
+        return Ok(());
+    }
+    Err(Failure::Failed(summary::verdict(&compared.report)))
+}
+
+fn compare_files(args: &Args, shown: &Shown) -> Result<Compared, Failure> {
+    let settings = args.settings()?;
+    args.report.as_deref().map_or(Ok(()), places::check_file)?;
+    args.map.as_deref().map_or(Ok(()), places::check_file)?;
+    // The nominal first: it is the quicker one to be refused.
+    let nominal = nominal::read(&args.nominal, args.nominal_unit_mm())?;
+    let input = input::read(&args.scan, args.units())?;
+    let scan_file = args.scan.display();
+    if let Some(why) = pipeline::no_surface(&input.columns, input.column_pitch_mm) {
+        return Err(Failure::Failed(format!("{scan_file}: {why}")));
+    }
+    let regrid = args.regrid(input.settings().regrid)?;
+    if let Some(extent) = Extent::within(&input.columns, &regrid.roi)
+        && regrid.pitch_mm < extent.finest_pitch_mm()
+    {
+        return Err(Failure::Failed(format!(
+            "{scan_file}: a grid of {} mm is too fine for its size and number of samples; leave \
+             out single points far away with --roi-x-mm and --roi-y-mm, else choose --pitch-mm {}",
+            regrid.pitch_mm,
+            extent.finest_pitch_mm()
+        )));
+    }
+    shown.begin("regrid");
+    let image =
+        regrid::regrid(input.columns.iter().cloned(), &regrid, shown).map_err(
+            |error| match error {
+                RegridError::Cancelled(_) => Failure::Interrupted,
+                other => Failure::at(&scan_file, &other),
+            },
+        )?;
+    shown.begin("compare");
+    let columns = cropped(&input.columns, &regrid.roi);
+    let compared = regrid::with_threads(regrid.threads, || {
+        compare::compare(&image, &columns, &nominal, &settings, shown)
+    })
+    .map_err(|error| Failure::at("cannot compare", &error))?;
+    let comparison = compared.map_err(|error| refused(args, &error))?;
+    if let Some(path) = &args.map {
+        draw(path, args, &image, &comparison, settings.tolerance)?;
+    }
+    let warnings = remarks(args, input.notes, &nominal);
+    let source = file_name(&args.nominal);
+    let nominal = (source, &nominal);
+    let report = ComparisonReport::new(
+        &comparison,
+        &image,
+        &settings,
+        input.scan,
+        nominal,
+        warnings,
+    );
+    if let Some(path) = &args.report {
+        write_atomically::<deliverables::DeliverError>(path, |sink| {
+            serde_json::to_writer_pretty(&mut *sink, &report)?;
+            Ok(sink.write_all(b"\n")?)
+        })
+        .map_err(|error| Failure::at(format!("cannot write {}", path.display()), &error))?;
+    }
+    Ok(Compared {
+        passed: report.passed,
+        map: args.map.clone(),
+        report,
+    })
+}
+
+/// What is odd about the files, each named.
+fn remarks(args: &Args, of_scan: Vec<String>, nominal: &Nominal) -> Vec<String> {
+    let of_scan = of_scan
+        .iter()
+        .map(|note| format!("{}: {note}", args.scan.display()));
+    let of_nominal = nominal
+        .remarks()
+        .iter()
+        .map(|remark| format!("{}: {remark}", args.nominal.display()));
+    of_scan.chain(of_nominal).collect()
+}
+
+fn draw(
+    path: &Path,
+    args: &Args,
+    image: &RangeImage,
+    comparison: &Comparison,
+    tolerance: Option<compare::Tolerance>,
+) -> Result<(), Failure> {
+    let title = format!(
+        "{} against {}",
+        file_name(&args.scan),
+        file_name(&args.nominal)
+    );
+    write_atomically::<std::io::Error>(path, |sink| {
+        deliverables::picture::write_deviations(image, comparison, tolerance, &title, sink)
+    })
+    .map(|_| ())
+    .map_err(|error| Failure::at(format!("cannot draw {}", path.display()), &error))
+}
+
+fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+/// The samples in the region of interest.
+fn cropped(columns: &[Column], roi: &Roi) -> Vec<Column> {
+    let holds = |(low, high): (f64, f64), value: f64| (low..=high).contains(&value);
+    let inside = columns
+        .iter()
+        .filter(|column| holds(roi.x_mm, column.x_mm()));
+    inside
+        .map(|column| {
+            let samples = column.samples().iter().copied();
+            let samples = samples.filter(|s| holds(roi.y_mm, s.y_mm) && holds(roi.z_mm, s.z_mm));
+            Column::new(column.x_mm(), samples.collect())
+        })
+        .collect()
+}
+
+fn refused(args: &Args, error: &CompareError) -> Failure {
+    let (scan, nominal) = (args.scan.display(), args.nominal.display());
+    let hint = match error {
+        CompareError::Cancelled(_) => return Failure::Interrupted,
+        CompareError::Units { .. } => "say so with --nominal-units, or with --units for the scan",
+        CompareError::NoOverlap { .. } => {
+            "both must be in one frame, x along the table, y up, z towards the camera; else leave \
+             --align at best-fit"
+        }
+        CompareError::NotRegistered { .. } => {
+            "check that the nominal shows the scanned side towards +z, leave out what is not the \
+             part with --roi-x-mm, --roi-y-mm and --roi-z-mm, or choose a larger --limit-mm"
+        }
+        CompareError::NothingMeasured { .. } => "check the region of interest and the pitch",
+        _ => return Failure::Failed(format!("{scan} against {nominal}: {error}")),
+    };
+    Failure::Failed(format!("{scan} against {nominal}: {error}; {hint}"))
+}
