@@ -6,14 +6,14 @@ use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    abort, change, convert, demo, doctor, fetch, jobs, laser, manual, rerun, resume, scan, scans,
-    status, token, watch, webhooks,
+    abort, change, compare, convert, demo, doctor, fetch, jobs, laser, manual, rerun, resume, scan,
+    scans, status, token, watch, webhooks,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
 ///
 /// `relief demo` shows the whole road with a simulated scanner; `relief convert` takes an
-/// existing scan file; `relief doctor` finds out why something does not work. The other
+/// existing scan file, and `relief compare` holds one against its nominal; `relief doctor` finds out why something does not work. The other
 /// commands speak to the service, reliefd.
 #[derive(Debug, Parser)]
 #[command(name = "relief", version, max_term_width = 100)]
@@ -30,6 +30,7 @@ pub(crate) struct Invocation {
 pub(crate) enum Command {
     Demo(demo::Args),
     Convert(convert::Args),
+    Compare(compare::Args),
     Scan(scan::Args),
     Abort(abort::Args),
     Resume(resume::Args),

@@ -33,6 +33,18 @@ pub(crate) fn lines(report: &Report) -> Vec<String> {
         output::counted(model.edges_shared, "edge"),
         model.free_edges
     ));
+    // Reports of earlier versions do not tell.
+    let lengths = &model.edge_lengths;
+    if lengths.measured_mm + lengths.intersected_mm + lengths.assumed_mm > 0.0 {
+        lines.push(format!(
+            "edges        {:.0} mm of outlines told by samples, {:.0} mm where faces intersect, {:.0} mm \
+             assumed ({:.0} %)",
+            lengths.measured_mm,
+            lengths.intersected_mm,
+            lengths.assumed_mm,
+            100.0 * lengths.assumed_share
+        ));
+    }
     lines.push(format!(
         "part         {} regions of at least {} nodes, {}",
         report.regions.count,

@@ -24,7 +24,8 @@ use serde_json::{Value, json};
 use sim_scanner::config::SimConfig;
 use sim_scanner::preset::Overrides;
 
-const FILES: [&str; 3] = [
+const FILES: [&str; 4] = [
+    "comparison.schema.json",
     "report.schema.json",
     "manifest.schema.json",
     "commands.schema.json",
@@ -120,8 +121,8 @@ fn the_schemas_are_schemas() {
         assert!(schema["$schema"].as_str().unwrap().contains("2020-12"));
     }
     for command in [
-        "convert", "demo", "scan", "abort", "resume", "status", "scans", "jobs", "retry", "cancel",
-        "rerun", "watch", "fetch", "doctor", "token", "laser", "webhooks",
+        "compare", "convert", "demo", "scan", "abort", "resume", "status", "scans", "jobs",
+        "retry", "cancel", "rerun", "watch", "fetch", "doctor", "token", "laser", "webhooks",
     ] {
         let reference = format!("commands.schema.json#/$defs/{command}");
         assert!(
@@ -163,6 +164,52 @@ fn the_report_of_a_conversion() {
         }
         newer["regions"]["count"] = json!("two");
         assert!(!schema.is_valid(&newer));
+    }
+}
+
+#[test]
+fn the_report_of_a_comparison() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    fs::write(at.join("roof.xyz"), text(&roof())).unwrap();
+    // The roof's left side: a plane slides, and half of the scan has no nominal.
+    let corners = [
+        "-30 -20 0",
+        "0 -20 18",
+        "0 20 22",
+        "-30 -20 0",
+        "0 20 22",
+        "-30 20 4",
+    ];
+    let facets = corners.chunks(3).map(|facet| {
+        let vertices: String = facet.iter().map(|c| format!("vertex {c}\n")).collect();
+        format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
+    });
+    let nominal = format!("solid\n{}endsolid\n", facets.collect::<String>());
+    fs::write(at.join("part.stl"), nominal).unwrap();
+    let options = [
+        "compare", "roof.xyz", "part.stl", "--json", "--report", "r.json",
+    ];
+    for (more, freedoms) in [
+        (&["--roi-x-mm=,-1"][..], 3),
+        (
+            &[
+                "--align",
+                "as-placed",
+                "--tolerance-mm",
+                "0.1",
+                "--map",
+                "m.png",
+            ],
+            0,
+        ),
+    ] {
+        let told = document(&relief(at, &[&options[..], more].concat()));
+        check("commands.schema.json#/$defs/compare", &told);
+        check("comparison.schema.json", &file(at.join("r.json")));
+        assert_eq!(told["passed"], true, "{told:#}");
+        let free = told["report"]["alignment"]["free"].as_array().unwrap();
+        assert_eq!(free.len(), freedoms, "{told:#}");
     }
 }
 
@@ -277,6 +324,8 @@ async fn what_the_clients_of_the_service_tell() {
     .await;
     assert_eq!(cancelled["id"], 3);
     told(&["cancel", "3"]).await;
+    // So that it is still under way when it is aborted.
+    scanner.control().step_columns(Some(5));
     let second = told(&["scan", "--name", "second"]).await;
     assert!(second.get("job").is_none());
     told(&["abort"]).await;

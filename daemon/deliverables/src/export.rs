@@ -26,12 +26,13 @@ pub struct CadOptions {
 }
 
 impl CadOptions {
-    /// Number of the surfaces' entity type.
+    /// Number of the surfaces' entity type; 190, that of a plane, for surfaces by their numbers.
     #[must_use]
     pub fn entity_number(&self) -> u16 {
         match self.entities {
             Entities::Parametric114 => 114,
             Entities::Rational128 => 128,
+            Entities::Analytic => 190,
         }
     }
 

@@ -6,6 +6,7 @@
 //! The bytes follow from the arguments alone, timings in the report apart: the time of
 //! the scan is given by the caller.
 
+pub mod comparison;
 mod export;
 mod file;
 mod manifest;
@@ -16,6 +17,7 @@ mod stopwatch;
 mod summary;
 mod write;
 
+pub use comparison::ComparisonReport;
 pub use export::{
     CadOptions, Entities, LengthUnit, Schema, WriteError, file_stem, write_iges, write_step,
 };

@@ -30,14 +30,14 @@ pub struct Report {
     pub crumbs: CrumbsReport,
     /// The trimmed faces made of them.
     pub model: ModelReport,
-    /// Signal-to-noise ratio of the whole restored image against the range image,
-    /// decibels, as in Shim & Lee 1995: R in 0.1 mm, 7000 to 8000; a node that one has
+    /// Signal-to-noise ratio of the whole restored image against the range image, its nodes next
+    /// to outlines decided anew ([`RangeImageReport::dropped_nodes`]), decibels, as in Shim & Lee 1995: R in 0.1 mm, 7000 to 8000; a node that one has
     /// and the other lacks counts with its full value. Larger is nearer; `null` where
     /// both are equal.
     pub snr_db: Option<f64>,
-    /// Nodes of the range image that lie outside every trimmed face.
+    /// Nodes of that range image that lie outside every trimmed face.
     pub lost_nodes: usize,
-    /// Nodes inside a trimmed face that the range image does not have.
+    /// Nodes inside a trimmed face that it does not have.
     pub invented_nodes: usize,
     /// Duration of each stage, seconds.
     pub timings_s: BTreeMap<String, f64>,
@@ -119,7 +119,7 @@ pub struct SettingsReport {
     /// Root mean square distance from the nodes at which a fitted surface is not made
     /// nearer still; no bound on how far it may lie off.
     pub tolerance_mm: f64,
-    /// IGES entities of the surfaces: 114 or 128.
+    /// IGES entities of the surfaces: 114, 128, or 190 for surfaces by their numbers.
     pub iges_entities: u16,
     /// What the STEP file follows: `ap242`, `ap214`, or `off` where there is none.
     #[serde(default)]
@@ -150,6 +150,12 @@ pub struct RangeImageReport {
     /// Median over the nodes of the standard deviation of those samples about it.
     #[serde(default)]
     pub noise_mm: Option<f64>,
+    /// Nodes next to outlines that lost their value once these were settled by the samples.
+    #[serde(default)]
+    pub dropped_nodes: usize,
+    /// Nodes next to outlines that got one then.
+    #[serde(default)]
+    pub filled_nodes: usize,
 }
 
 /// The surface regions.
@@ -291,7 +297,7 @@ pub struct CrumbReport {
 }
 
 /// The trimmed faces.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ModelReport {
     /// Trimmed faces.
     pub faces: usize,
@@ -299,4 +305,20 @@ pub struct ModelReport {
     pub edges_shared: usize,
     /// Edges that bound one face only.
     pub free_edges: usize,
+    /// How it is known where they run.
+    #[serde(default)]
+    pub edge_lengths: EdgeLengthsReport,
+}
+
+/// Lengths of edges as the camera sees them, by how it is known where they run.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct EdgeLengthsReport {
+    /// The samples beside them tell.
+    pub measured_mm: f64,
+    /// The surfaces of their two faces intersect there.
+    pub intersected_mm: f64,
+    /// They are drawn smoothly between nodes.
+    pub assumed_mm: f64,
+    /// Part of the last in all three, 0 to 1.
+    pub assumed_share: f64,
 }

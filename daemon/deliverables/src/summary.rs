@@ -3,13 +3,12 @@
 use std::collections::BTreeMap;
 
 use pipeline::{NodeRole, Outcome, Settings};
-use range_image::RangeImage;
-use reconstruct::{Face, Model, Surface};
+use reconstruct::{EdgeOrigin, Face, Model, Surface};
 
 use crate::export::CadOptions;
 use crate::report::{
-    BackgroundRegionReport, BackgroundReport, CrumbReport, CrumbsReport, ModelReport,
-    RangeImageReport, RegionReport, RegionsReport, Report, SettingsReport,
+    BackgroundRegionReport, BackgroundReport, CrumbReport, CrumbsReport, EdgeLengthsReport,
+    ModelReport, RangeImageReport, RegionReport, RegionsReport, Report, SettingsReport,
 };
 use crate::shape::shape;
 use crate::write::Inputs;
@@ -29,7 +28,7 @@ impl Report {
             timestamp: inputs.timestamp.to_string(),
             scan: inputs.scan.clone(),
             settings: settings(inputs.settings, inputs.cad),
-            range_image: range_image(inputs.image),
+            range_image: range_image(inputs),
             regions: regions(inputs.outcome),
             background: background(inputs.outcome),
             crumbs: crumbs(inputs.outcome),
@@ -79,8 +78,10 @@ fn limits((low, high): (f64, f64)) -> [Option<f64>; 2] {
     [finite(low), finite(high)]
 }
 
-fn range_image(image: &RangeImage) -> RangeImageReport {
+fn range_image(inputs: &Inputs<'_>) -> RangeImageReport {
+    let image = inputs.image;
     let extent = image.z_extent_mm();
+    let settled = inputs.outcome.settled.as_ref();
     RangeImageReport {
         pitch_mm: image.pitch_mm(),
         columns: image.columns(),
@@ -90,6 +91,8 @@ fn range_image(image: &RangeImage) -> RangeImageReport {
         z_max_mm: extent.map(|(_, high)| high),
         inlier_share: median(image.qualities().map(|quality| quality.inlier_share())),
         noise_mm: median(image.qualities().map(|quality| f64::from(quality.scale_mm))),
+        dropped_nodes: settled.map_or(0, |settled| settled.dropped),
+        filled_nodes: settled.map_or(0, |settled| settled.filled),
     }
 }
 
@@ -186,5 +189,27 @@ fn model(model: &Model) -> ModelReport {
         faces: model.faces.len(),
         edges_shared: uses.iter().filter(|&&count| count > 1).count(),
         free_edges: uses.iter().filter(|&&count| count == 1).count(),
+        edge_lengths: edge_lengths(model),
+    }
+}
+
+fn edge_lengths(model: &Model) -> EdgeLengthsReport {
+    let of = |origin: EdgeOrigin| -> f64 {
+        let edges = model.edges.iter().filter(|edge| edge.origin == origin);
+        edges.map(|edge| edge.path.arc_length()).sum()
+    };
+    let measured_mm = of(EdgeOrigin::Measured);
+    let intersected_mm = of(EdgeOrigin::Intersected);
+    let assumed_mm = of(EdgeOrigin::Assumed);
+    let all_mm = measured_mm + intersected_mm + assumed_mm;
+    EdgeLengthsReport {
+        measured_mm,
+        intersected_mm,
+        assumed_mm,
+        assumed_share: if all_mm > 0.0 {
+            assumed_mm / all_mm
+        } else {
+            0.0
+        },
     }
 }

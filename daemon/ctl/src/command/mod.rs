@@ -2,6 +2,7 @@
 
 pub(crate) mod abort;
 pub(crate) mod change;
+pub(crate) mod compare;
 pub(crate) mod convert;
 pub(crate) mod demo;
 pub(crate) mod doctor;
@@ -11,6 +12,7 @@ pub(crate) mod laser;
 pub(crate) mod manual;
 mod named;
 mod part;
+mod places;
 pub(crate) mod rerun;
 pub(crate) mod resume;
 pub(crate) mod scan;
@@ -31,6 +33,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
     let json = invocation.json;
     match invocation.command {
         Command::Demo(args) => block_on(demo::run(args, json)),
+        Command::Compare(args) => block_on(compare::run(args, json)),
         Command::Convert(args) => block_on(convert::run(args, json)),
         Command::Scan(args) => block_on(scan::run(args, json)),
         Command::Abort(args) => block_on(abort::run(args, json)),

@@ -38,7 +38,14 @@ pub(crate) struct PartArgs {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Limits(f64, f64);
 
-fn limits(text: &str) -> Result<Limits, String> {
+impl Limits {
+    /// Both of them.
+    pub(crate) fn mm(self) -> (f64, f64) {
+        (self.0, self.1)
+    }
+}
+
+pub(crate) fn limits(text: &str) -> Result<Limits, String> {
     let (low, high) = text
         .split_once(',')
         .ok_or("expected MIN,MAX, such as -30,60 or -30, for no upper limit")?;

@@ -79,6 +79,18 @@ impl Canvas {
         self.fill(x + width - 1, y, 1, height, colour);
     }
 
+    /// Copies a canvas into the upper left corner.
+    pub(super) fn paste(&mut self, other: &Self) {
+        for y in 0..other.height.min(self.height) {
+            for x in 0..other.width.min(self.width) {
+                let start = (y * other.width + x) * 3;
+                if let Some(&[r, g, b]) = other.pixels.get(start..start + 3) {
+                    self.set(x, y, [r, g, b]);
+                }
+            }
+        }
+    }
+
     /// Lays a colour over the canvas as strongly as the mask says.
     pub(super) fn stencil(&mut self, mask: &Mask, colour: Rgb) {
         for y in 0..self.height.min(mask.height) {

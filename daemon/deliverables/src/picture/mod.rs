@@ -2,6 +2,7 @@
 
 mod borders;
 mod canvas;
+mod deviations;
 mod inliers;
 mod plot;
 mod range;
@@ -11,6 +12,7 @@ mod scale;
 
 use std::io::Write;
 
+use compare::{Comparison, Tolerance};
 use pipeline::Outcome;
 use range_image::RangeImage;
 
@@ -56,6 +58,21 @@ pub fn write_residuals(
     encode(&residuals::draw(image, restored, model, name), sink)
 }
 
+/// Draws how far a scan lies off its nominal, with a histogram, and writes it as PNG. What is
+/// significantly beyond the limits is outlined, and numbered in the order of the regions.
+///
+/// # Errors
+/// What the sink reports.
+pub fn write_deviations(
+    image: &RangeImage,
+    comparison: &Comparison,
+    tolerance: Option<Tolerance>,
+    name: &str,
+    sink: impl Write,
+) -> std::io::Result<()> {
+    encode(&deviations::draw(image, comparison, tolerance, name), sink)
+}
+
 /// Draws the share of inliers among the samples around each node, ready to be written as
 /// PNG; `None` where the image says nothing of its nodes' quality.
 #[must_use]
@@ -81,7 +98,7 @@ fn encode(canvas: &Canvas, sink: impl Write) -> std::io::Result<()> {
     let mut encoder = png::Encoder::new(sink, side(canvas.width())?, side(canvas.height())?);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::Balanced);
+    encoder.set_compression(png::Compression::Fast);
     let write = || {
         let mut writer = encoder.write_header()?;
         writer.write_image_data(canvas.pixels())?;

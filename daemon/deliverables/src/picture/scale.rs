@@ -40,6 +40,15 @@ impl Scale<'_> {
         }
     }
 
+    /// Left end, y and width of the line across the bar at a value; `None` beyond its ends.
+    pub(super) fn place(&self, plot: &Plot, value: f64) -> Option<(usize, usize, usize)> {
+        let span = plot.height().max(LEAST_HEIGHT).saturating_sub(1).max(1) as f64;
+        let y = plot.top() + ((1.0 - self.share(value)) * span).round() as usize;
+        (self.low..=self.high)
+            .contains(&value)
+            .then_some((plot.right() + GAP, y, WIDTH))
+    }
+
     /// Draws the bar to the right of the plot.
     pub(super) fn draw(&self, plot: &mut Plot) {
         let (left, top) = (plot.right() + GAP, plot.top());

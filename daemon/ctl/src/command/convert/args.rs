@@ -40,7 +40,8 @@ pub(crate) struct Args {
     /// millimetres
     #[arg(long, value_name = "MM")]
     tolerance_mm: Option<f64>,
-    /// IGES entities of the surfaces: 114 (parametric splines) or 128 (rational B-splines)
+    /// IGES entities of the surfaces: 114 (parametric splines), 128 (rational B-splines), or 190
+    /// (planes, cylinders, cones, spheres and tori by their numbers, other faces as 128)
     #[arg(long, value_name = "TYPE", value_enum, default_value_t = EntityType::Parametric)]
     entities: EntityType,
     /// What a STEP file follows: AP242, or AP214 for programs that do not know the former
@@ -112,6 +113,8 @@ enum EntityType {
     Parametric,
     #[value(name = "128")]
     Rational,
+    #[value(name = "190")]
+    Analytic,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -258,6 +261,7 @@ impl Args {
             entities: match self.entities {
                 EntityType::Parametric => Entities::Parametric114,
                 EntityType::Rational => Entities::Rational128,
+                EntityType::Analytic => Entities::Analytic,
             },
             step: match (format, self.step_schema) {
                 (CadFormat::Iges, _) => None,

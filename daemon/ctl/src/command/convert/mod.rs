@@ -1,7 +1,6 @@
 //! `relief convert`.
 
 mod args;
-mod places;
 mod run;
 
 pub(crate) use args::Args;

@@ -10,8 +10,9 @@ use pipeline::{Extent, InMemory, Observer, PipelineError, Settings, Stage};
 use range_image::Monitor;
 use serde::Serialize;
 
+use super::Args;
 use super::args::CadFormat;
-use super::{Args, places};
+use crate::command::places;
 use crate::failure::Failure;
 use crate::input::{self, Input};
 use crate::output;
