@@ -18,6 +18,7 @@ from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp
 from OCP.BRepTools import BRepTools, BRepTools_WireExplorer
 from OCP.GProp import GProp_GProps
+from OCP.GeomAbs import GeomAbs_Cone, GeomAbs_Cylinder, GeomAbs_Sphere, GeomAbs_Torus
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.IGESControl import IGESControl_Reader
 from OCP.Interface import Interface_CheckTool
@@ -27,6 +28,10 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS
 from OCP.gp import gp_Pnt, gp_Vec
 
+
+# Surfaces whose normal always points away from their axis: entities 192 to 198 have no other side,
+# and a trimmed surface (144) has none of its own.
+ROUND = (GeomAbs_Cylinder, GeomAbs_Cone, GeomAbs_Sphere, GeomAbs_Torus)
 
 # Relative error allowed to the integration of areas.
 AREA_PRECISION = 1e-6
@@ -148,6 +153,7 @@ def judge_face(face, spacing):
         "valid": BRepCheck_Analyzer(face).IsValid(),
         "area_mm2": properties.Mass(),
         "normal_z": normal_towards_camera(face),
+        "round": BRepAdaptor_Surface(face, True).GetType() in ROUND,
         "vertices": distinct(face, TopAbs_VERTEX),
         "tolerance_mm": tolerance,
         "loops": loops,
@@ -267,10 +273,11 @@ def judge(path, arguments):
             problems.append(f"face {number} is not valid by BRepCheck")
         if not face["area_mm2"] > 0.0:
             problems.append(f"face {number} has area {face['area_mm2']}")
-        if not face["normal_z"] > 0.0:
+        is_hollow = face["round"] and face["normal_z"] < 0.0
+        if not (face["normal_z"] > 0.0 or is_hollow):
             problems.append(f"face {number} turns its back to the camera")
         for k, loop in enumerate(face["loops"]):
-            if (loop["signed_area_xy_mm2"] > 0.0) != loop["outer"]:
+            if (loop["signed_area_xy_mm2"] > 0.0) != (loop["outer"] != is_hollow):
                 problems.append(f"face {number}, loop {k} runs the wrong way")
     if arguments.expect_faces is not None and len(faces) != arguments.expect_faces:
         problems.append(f"{len(faces)} faces instead of {arguments.expect_faces}")

@@ -10,11 +10,13 @@
 //! The program `study-segmentation` judges the segmentation: [`scenes`] draws objects from
 //! seeds, scans them and knows the face over each node; [`score`] compares labels with it.
 //! `study-reproduction` repeats the experiments of Shim & Lee 1995; [`outline`] and
-//! [`trimming`] say how far trim loops lie from true outlines.
+//! [`trimming`] say how far trim loops lie from true outlines, [`intervals`] what samples allow
+//! of those along an axis.
 
 pub mod columns;
 pub mod direct;
 pub mod iges;
+pub mod intervals;
 pub mod mutations;
 pub mod outline;
 pub mod rig;

@@ -80,7 +80,7 @@ impl Trimming {
     }
 }
 
-fn sides(outline: &[Vec3]) -> impl Iterator<Item = (Vec3, Vec3)> + '_ {
+pub(crate) fn sides(outline: &[Vec3]) -> impl Iterator<Item = (Vec3, Vec3)> + '_ {
     let next = outline.iter().cycle().skip(1);
     outline.iter().copied().zip(next.copied())
 }
@@ -91,7 +91,7 @@ fn is_oblique(from: Vec3, to: Vec3) -> bool {
 }
 
 /// Whether no other face has this point on its outline.
-fn is_silhouette(point: Vec3, face: &VisibleFace, faces: &[VisibleFace]) -> bool {
+pub(crate) fn is_silhouette(point: Vec3, face: &VisibleFace, faces: &[VisibleFace]) -> bool {
     let mut others = faces.iter().filter(|other| other.id != face.id);
     others.all(|other| other.outline_distance_mm(point) > SHARED_MM)
 }

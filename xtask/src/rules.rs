@@ -26,7 +26,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("segment", &["range-image"]),
     ("shapes", &[]),
     ("reconstruct", &["nurbs", "range-image", "shapes"]),
-    ("cad-exchange", &["nurbs", "reconstruct"]),
+    ("cad-exchange", &["nurbs", "reconstruct", "shapes"]),
+    ("compare", &["range-image"]),
     (
         "pipeline",
         &["range-image", "reconstruct", "regrid", "segment", "shapes"],
@@ -74,8 +75,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-const DELIVERABLES: [&str; 9] = [
+const DELIVERABLES: [&str; 10] = [
     "cad-exchange",
+    "compare",
     "nurbs",
     "pipeline",
     "range-image",
@@ -104,8 +106,9 @@ const DAEMON: [&str; 15] = [
     "storage",
 ];
 
-const COMMAND_LINE: [&str; 16] = [
+const COMMAND_LINE: [&str; 17] = [
     "cad-exchange",
+    "compare",
     "deliverables",
     "nurbs",
     "pipeline",

@@ -6,7 +6,7 @@ use std::fs;
 use anyhow::Result;
 use clap::Subcommand;
 
-use crate::{shell, vm};
+use crate::{judge, shell, vm};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Study {
@@ -69,6 +69,13 @@ pub(crate) enum Study {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
+    /// Hold the models of random parts, built by OpenCASCADE, against the parts.
+    #[command(disable_help_flag = true)]
+    Parts {
+        /// Options of the study; `--help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
     /// Hold the shapes found on faces against what the faces are.
     #[command(disable_help_flag = true)]
     Shapes {
@@ -87,6 +94,12 @@ pub(crate) fn run(study: &Study) -> Result<()> {
         Study::Faults { options } => program_of("relief-faults", "study-faults", options),
         Study::Mutations { options } => program("study-mutations", options),
         Study::Outline { options } => program("study-outline", options),
+        Study::Parts { options } => {
+            let python = judge::python(&shell::root().join("target/judges"))?;
+            let mut words: Vec<OsString> = vec!["--python".into(), python.into()];
+            words.extend(options.iter().cloned());
+            program("study-parts", &words)
+        }
         Study::RealScans { options } => program("study-real-scans", options),
         Study::Regrid { options } => program("study-regrid", options),
         Study::Segmentation { options } => program("study-segmentation", options),

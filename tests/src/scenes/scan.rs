@@ -66,7 +66,8 @@ impl View {
 }
 
 /// The lattice that the service would choose for a sweep.
-pub(super) fn lattice(scanner: &Scanner, sweep: &Sweep) -> Lattice {
+#[must_use]
+pub fn lattice(scanner: &Scanner, sweep: &Sweep) -> Lattice {
     let column_pitch_mm = f64::from(sweep.pitch_counts.abs()) * scanner.mechanics.count_mm();
     let step = f64::from(sweep.lateral_step_counts);
     let spacing_mm = match scanner.head.kind {

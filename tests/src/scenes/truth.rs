@@ -222,6 +222,12 @@ pub struct Truth {
 }
 
 impl Truth {
+    /// What a scanner sees of its object in a sweep; faces that meet smoothly are several.
+    #[must_use]
+    pub fn of_scan(scanner: &Scanner, sweep: &Sweep, lattice: Lattice) -> Self {
+        Faces::of(scanner, sweep, lattice).regions(&BTreeMap::new())
+    }
+
     /// Whether the region with this label counts.
     #[must_use]
     pub fn counts(&self, label: u16) -> bool {

@@ -19,11 +19,11 @@ use relief_tests::rig::{Client, Events, Program, small_house};
 use process::sample;
 use trend::{Sample, Trend};
 
-/// Old scans go, as they would where the service is left alone.
+/// Old scans go, as they would where the service is left alone, from the first minutes on.
 const SETTINGS: &str = "\
 [storage]
 reserve_mb = 1
-scans_mb = 100
+scans_mb = 20
 [log]
 level = \"error\"
 format = \"text\"";

@@ -7,6 +7,7 @@ use crate::experiment::Figures;
 use crate::regions::{Reference, RegionFigures};
 use crate::results::{Results, of_region};
 use crate::tables::{number, oblique_rms_pitches, table};
+use crate::upright::Found;
 
 /// At least or at most so much.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -137,6 +138,20 @@ fn all(results: &Results) -> Vec<Bar> {
             |f| f.whole[0].snr_db,
         ),
         whole(
+            "`relief`, whole image against the image as regridded: lost and invented",
+            Bound::AtMost(0.0),
+            "nodes",
+            0,
+            |f| (f.as_regridded.lost_nodes + f.as_regridded.invented_nodes) as f64,
+        ),
+        whole(
+            "`relief`, whole image against the image as regridded: SNR",
+            Bound::AtLeast(80.0),
+            "dB",
+            1,
+            |f| f.as_regridded.snr_db,
+        ),
+        whole(
             "`relief`, whole image against the truth: lost and invented",
             Bound::AtMost(0.0),
             "nodes",
@@ -171,7 +186,22 @@ fn all(results: &Results) -> Vec<Bar> {
             3,
             oblique_rms_pitches,
         ),
+        Bar {
+            what: "`relief`, silhouettes along an axis, beyond the interval that the samples allow",
+            bound: Bound::AtMost(0.0),
+            unit: "pitches",
+            digits: 3,
+            values: beyond(&results.upright),
+        },
     ]
+}
+
+fn beyond(upright: &[Found]) -> Vec<Value> {
+    let value = |found: &Found| Value {
+        what: format!("House upright, seed {}", found.seed),
+        value: found.silhouette.beyond_mm / found.pitch_mm,
+    };
+    upright.iter().map(value).collect()
 }
 
 fn of_runs(results: &Results, method: Method, figure: fn(&Figures) -> f64) -> Vec<Value> {

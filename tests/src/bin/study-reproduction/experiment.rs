@@ -78,6 +78,8 @@ pub(crate) struct Figures {
     pub(crate) faces: usize,
     /// The restored image against the range image and against the truth.
     pub(crate) whole: [Metrics; 2],
+    /// Against the range image as regridded, before nodes beside outlines were decided anew.
+    pub(crate) as_regridded: Metrics,
     /// The range image against the truth.
     pub(crate) regridded: Metrics,
     pub(crate) trimming: Trimming,
@@ -122,9 +124,10 @@ pub(crate) fn run(scan: &Scan, method: Method, threads: usize) -> Result<Run> {
         regions,
         faces: model.faces.len(),
         whole: [
-            compare(&image, &outcome.reconstruction.restored),
+            outcome.reconstruction.metrics,
             compare(&truth.image, &restored),
         ],
+        as_regridded: compare(&image, &outcome.reconstruction.restored),
         regridded: compare(&truth.image, &truth.on_this_grid(&image)),
         trimming: trimming(scan, &outcome, &labels)?,
         vertices: model.vertices.len(),

@@ -15,6 +15,7 @@ mod regions;
 mod results;
 mod tables;
 mod true_image;
+mod upright;
 
 use std::fs;
 use std::path::PathBuf;
@@ -112,8 +113,11 @@ fn measure() -> Result<(Results, Vec<Run>)> {
         })
         .collect::<Result<_>>()?;
     let entries = firsts.iter().map(entry).chain(runs.into_iter().flatten());
-    let entries = entries.collect();
-    Ok((Results { entries }, firsts))
+    let results = Results {
+        entries: entries.collect(),
+        upright: upright::measure()?,
+    };
+    Ok((results, firsts))
 }
 
 fn entry(run: &Run) -> Entry {

@@ -8,6 +8,7 @@ use crate::conditions::{COLUMNS, DROPOUTS, MIXED, NOISE_MM, OUTLIERS, SAMPLES, S
 use crate::regions::Reference;
 use crate::results::Results;
 use crate::tables::{Kind, nodes, regions, regions_over_seeds, seconds, seeds, wholes};
+use crate::upright::intervals;
 
 const TEXT: &str = include_str!("page.md");
 
@@ -55,6 +56,7 @@ pub(crate) fn page(results: &Results) -> Result<String> {
         ),
         ("borders", wholes(results, Kind::Borders, false)),
         ("borders over seeds", wholes(results, Kind::Borders, true)),
+        ("intervals", intervals(&results.upright)),
         ("seconds", seconds(results)),
     ];
     let mut text = TEXT.to_owned();

@@ -5,6 +5,7 @@ use pipeline::Method;
 use crate::conditions::{SEEDS, Subject};
 use crate::experiment::Figures;
 use crate::regions::RegionFigures;
+use crate::upright::Found;
 
 /// One run's figures, and which run it was.
 #[derive(Debug, Clone)]
@@ -19,6 +20,8 @@ pub(crate) struct Entry {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Results {
     pub(crate) entries: Vec<Entry>,
+    /// Silhouettes along an axis.
+    pub(crate) upright: Vec<Found>,
 }
 
 /// The roads in the order of the tables.

@@ -1,0 +1,110 @@
+//! What OpenCASCADE says of the exported files, and who makes the parts.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, ensure};
+use serde::Deserialize;
+
+const MAKE: &str = "tests/judges/parts/make.py";
+const CHECK: &str = "tests/judges/parts/check.py";
+/// Edges of one face may lie so far in all where none belongs: a corner's worth.
+pub(crate) const MISPLACED_MM: f64 = 1.0;
+
+/// The verdict on a file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub(crate) struct Judged {
+    pub(crate) seed: u64,
+    /// `igs` or `step`.
+    pub(crate) file: String,
+    pub(crate) is_read: bool,
+    pub(crate) faces: usize,
+    pub(crate) invalid: usize,
+    /// Edges of one face after sewing, and those where none belongs.
+    pub(crate) free_mm: f64,
+    pub(crate) misplaced_mm: f64,
+}
+
+impl Judged {
+    pub(crate) fn is_valid(&self) -> bool {
+        self.is_read && self.faces > 0 && self.invalid == 0
+    }
+
+    pub(crate) fn is_closed(&self) -> bool {
+        self.is_read && self.misplaced_mm <= MISPLACED_MM
+    }
+}
+
+/// A Python with OpenCASCADE.
+#[derive(Debug, Clone)]
+pub(crate) struct Python(pub(crate) PathBuf);
+
+impl Python {
+    fn said(&self, script: &str, words: &[String]) -> Result<String> {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let output = Command::new(&self.0)
+            .args(["-B", script])
+            .args(words)
+            .current_dir(root)
+            .stderr(Stdio::inherit())
+            .output()
+            .with_context(|| format!("cannot start {}", self.0.display()))?;
+        ensure!(
+            output.status.success(),
+            "{script} ended with {}",
+            output.status
+        );
+        Ok(String::from_utf8(output.stdout)?)
+    }
+
+    /// Makes the parts that are not there.
+    pub(crate) fn make(&self, folder: &Path, seeds: &[u64]) -> Result<()> {
+        let folder = absolute(folder)?;
+        let mut words = vec!["--out".to_owned(), folder];
+        words.extend(seeds.iter().map(u64::to_string));
+        eprint!("{}", self.said(MAKE, &words)?);
+        Ok(())
+    }
+
+    /// Judges the models in a folder.
+    pub(crate) fn judge(&self, folder: &Path, seeds: &[u64]) -> Result<Vec<Judged>> {
+        let mut words = vec![absolute(folder)?];
+        words.extend(seeds.iter().map(u64::to_string));
+        Ok(serde_json::from_str(&self.said(CHECK, &words)?)?)
+    }
+}
+
+fn absolute(folder: &Path) -> Result<String> {
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    Ok(fs::canonicalize(folder)?.display().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_holds_if_it_was_read_and_all_is_where_it_belongs() {
+        let sound = Judged {
+            seed: 1,
+            file: "igs".into(),
+            is_read: true,
+            faces: 4,
+            invalid: 0,
+            free_mm: 300.0,
+            misplaced_mm: 0.4,
+        };
+        assert!(sound.is_valid() && sound.is_closed());
+        let with = |change: fn(&mut Judged)| {
+            let mut changed = sound.clone();
+            change(&mut changed);
+            changed
+        };
+        assert!(!with(|j| j.invalid = 1).is_valid());
+        assert!(!with(|j| j.faces = 0).is_valid());
+        assert!(!with(|j| j.misplaced_mm = 1.5).is_closed());
+        let unread = with(|j| j.is_read = false);
+        assert!(!unread.is_valid() && !unread.is_closed());
+    }
+}

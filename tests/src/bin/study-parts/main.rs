@@ -1,0 +1,218 @@
+//! Random parts of known faces, scanned and made into models, against what they really are.
+//!
+//! ```sh
+//! cargo xtask study parts --seeds 201..=210
+//! ```
+//!
+//! Parts and their truth come from OpenCASCADE (`tests/judges/parts`); the truth is read here,
+//! beside the code under test, and never given to it.
+
+mod bars;
+mod bound;
+mod edges;
+mod grid;
+mod judge;
+mod list;
+mod measure;
+mod numbers;
+mod page;
+mod part;
+mod quality;
+mod scan;
+mod surface;
+mod tables;
+mod trims;
+mod truth_grid;
+
+use std::collections::VecDeque;
+use std::fs;
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+
+use anyhow::{Context, Result, bail, ensure};
+use clap::Parser;
+use deliverables::{CadOptions, write_iges, write_step};
+use jiff::Timestamp;
+
+use crate::judge::Python;
+use crate::measure::{Measured, measure};
+use crate::part::Part;
+
+/// Hold the models of random parts of known faces against the parts
+#[derive(Debug, Parser)]
+#[command(name = "study-parts", version)]
+struct Options {
+    /// A Python with OpenCASCADE, which makes parts that are not there and judges models
+    #[arg(long, value_name = "FILE")]
+    python: Option<PathBuf>,
+    /// The folder of the parts: SEED.stl and SEED.json
+    #[arg(long, value_name = "DIR", default_value = "target/studies/parts")]
+    parts: PathBuf,
+    /// The folder for IGES and STEP files of the models
+    #[arg(
+        long,
+        value_name = "DIR",
+        default_value = "target/studies/parts/models"
+    )]
+    models: PathBuf,
+    /// The parts, from the first seed to the last: 101..=160 is for figures, 201 and up may be
+    /// looked at in tuning
+    #[arg(long, value_name = "A..=B", default_value = "101..=160", value_parser = parse_seeds)]
+    seeds: RangeInclusive<u64>,
+    /// List every face that is not as it should be
+    #[arg(long)]
+    list: bool,
+    /// The first six parts only
+    #[arg(long)]
+    short: bool,
+    /// Write the page about the study instead of printing it
+    #[arg(long)]
+    write: bool,
+}
+
+/// Parts of a short study.
+const SHORT: usize = 6;
+
+const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/studies/parts.md");
+
+fn parse_seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
+    let parse = |number: &str| number.trim().parse::<u64>().ok();
+    let ends = match text.split_once("..=") {
+        Some((first, last)) => (parse(first), parse(last)),
+        None => (parse(text), parse(text)),
+    };
+    match ends {
+        (Some(first), Some(last)) if first <= last => Ok(first..=last),
+        _ => Err("a seed, or the first and last as in 201..=210".to_owned()),
+    }
+}
+
+fn main() -> ExitCode {
+    match run(&Options::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("study-parts: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(options: &Options) -> Result<()> {
+    let most = if options.short { SHORT } else { usize::MAX };
+    let seeds: Vec<u64> = options.seeds.clone().take(most).collect();
+    let (Some(first), Some(last)) = (seeds.first(), seeds.last()) else {
+        bail!("no seeds");
+    };
+    let python = options.python.clone().map(Python);
+    if let Some(python) = &python {
+        python.make(&options.parts, &seeds)?;
+    }
+    fs::create_dir_all(&options.models).with_context(|| options.models.display().to_string())?;
+    let (parts, failed) = all(options, &seeds)?;
+    for (seed, why) in &failed {
+        eprintln!("part {seed}: {why}");
+    }
+    let judged = match &python {
+        Some(python) => {
+            let made: Vec<u64> = parts.iter().map(|part| part.seed).collect();
+            Some(python.judge(&options.models, &made)?)
+        }
+        None => None,
+    };
+    if options.list {
+        print!("{}", list::list(&parts));
+    }
+    let text = page::page(&(*first..=*last), &parts, &failed, judged.as_deref());
+    if options.write {
+        return fs::write(PAGE, text).context(PAGE);
+    }
+    print!("{text}");
+    Ok(())
+}
+
+/// A part that gave no model, and why.
+pub(crate) type Failed = (u64, String);
+
+/// All parts in the order of their seeds, worked on by as many threads as there are processors.
+fn all(options: &Options, seeds: &[u64]) -> Result<(Vec<Measured>, Vec<Failed>)> {
+    let open = Mutex::new(seeds.iter().copied().collect::<VecDeque<_>>());
+    let next = || {
+        open.lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .pop_front()
+    };
+    let work = || {
+        let mut done = Vec::new();
+        while let Some(seed) = next() {
+            let measured = one(options, seed);
+            if let Ok(measured) = &measured {
+                eprintln!(
+                    "part {seed}: scanned in {:.1} s, model in {:.1} s",
+                    measured.scan_s, measured.process_s
+                );
+            }
+            done.push((seed, measured));
+        }
+        done
+    };
+    let threads = thread::available_parallelism().map_or(1, usize::from);
+    let mut done: Vec<(u64, Result<Measured>)> = thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        let done = workers.into_iter().flat_map(|worker| worker.join());
+        done.flatten().collect()
+    });
+    ensure!(done.len() == seeds.len(), "a part was lost to a panic");
+    done.sort_by_key(|(seed, _)| *seed);
+    let (mut parts, mut failed) = (Vec::new(), Vec::new());
+    for (seed, measured) in done {
+        match measured {
+            Ok(measured) => parts.push(measured),
+            Err(error) => failed.push((seed, format!("{error:#}"))),
+        }
+    }
+    ensure!(!parts.is_empty(), "no part could be measured: {failed:?}");
+    Ok((parts, failed))
+}
+
+fn one(options: &Options, seed: u64) -> Result<Measured> {
+    let part = Part::read(&options.parts, seed)?;
+    let measured = measure(&part)?;
+    write_models(&options.models, &measured)?;
+    Ok(measured)
+}
+
+fn write_models(folder: &Path, measured: &Measured) -> Result<()> {
+    let model = &measured.outcome.reconstruction.model;
+    let (name, cad) = (format!("part-{}", measured.seed), CadOptions::default());
+    let (mut iges, mut step) = (Vec::new(), Vec::new());
+    write_iges(model, &name, Timestamp::UNIX_EPOCH, &cad, &mut iges)?;
+    write_step(model, &name, Timestamp::UNIX_EPOCH, &cad, &mut step)?;
+    let mask = serde_json::to_vec(&measured.mask)?;
+    for (ending, bytes) in [("igs", iges), ("step", step), ("mask.json", mask)] {
+        let file = folder.join(format!("{}.{ending}", measured.seed));
+        fs::write(&file, bytes).with_context(|| file.display().to_string())?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Options::command().debug_assert();
+    }
+
+    #[test]
+    fn seeds_are_one_or_a_range() {
+        assert_eq!(parse_seeds("7"), Ok(7..=7));
+        assert_eq!(parse_seeds("201..=210"), Ok(201..=210));
+        assert!(parse_seeds("210..=201").is_err());
+        assert!(parse_seeds("a few").is_err());
+    }
+}
