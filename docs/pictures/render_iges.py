@@ -65,6 +65,15 @@ def turned(points):
     return points[..., [0, 2, 1]] * np.array([1.0, -1.0, 1.0])
 
 
+class LinesInFront(Line3DCollection):
+    """Lines over all faces: collections are drawn in the order of their depths, and lines that bound
+    a face have about that of the face."""
+
+    def do_3d_projection(self):
+        super().do_3d_projection()
+        return -np.inf
+
+
 def draw(axes, shape, labels=True, colours=COLOURS):
     """Faces shaded in colours of their own, edges in black, on axes in 3D."""
     BRepMesh_IncrementalMesh(shape, 0.05, False, 0.2, True)
@@ -83,7 +92,7 @@ def draw(axes, shape, labels=True, colours=COLOURS):
         axes.add_collection3d(Poly3DCollection(mesh, facecolors=faces, edgecolors=faces, linewidths=0.8))
         extent.append(mesh.reshape(-1, 3))
     lines = [turned(edge_line(edge)) for edge in explore(shape, TopAbs_EDGE)]
-    axes.add_collection3d(Line3DCollection(lines, colors="black", linewidths=0.8))
+    axes.add_collection3d(LinesInFront(lines, colors="black", linewidths=0.8))
     extent = np.concatenate(extent)
     low, high = extent.min(axis=0), extent.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
