@@ -419,7 +419,15 @@ fn the_demo_leaves_the_deliverables_and_nothing_else() {
     assert_eq!(told["iges"], "there/cylinder.igs");
     assert_eq!(told["scan"]["state"], "complete");
     assert_eq!(told["job"]["state"], "done");
-    assert_eq!(told["report"]["model"]["faces"], 2);
+    let model = &told["report"]["model"];
+    assert_eq!(model["faces"], 2);
+    // None is 0, never the -0 of an empty sum.
+    let lengths = model["edge_lengths"].as_object().unwrap();
+    assert!(
+        lengths
+            .values()
+            .all(|length| length.as_f64().unwrap().is_sign_positive())
+    );
     let mut names: Vec<String> = fs::read_dir(directory.path().join("there"))
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())

@@ -196,7 +196,8 @@ fn model(model: &Model) -> ModelReport {
 fn edge_lengths(model: &Model) -> EdgeLengthsReport {
     let of = |origin: EdgeOrigin| -> f64 {
         let edges = model.edges.iter().filter(|edge| edge.origin == origin);
-        edges.map(|edge| edge.path.arc_length()).sum()
+        // Not a sum, which would be -0 of none and be printed so.
+        edges.fold(0.0, |sum, edge| sum + edge.path.arc_length())
     };
     let measured_mm = of(EdgeOrigin::Measured);
     let intersected_mm = of(EdgeOrigin::Intersected);
