@@ -25,12 +25,20 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("regrid", &["range-image"]),
     ("segment", &["range-image"]),
     ("shapes", &[]),
+    ("faces", &["range-image", "shapes"]),
     ("reconstruct", &["nurbs", "range-image", "shapes"]),
     ("cad-exchange", &["nurbs", "reconstruct", "shapes"]),
     ("compare", &["range-image"]),
     (
         "pipeline",
-        &["range-image", "reconstruct", "regrid", "segment", "shapes"],
+        &[
+            "faces",
+            "range-image",
+            "reconstruct",
+            "regrid",
+            "segment",
+            "shapes",
+        ],
     ),
     ("storage", &[]),
     (

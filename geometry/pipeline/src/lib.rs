@@ -34,4 +34,4 @@ pub use process::{
     Outcome, PipelineError, process, process_columns, process_in_view, process_scan,
 };
 pub use segment::{Background, BackgroundKind, BackgroundRegion, Plane, View};
-pub use settings::{Settings, SettingsError};
+pub use settings::{Settings, SettingsError, SmoothJoins};

@@ -1,5 +1,6 @@
 //! The stages in their order.
 
+use faces::Observations;
 use range_image::{Cancelled, Column, RangeImage, RegionMap};
 use reconstruct::metrics::compare;
 use reconstruct::{Evidence, Fitted, Method, ReconstructError, Reconstruction};
@@ -8,11 +9,12 @@ use segment::SegmentError;
 use shapes::Shape;
 
 use crate::columns::{Columns, InMemory, ReadAgainError, Within};
+use crate::kinds::samples::{OnRegion, of_regions};
 use crate::kinds::{RegionKind, kinds};
 use crate::outlines::{self, Removed, SettledNodes, settle_nodes};
 use crate::part::divide;
 use crate::{Background, Crumb, Kinds, NodeRole, View};
-use crate::{Observer, Settings, SettingsError, Stage};
+use crate::{Observer, Settings, SettingsError, SmoothJoins, Stage};
 
 /// What became of a range image.
 #[derive(Debug, Clone)]
@@ -248,13 +250,29 @@ fn in_view(
     let within = columns.map(|columns| Within { columns, roi });
     let columns = within.as_ref().map(|within| within as &dyn Columns);
     let view = view.within(roi.x_mm, roi.y_mm);
-    let part = divide(image, &view, settings, observer)?;
-
-    observer.stage(Stage::Reconstruct);
+    let mut part = divide(image, &view, settings, observer)?;
     let part_image = part.image.as_ref().unwrap_or(image);
     let is_relief = settings.reconstruct.method == Method::Relief;
+    let has_kinds = settings.kinds == Kinds::Auto && is_relief;
+    let samples = columns
+        .map(|columns| of_regions(part_image, &part.regions, columns, observer))
+        .transpose()?;
+    if has_kinds
+        && settings.smooth_joins == SmoothJoins::Split
+        && let Some(samples) = &samples
+    {
+        part.regions = faces(part_image, &part.regions, samples, observer)?;
+    }
+
+    observer.stage(Stage::Reconstruct);
     let of_samples = || {
-        let kinds = kinds(part_image, &part.regions, columns, observer)?;
+        let kinds = kinds(
+            part_image,
+            &part.regions,
+            samples.as_deref(),
+            settings.smooth_joins,
+            observer,
+        )?;
         let removed = part.image.is_some().then_some(Removed {
             image,
             roles: &part.roles,
@@ -273,7 +291,7 @@ fn in_view(
     let are_too_many = beside.is_none();
     let beside = beside.unwrap_or_default();
     let mut shapes: Vec<Option<Shape>> = Vec::new();
-    if settings.kinds == Kinds::Auto && is_relief {
+    if has_kinds {
         shapes.extend(kinds.iter().map(RegionKind::shape));
     }
     let evidence = Evidence {
@@ -308,4 +326,20 @@ fn in_view(
         settled,
         stages: vec![Stage::Segment, Stage::Reconstruct],
     })
+}
+
+/// The regions, each of one surface as far as that is one of a kind.
+fn faces(
+    image: &RangeImage,
+    regions: &RegionMap,
+    samples: &[OnRegion],
+    observer: &dyn Observer,
+) -> Result<RegionMap, Cancelled> {
+    let at_node = |on: &OnRegion| {
+        let [column, row] = on.nearest(image);
+        (column * image.rows() + row, on.sample)
+    };
+    let at_nodes: Vec<_> = samples.iter().map(at_node).collect();
+    let observations = Observations::new(image.raw_z_mm().len(), &at_nodes, 1.0);
+    faces::divide(image, regions, &observations, observer)
 }

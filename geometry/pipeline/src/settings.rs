@@ -17,8 +17,26 @@ pub struct Settings {
     pub background: BackgroundPolicy,
     /// Which kinds of surface faces may be of; method `relief` only.
     pub kinds: Kinds,
+    /// Whether regions whose surfaces join smoothly are taken apart; kinds `auto` of method
+    /// `relief` only.
+    pub smooth_joins: SmoothJoins,
     /// From regions to the model.
     pub reconstruct: ReconstructSettings,
+}
+
+/// What becomes of a region of several surfaces that join smoothly.
+///
+/// No command and no configuration offers the choice yet: taking organic shapes apart, to find
+/// that they are of no kinds, takes seconds, and the numbers of the faces found are less sure
+/// than they say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum SmoothJoins {
+    /// It stays one.
+    #[default]
+    Keep,
+    /// It is taken apart into faces of one kind each ([`faces::divide`]), whose numbers rest on
+    /// samples up to their borders.
+    Split,
 }
 
 /// A setting that cannot be used. The message says which, its limits, and its value.
@@ -40,6 +58,7 @@ impl Settings {
             segment: SegmentSettings::default(),
             background: BackgroundPolicy::default(),
             kinds: Kinds::default(),
+            smooth_joins: SmoothJoins::default(),
             reconstruct: ReconstructSettings::default(),
         }
         .with_seed(1)

@@ -63,12 +63,10 @@ const CAUTION: f64 = 4.0;
 #[must_use]
 pub fn decide(samples: &[Sample], area: f64) -> Evidence {
     let independent = samples.len() as f64 / area.max(1.0);
-    let enough = |freedom: usize| freedom as f64 * PER_NUMBER <= independent;
-    let frame = Frame::of(samples);
-    let polynomials = frame.map(|frame| polynomials(samples, &frame, &enough));
+    let enough = |freedom: usize| are_enough(independent, freedom);
     let mut scale = Scale {
         independent,
-        surfaces: polynomials.unwrap_or_default(),
+        surfaces: polynomials_of(samples, independent),
     };
     for family in Family::ALL {
         if enough(family.freedom())
@@ -107,9 +105,9 @@ pub fn decide(samples: &[Sample], area: f64) -> Evidence {
 }
 
 /// Surfaces on the scale that compares them.
-struct Scale {
-    independent: f64,
-    surfaces: Vec<Surface>,
+pub(crate) struct Scale {
+    pub(crate) independent: f64,
+    pub(crate) surfaces: Vec<Surface>,
 }
 
 impl Scale {
@@ -158,7 +156,7 @@ impl Scale {
         self.score(left(off, most) / HOPELESS, freedom) <= least + DOUBT
     }
 
-    fn scored(&self) -> Vec<(Candidate, Option<&Fit>)> {
+    pub(crate) fn scored(&self) -> Vec<(Candidate, Option<&Fit>)> {
         let most = self.most();
         let scored = self.surfaces.iter().map(|surface| {
             let candidate = Candidate {
@@ -173,11 +171,11 @@ impl Scale {
 }
 
 /// A surface to be compared.
-struct Surface {
+pub(crate) struct Surface {
     /// How far each sample is off it, in its deviations.
-    off: Vec<f64>,
-    freedom: usize,
-    fit: Option<Fit>,
+    pub(crate) off: Vec<f64>,
+    pub(crate) freedom: usize,
+    pub(crate) fit: Option<Fit>,
 }
 
 impl Surface {
@@ -194,6 +192,17 @@ impl Surface {
 fn left(off: &[f64], most: f64) -> f64 {
     let squares = off.iter().map(|off| off.abs().min(most).powi(2));
     squares.sum::<f64>() / off.len() as f64
+}
+
+fn are_enough(independent: f64, freedom: usize) -> bool {
+    freedom as f64 * PER_NUMBER <= independent
+}
+
+/// The polynomials that are looked at; none where the samples lie on a line.
+pub(crate) fn polynomials_of(samples: &[Sample], independent: f64) -> Vec<Surface> {
+    let enough = |freedom: usize| are_enough(independent, freedom);
+    let frame = Frame::of(samples);
+    frame.map_or_else(Vec::new, |frame| polynomials(samples, &frame, &enough))
 }
 
 /// Polynomials over the samples' plane, of degrees 2, 3, 4 and 6.

@@ -40,12 +40,29 @@ pub struct Fit {
     pub held: usize,
     /// Its numbers and how well they are known.
     pub numbers: Numbers,
+    deviation: f64,
     local: Local,
 }
 
 impl Fit {
+    /// The shape of the same family nearest to this one that samples ask for. `area` is that of
+    /// [`fit`]. `None` as there.
+    #[must_use]
+    pub fn again(&self, samples: &[Sample], area: f64) -> Option<Self> {
+        if samples.len() <= self.shape.family().freedom() {
+            return None;
+        }
+        told(settled(self.local, samples)?, samples, area)
+    }
+
+    /// Standard deviation of the samples held about the shape, in what they are said to have.
+    #[must_use]
+    pub fn deviation(&self) -> f64 {
+        self.deviation
+    }
+
     /// How far samples lie off the shape along their rays, in their standard deviations.
-    pub(crate) fn offs(&self, samples: &[Sample]) -> impl Iterator<Item = f64> {
+    pub fn offs(&self, samples: &[Sample]) -> impl Iterator<Item = f64> {
         self.local.offs(samples)
     }
 }
@@ -211,6 +228,7 @@ fn told(local: Local, samples: &[Sample], area: f64) -> Option<Fit> {
         rms_mm: (squares_mm2 / count as f64).sqrt(),
         held: count,
         numbers: numbers(&local, &covariance)?,
+        deviation: (squares / left).sqrt(),
         local,
     })
 }

@@ -17,6 +17,7 @@ mod jet;
 mod local;
 mod robust;
 mod rotation;
+mod several;
 mod shape;
 mod spread;
 mod start;
@@ -24,6 +25,7 @@ mod uncertainty;
 
 pub use evidence::{Candidate, Evidence, Verdict, decide};
 pub use fit::{Fit, Sample, fit};
+pub use several::is_smooth;
 pub use shape::{Cone, Cylinder, Family, Plane, Shape, Sphere, Torus};
 pub use spread::{is_in_share, spread};
 pub use uncertainty::{Measured, Numbers, Spread};

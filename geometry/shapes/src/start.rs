@@ -14,6 +14,8 @@ const HALF_ANGLES_RAD: [f64; 4] = [-0.6, -0.15, 0.15, 0.6];
 const TUBE_ANGLES_RAD: [f64; 5] = [-1.2, -0.6, 0.1, 0.6, 1.2];
 /// Weight below which a sample has no part in a start.
 const NO_PART: f64 = 0.02;
+/// Samples are flat whose variance across is less than this share of that in width.
+const FLAT: f64 = 0.1;
 /// Curvature taken for none, times the samples' extent.
 const STRAIGHT: f64 = 1e-3;
 
@@ -29,8 +31,8 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    /// The frame of samples' principal axes, its normal towards +z. `None` where they lie on
-    /// a line.
+    /// The frame of samples' principal axes, its normal towards +z: the least of them, or that
+    /// nearest to the rays where the samples are not flat. `None` where they lie on a line.
     pub(crate) fn of(samples: &[Sample]) -> Option<Self> {
         let count = samples.len().max(1) as f64;
         let sum: Vector3<f64> = samples.iter().map(|s| s.point_mm).sum();
@@ -43,15 +45,26 @@ impl Frame {
         let eigen = SymmetricEigen::new(spread / count);
         let mut order = [0, 1, 2];
         order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
-        let vector = |k: usize| eigen.eigenvectors.column(order[k]).into_owned();
-        let reach = 2.0 * eigen.eigenvalues[order[2]].max(0.0).sqrt();
-        let width = eigen.eigenvalues[order[1]].max(0.0).sqrt();
+        let ray: Vector3<f64> = samples.iter().map(|sample| sample.ray).sum();
+        let vector = |k: usize| eigen.eigenvectors.column(k).into_owned();
+        let variance = |k: usize| eigen.eigenvalues[k].max(0.0);
+        if variance(order[0]) > FLAT * variance(order[1]) {
+            // What was seen half around is as thick as it is wide: only where it was seen from
+            // tells which side is up.
+            let facing = |k: &usize| vector(*k).dot(&ray).abs();
+            order.sort_by(|a, b| facing(b).total_cmp(&facing(a)));
+            if variance(order[1]) > variance(order[2]) {
+                order.swap(1, 2);
+            }
+        }
+        let reach = 2.0 * variance(order[2]).sqrt();
+        let width = variance(order[1]).sqrt();
         if width <= 1e-9 * reach || width.is_nan() {
             return None;
         }
-        let normal: Vector3<f64> = vector(0);
+        let normal: Vector3<f64> = vector(order[0]);
         let normal = if normal.z < 0.0 { -normal } else { normal };
-        let along: Vector3<f64> = vector(2);
+        let along: Vector3<f64> = vector(order[2]);
         Some(Self {
             middle,
             normal,

@@ -114,3 +114,48 @@ fn too_few_samples_tell_nothing() {
     let alike = sheet(100, 1, |_, _| 0.0);
     assert!(matches!(decide(&alike, 17.0).verdict, Verdict::Unknown));
 }
+
+/// A lying shaft as a scanner sees it: evenly in x and y, noise along z, more of it on slopes.
+fn lying(radius_mm: f64, length_mm: f64, steepest_rad: f64, seed: u64) -> Vec<Sample> {
+    let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(3));
+    let half = radius_mm * libm::sin(steepest_rad);
+    let tilt_rad = 0.3 * random.uniform() - 0.15;
+    let count = (length_mm * 2.0 * half * 4.0) as usize;
+    (0..count)
+        .map(|_| {
+            let x = length_mm * random.uniform();
+            let y = half * (2.0 * random.uniform() - 1.0);
+            let up = (radius_mm * radius_mm - y * y).sqrt();
+            let z = (up + x * libm::sin(tilt_rad)) / libm::cos(tilt_rad);
+            let sigma_mm = NOISE_MM * radius_mm / (up * libm::cos(tilt_rad));
+            Sample {
+                point_mm: Vector3::new(x, y, z + sigma_mm * random.normal()),
+                ray: Vector3::z(),
+                sigma_mm,
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn a_short_shaft_seen_half_around_is_a_cylinder() {
+    let mut wrong = Vec::new();
+    for (radius_mm, length_mm) in [(20.0, 8.0), (28.0, 12.0), (29.7, 16.0), (40.0, 10.0)] {
+        for steepest_rad in [0.7, 1.0, 1.15, 1.25] {
+            for seed in 0..4 {
+                let samples = lying(radius_mm, length_mm, steepest_rad, seed);
+                let evidence = decide(&samples, 1.0);
+                if family(&evidence) != Some(Family::Cylinder) {
+                    wrong.push((
+                        radius_mm,
+                        length_mm,
+                        steepest_rad,
+                        seed,
+                        evidence.candidates,
+                    ));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{} {wrong:#?}", wrong.len());
+}

@@ -1,18 +1,19 @@
 //! What kind of surface each region is.
 
+mod bearing;
 mod nodes;
 mod policy;
-mod samples;
+pub(crate) mod samples;
 
 use core::num::NonZeroU16;
 
-use range_image::{Monitor, RangeImage, RegionMap};
+use range_image::{Cancelled, Monitor, RangeImage, RegionMap};
 use rayon::prelude::*;
-use shapes::{Evidence, Sample, Shape, Verdict, decide};
+use shapes::{Evidence, Shape, Verdict};
 
-use crate::columns::Columns;
-use crate::process::PipelineError;
+use crate::SmoothJoins;
 pub use policy::{Kinds, UnknownKinds};
+use samples::OnRegion;
 
 /// A region's kind of surface.
 #[derive(Debug, Clone)]
@@ -46,27 +47,21 @@ pub enum Basis {
     Nodes,
 }
 
-/// What a region's surface is decided by.
-struct Bearing {
-    samples: Vec<Sample>,
-    /// As [`shapes::fit`] has it.
-    area: f64,
-}
-
-/// Decides for each region, in the order of their labels: by the samples where columns are
-/// given, else by the nodes.
+/// Decides for each region, in the order of their labels: by the samples where they are given,
+/// else by the nodes.
 ///
 /// # Errors
-/// Cancelled, or the columns cannot be read again.
+/// Cancelled.
 pub(crate) fn kinds(
     image: &RangeImage,
     regions: &RegionMap,
-    columns: Option<&dyn Columns>,
+    samples: Option<&[OnRegion]>,
+    smooth_joins: SmoothJoins,
     monitor: &dyn Monitor,
-) -> Result<Vec<RegionKind>, PipelineError> {
-    let (bearings, basis) = match columns {
-        Some(columns) => {
-            let all = samples::of_regions(image, regions, columns, monitor)?;
+) -> Result<Vec<RegionKind>, Cancelled> {
+    let (bearings, basis) = match samples {
+        Some(samples) => {
+            let all = bearing::of_samples(image, regions, samples);
             (all, Basis::Samples)
         }
         None => (nodes::of_regions(image, regions), Basis::Nodes),
@@ -76,12 +71,28 @@ pub(crate) fn kinds(
         .collect();
     let decided = bearings.par_iter().zip(labels).map(|(bearing, label)| {
         monitor.check()?;
-        let evidence = decide(&bearing.samples, bearing.area);
         Ok(RegionKind {
             label,
-            evidence,
+            evidence: bearing.decide(),
             basis,
         })
     });
-    decided.collect()
+    let decided: Vec<Result<RegionKind, Cancelled>> = decided.collect();
+    let mut decided = decided.into_iter().collect::<Result<Vec<_>, _>>()?;
+    if smooth_joins == SmoothJoins::Keep {
+        // What lies beside a border may be of a surface that joins this one.
+        return Ok(decided);
+    }
+    let shapes: Vec<Option<Shape>> = decided.iter().map(RegionKind::shape).collect();
+    decided
+        .par_iter_mut()
+        .zip(&bearings)
+        .for_each(|(kind, bearing)| {
+            if let Verdict::Shape(fit) = &mut kind.evidence.verdict
+                && let Some(refined) = bearing.refine(fit, &shapes)
+            {
+                **fit = refined;
+            }
+        });
+    Ok(decided)
 }

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use range_image::{NodeQuality, RangeImage, RegionMap};
 use shapes::{Sample, spread};
 
-use super::Bearing;
+use super::bearing::Bearing;
 use crate::neighbourhood::depth;
 
 /// Distances from a region's border, in nodes, from which on nodes are taken: those at the
@@ -81,5 +81,6 @@ fn bearing(image: &RangeImage, regions: &RegionMap, nodes: &[(usize, usize)]) ->
     Bearing {
         samples: samples.collect(),
         area,
+        beside: Vec::new(),
     }
 }

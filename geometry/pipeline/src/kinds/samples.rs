@@ -4,14 +4,10 @@ use nalgebra::Vector3;
 use range_image::{Column, Monitor, RangeImage, RegionMap};
 use shapes::{Sample, is_in_share};
 
-use super::Bearing;
 use crate::columns::Columns;
-use crate::neighbourhood::{DEEPEST, depth, rise};
+use crate::neighbourhood::rise;
 use crate::process::PipelineError;
 
-/// Samples that are enough to decide by; where there are fewer away from the border, those
-/// nearer to it are taken too.
-const ENOUGH: usize = 200;
 /// A region's samples are halved when they come to twice as many: its numbers are then known
 /// to some thousandths of the noise.
 const MOST: usize = 1 << 15;
@@ -28,54 +24,64 @@ const MOST_OBLIQUE: f64 = 0.1;
 /// Deviation where an image tells none, of its pitch.
 const UNTOLD: f64 = 1e-3;
 
-/// The samples of each region, in the order of their labels. A sample is a region's if all
-/// four nodes around it are.
-pub(super) fn of_regions(
+/// A sample on a region.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OnRegion {
+    /// The lowest of the four nodes around it, column and row.
+    pub(crate) cell: [u32; 2],
+    pub(crate) sample: Sample,
+}
+
+impl OnRegion {
+    /// The node that it lies nearest to, column and row.
+    pub(crate) fn nearest(&self, image: &RangeImage) -> [usize; 2] {
+        let [column, row] = self.cell.map(|index| index as usize);
+        let half_mm = 0.5 * image.pitch_mm();
+        let point_mm = self.sample.point_mm;
+        [
+            column + usize::from(point_mm.x - image.x_mm(column) > half_mm),
+            row + usize::from(point_mm.y - image.y_mm(row) > half_mm),
+        ]
+    }
+}
+
+/// The samples of the regions, region by region. A sample is a region's if all four nodes around
+/// it are.
+pub(crate) fn of_regions(
     image: &RangeImage,
     regions: &RegionMap,
     columns: &dyn Columns,
     monitor: &dyn Monitor,
-) -> Result<Vec<Bearing>, PipelineError> {
+) -> Result<Vec<OnRegion>, PipelineError> {
     let places = Places::new(image, regions, columns.camera_mm());
-    let depths = usize::from(DEEPEST) + 1;
-    let mut kept = vec![vec![Thinned::default(); depths]; usize::from(regions.regions())];
+    let mut kept = vec![Thinned::default(); usize::from(regions.regions())];
     let mut go_on = Ok(());
     columns
         .visit(&mut |column| {
-            places.of_column(column, |label, depth, sample| {
-                kept[usize::from(label) - 1][usize::from(depth)].push(sample);
+            places.of_column(column, |label, sample| {
+                kept[usize::from(label) - 1].push(sample);
             });
             go_on = monitor.check();
             go_on.is_ok()
         })
         .map_err(PipelineError::ReadAgain)?;
     go_on?;
-    let bearing = |by_depth: Vec<Thinned>| {
-        let mut samples = Vec::new();
-        // From the innermost on.
-        for ring in by_depth.into_iter().rev() {
-            if samples.len() >= ENOUGH {
-                break;
-            }
-            samples.extend(ring.kept.into_iter().map(|(_, sample)| sample));
-        }
-        Bearing { samples, area: 1.0 }
-    };
-    Ok(kept.into_iter().map(bearing).collect())
+    let all = kept.into_iter().flat_map(|thinned| thinned.kept);
+    Ok(all.map(|(_, sample)| sample).collect())
 }
 
 /// Samples: all of them, or a share that is as evenly spread.
 #[derive(Clone, Default)]
 struct Thinned {
     /// Each with the number of those before it.
-    kept: Vec<(u64, Sample)>,
+    kept: Vec<(u64, OnRegion)>,
     seen: u64,
     /// One in two to the power of this is kept.
     halvings: u32,
 }
 
 impl Thinned {
-    fn push(&mut self, sample: Sample) {
+    fn push(&mut self, sample: OnRegion) {
         if is_in_share(self.seen, self.halvings) {
             self.kept.push((self.seen, sample));
         }
@@ -101,7 +107,6 @@ struct Places<'a> {
 /// What the range image says of the samples at a node.
 #[derive(Clone, Copy)]
 struct Node {
-    depth: u8,
     /// Standard deviation of their z, millimetres.
     deviation_mm: f32,
     /// As [`rise`] has it.
@@ -112,7 +117,6 @@ impl<'a> Places<'a> {
     fn new(image: &'a RangeImage, regions: &'a RegionMap, camera_mm: Option<[f64; 2]>) -> Self {
         let each = (0..image.columns()).flat_map(|c| (0..image.rows()).map(move |r| (c, r)));
         let node = |(column, row)| Node {
-            depth: depth(regions, column, row),
             deviation_mm: deviation_mm(image, regions, column, row) as f32,
             rise: rise(image, regions, column, row).map(|rise| rise as f32),
         };
@@ -135,8 +139,8 @@ impl<'a> Places<'a> {
             .unwrap_or_else(Vector3::z)
     }
 
-    /// Tells of the samples of a column that lie on regions: region, depth and sample.
-    fn of_column(&self, column: &Column, mut tell: impl FnMut(u16, u8, Sample)) {
+    /// Tells of the samples of a column that lie on regions, and of which.
+    fn of_column(&self, column: &Column, mut tell: impl FnMut(u16, OnRegion)) {
         let (image, pitch_mm) = (self.image, self.image.pitch_mm());
         let cell = |at_mm: f64, first_mm: f64, nodes: usize| {
             let at = (at_mm - first_mm) / pitch_mm;
@@ -166,14 +170,12 @@ impl<'a> Places<'a> {
             let shares = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
             let mut z_mm = 0.0;
             let mut here = Node {
-                depth: DEEPEST,
                 deviation_mm: 0.0,
                 rise: [0.0; 2],
             };
             for ((c, r), share) in corners.into_iter().zip(shares) {
                 let node = &self.nodes[c * image.rows() + r];
                 z_mm += share * image.z_mm(c, r).unwrap_or(f64::NAN);
-                here.depth = here.depth.min(node.depth);
                 here.deviation_mm += share as f32 * node.deviation_mm;
                 for (sum, rise) in here.rise.iter_mut().zip(node.rise) {
                     *sum += share as f32 * rise;
@@ -195,7 +197,8 @@ impl<'a> Places<'a> {
                     ray,
                     sigma_mm: deviation_mm / covered.abs().max(MOST_OBLIQUE),
                 };
-                tell(label, here.depth, sample);
+                let cell = [c as u32, r as u32];
+                tell(label, OnRegion { cell, sample });
             }
         }
     }
@@ -230,11 +233,13 @@ mod tests {
         let mut thinned = Thinned::default();
         let count = 9 * MOST as u64;
         for x in 0..count {
-            thinned.push(Sample {
+            let sample = Sample {
                 point_mm: Vector3::new(x as f64, 0.0, 0.0),
                 ray: Vector3::z(),
                 sigma_mm: 1.0,
-            });
+            };
+            let cell = [0, 0];
+            thinned.push(OnRegion { cell, sample });
         }
         assert_eq!(thinned.seen, count);
         assert!((MOST..2 * MOST).contains(&thinned.kept.len()));
@@ -242,7 +247,7 @@ mod tests {
             thinned
                 .kept
                 .iter()
-                .all(|(x, sample)| sample.point_mm.x == *x as f64)
+                .all(|(x, on)| on.sample.point_mm.x == *x as f64)
         );
         // From the first to the last, and of every row of 256.
         let gaps = thinned.kept.windows(2).map(|pair| pair[1].0 - pair[0].0);

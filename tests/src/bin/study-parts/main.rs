@@ -36,6 +36,7 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Parser;
 use deliverables::{CadOptions, write_iges, write_step};
 use jiff::Timestamp;
+use pipeline::SmoothJoins;
 
 use crate::judge::Python;
 use crate::measure::{Measured, measure};
@@ -65,12 +66,25 @@ struct Options {
     /// List every face that is not as it should be
     #[arg(long)]
     list: bool,
+    /// Take regions apart at smooth joins, which the service does not do yet
+    #[arg(long, conflicts_with = "write")]
+    split: bool,
     /// The first six parts only
     #[arg(long)]
     short: bool,
     /// Write the page about the study instead of printing it
     #[arg(long)]
     write: bool,
+}
+
+impl Options {
+    fn smooth_joins(&self) -> SmoothJoins {
+        if self.split {
+            SmoothJoins::Split
+        } else {
+            SmoothJoins::Keep
+        }
+    }
 }
 
 /// Parts of a short study.
@@ -179,7 +193,7 @@ fn all(options: &Options, seeds: &[u64]) -> Result<(Vec<Measured>, Vec<Failed>)>
 
 fn one(options: &Options, seed: u64) -> Result<Measured> {
     let part = Part::read(&options.parts, seed)?;
-    let measured = measure(&part)?;
+    let measured = measure(&part, options.smooth_joins())?;
     write_models(&options.models, &measured)?;
     Ok(measured)
 }

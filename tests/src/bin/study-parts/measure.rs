@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use anyhow::Result;
-use pipeline::Outcome;
+use pipeline::{Outcome, SmoothJoins};
 use relief_tests::score::{MachineClass, Overlaps, TruthClass, classify};
 use shapes::Verdict;
 
@@ -95,12 +95,12 @@ impl Face {
 }
 
 /// Scans a part and holds what comes out against it.
-pub(crate) fn measure(part: &Part) -> Result<Measured> {
+pub(crate) fn measure(part: &Part, smooth_joins: SmoothJoins) -> Result<Measured> {
     let begun = Instant::now();
     let scan = scan(part)?;
     let scan_s = begun.elapsed().as_secs_f64();
     let begun = Instant::now();
-    let (image, outcome) = scan.process()?;
+    let (image, outcome) = scan.process(smooth_joins)?;
     let process_s = begun.elapsed().as_secs_f64();
 
     let truth = &scan.truth;

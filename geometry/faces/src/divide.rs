@@ -1,0 +1,157 @@
+//! All regions of an image.
+
+use range_image::{Cancelled, Monitor, RangeImage, RegionMap};
+use rayon::prelude::*;
+use shapes::{Fit, Verdict, decide};
+
+use crate::compete::{NONE, Pieces};
+use crate::field::{Field, Set, places};
+use crate::join::join;
+use crate::observations::Observations;
+use crate::split::split;
+
+/// Samples by which a region is told to be of one shape.
+const SAMPLES: usize = 4000;
+/// Samples by which regions are told where only their borders are at stake.
+const SOME: usize = 1000;
+/// Blocks of nodes that are looked at, to either side of their middle, and fewest samples of one.
+const BLOCKS: [usize; 2] = [2, 5];
+const FEWEST: usize = 8;
+/// Standard errors by which a block lies off the shape of its region if it is of another.
+const STRAYED: f64 = 4.0;
+/// Samples count as off up to so many deviations.
+const MOST_OFF: f64 = 3.0;
+/// Blocks off that make a region one of several surfaces.
+const MOST_STRAYED: usize = 2;
+
+/// Takes regions apart into those of one surface each, and joins those that are of one.
+///
+/// # Errors
+/// Cancelled.
+pub fn divide(
+    image: &RangeImage,
+    regions: &RegionMap,
+    observations: &Observations,
+    monitor: &dyn Monitor,
+) -> Result<RegionMap, Cancelled> {
+    let mut nodes: Vec<Vec<usize>> = vec![Vec::new(); usize::from(regions.regions())];
+    for (node, label) in regions.raw_labels().iter().enumerate() {
+        if let Some(own) = usize::from(*label).checked_sub(1) {
+            nodes[own].push(node);
+        }
+    }
+    let split = nodes.par_iter().map(|nodes| {
+        monitor.check()?;
+        let Some(field) = Field::new(image, observations, nodes) else {
+            return Ok(Vec::new());
+        };
+        if is_one(&field) {
+            return Ok(Vec::new());
+        }
+        let pieces = split(&field, monitor)?.unwrap_or_default();
+        let of_image = |set: &Set| {
+            let nodes = places(set)
+                .into_iter()
+                .filter_map(|place| field.node(place));
+            nodes.map(|node| node.index).collect::<Vec<_>>()
+        };
+        Ok(pieces.iter().map(of_image).collect())
+    });
+    let split: Vec<Result<Vec<Vec<usize>>, Cancelled>> = split.collect();
+    let mut labels = regions.raw_labels().to_vec();
+    let mut next = regions.regions();
+    for pieces in split {
+        // The first keeps the label.
+        for piece in pieces?.iter().skip(1) {
+            let Some(label) = next.checked_add(1) else {
+                break;
+            };
+            next = label;
+            piece.iter().for_each(|node| labels[*node] = label);
+        }
+    }
+    join(image, &mut labels, observations, monitor)?;
+    place_borders(image, &mut labels, observations, monitor)?;
+    Ok(RegionMap::new(image, labels))
+}
+
+/// Gives nodes at the borders of regions to those whose shape explains them best.
+fn place_borders(
+    image: &RangeImage,
+    labels: &mut [u16],
+    observations: &Observations,
+    monitor: &dyn Monitor,
+) -> Result<(), Cancelled> {
+    let labelled: Vec<usize> = (0..labels.len())
+        .filter(|node| labels[*node] != 0)
+        .collect();
+    let Some(field) = Field::new(image, observations, &labelled) else {
+        return Ok(());
+    };
+    let label = |place| {
+        let node = field.node(place)?;
+        usize::from(labels[node.index]).checked_sub(1)
+    };
+    let of_field: Vec<usize> = (0..field.len()).map(|p| label(p).unwrap_or(NONE)).collect();
+    let most = labels.iter().copied().max().unwrap_or(0);
+    let mut sets = vec![Vec::new(); usize::from(most)];
+    for (place, label) in of_field.iter().enumerate().filter(|(_, l)| **l != NONE) {
+        sets[*label].push(place);
+    }
+    let fits = sets.par_iter().map(|places| {
+        monitor.check()?;
+        let samples = field.samples_of(places, SOME);
+        match decide(&samples, observations.area()).verdict {
+            Verdict::Shape(fit) => Ok(Some(*fit)),
+            Verdict::FreeForm | Verdict::Unknown => Ok(None),
+        }
+    });
+    let fits: Vec<Result<Option<Fit>, Cancelled>> = fits.collect();
+    let mut pieces = Pieces {
+        field: &field,
+        labels: of_field,
+        fits: fits.into_iter().collect::<Result<_, _>>()?,
+    };
+    pieces.compete(monitor)?;
+    for (place, label) in pieces.labels.iter().enumerate() {
+        if let Some(node) = field.node(place)
+            && *label != NONE
+        {
+            labels[node.index] = *label as u16 + 1;
+        }
+    }
+    Ok(())
+}
+
+/// Whether a region is of one shape, all of it: nowhere do neighbouring samples lie to one side
+/// of it.
+fn is_one(field: &Field<'_>) -> bool {
+    let all = field.all();
+    let Some(fit) = field.fit(&all, 2, SAMPLES) else {
+        return false;
+    };
+    BLOCKS
+        .iter()
+        .all(|half| strayed(field, &fit, *half) < MOST_STRAYED)
+}
+
+/// Blocks of nodes whose samples lie off a shape in their mean.
+fn strayed(field: &Field<'_>, fit: &Fit, half: usize) -> usize {
+    let all = field.all();
+    let step = 2 * half + 1;
+    let mut strayed = 0;
+    for column in (half..field.columns()).step_by(step) {
+        for row in (half..field.rows()).step_by(step) {
+            let place = column * field.rows() + row;
+            let block = field.around(place, half).filter(|place| all[*place]);
+            let samples = field.samples_at(block);
+            if samples.len() >= FEWEST {
+                let offs = fit.offs(&samples).map(|off| off.clamp(-MOST_OFF, MOST_OFF));
+                let mean = offs.sum::<f64>() / samples.len() as f64;
+                let chance = fit.deviation() / (samples.len() as f64).sqrt();
+                strayed += usize::from(mean.abs() > STRAYED * chance);
+            }
+        }
+    }
+    strayed
+}

@@ -1,0 +1,234 @@
+//! A region of several surfaces taken apart.
+
+use range_image::{Cancelled, Monitor};
+use rayon::prelude::*;
+use shapes::{is_smooth, spread};
+
+use crate::compete::{NONE, Pieces};
+use crate::field::{Field, Set, count, places};
+use crate::grow::{FEWEST, Piece, grow};
+
+/// Half-widths of the windows that pieces are grown from, in nodes, one after the other.
+const WINDOWS: [usize; 3] = [8, 5, 3];
+/// Share of a window that must be open.
+const OPEN: f64 = 0.9;
+/// A piece that has lost more than this share of its nodes to greater ones was no other surface.
+const LOST: f64 = 0.4;
+/// Least share of a region that must be of shapes, once it is taken apart.
+const EXPLAINED: f64 = 0.5;
+/// How far to either side of a border between pieces samples tell whether it is one, in nodes.
+const BESIDE: usize = 8;
+/// Nodes of a piece beside another that make them neighbours.
+const CONTACT: usize = 3;
+/// Windows of a size that are looked at in a region, at most, and how many at once.
+const MOST_SEEDS: usize = 60;
+const AT_ONCE: usize = 8;
+/// Pairs of pieces with a smooth surface in common that make a region a free form, where they are
+/// more than half of all pairs.
+const FEW_PAIRS: usize = 3;
+/// Nodes of what is of no shape that make it a face: of fewer, the nearest pieces get them.
+const FREE: usize = 50;
+/// How far from its border such a face must reach, in nodes.
+const FREE_DEPTH: usize = 2;
+
+/// The pieces of a region, each of one surface; `None` where it is not made of shapes.
+pub(crate) fn split(
+    field: &Field<'_>,
+    monitor: &dyn Monitor,
+) -> Result<Option<Vec<Set>>, Cancelled> {
+    let all = field.all();
+    let mut open = all.clone();
+    let mut pieces: Vec<Piece> = Vec::new();
+    for window in WINDOWS.into_iter().map(Some).chain([None]) {
+        let mut found = match window {
+            Some(half) => candidates(field, &open, half, monitor)?,
+            // What is left may be one surface, too small for windows.
+            None => {
+                let left = field.parts(&field.opened(&open)).into_iter();
+                let left = left.filter(|part| count(part) >= FEWEST);
+                left.filter_map(|part| grow(field, &open, &places(&part)))
+                    .collect()
+            }
+        };
+        found.sort_by_key(|piece| core::cmp::Reverse(count(&piece.nodes)));
+        for mut piece in found {
+            let before = count(&piece.nodes);
+            for (is_in, open) in piece.nodes.iter_mut().zip(&open) {
+                *is_in &= open;
+            }
+            piece.nodes = field.opened(&piece.nodes);
+            let greatest = field
+                .parts(&piece.nodes)
+                .into_iter()
+                .max_by_key(|p| count(p));
+            let Some(nodes) = greatest else { continue };
+            let now = count(&nodes);
+            if now < FEWEST || (now as f64) < (1.0 - LOST) * before as f64 {
+                continue;
+            }
+            for (open, is_in) in open.iter_mut().zip(&nodes) {
+                *open &= !is_in;
+            }
+            pieces.push(Piece { nodes, ..piece });
+        }
+        if is_free_form(field, &pieces) {
+            return Ok(None);
+        }
+    }
+    let explained = count(&all) - count(&open);
+    if (explained as f64) < EXPLAINED * count(&all) as f64 {
+        return Ok(None);
+    }
+    let free = free_parts(field, &open).into_iter();
+    pieces.extend(free.map(|nodes| Piece { fit: None, nodes }));
+    if pieces.len() < 2 {
+        return Ok(None);
+    }
+    let pieces = settled(field, pieces, monitor)?;
+    let apart = apart(field, &pieces, monitor)?;
+    Ok((apart.len() > 1).then_some(apart))
+}
+
+/// The pieces with every node of the field.
+fn settled(
+    field: &Field<'_>,
+    pieces: Vec<Piece>,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Piece>, Cancelled> {
+    let mut labels = vec![NONE; field.len()];
+    for (label, piece) in pieces.iter().enumerate() {
+        for place in places(&piece.nodes) {
+            labels[place] = label;
+        }
+    }
+    let mut pieces = Pieces {
+        field,
+        labels,
+        fits: pieces.into_iter().map(|piece| piece.fit).collect(),
+    };
+    pieces.reclaim();
+    pieces.fill();
+    pieces.compete(monitor)?;
+    let Pieces { labels, fits, .. } = pieces;
+    let piece = |(label, fit)| Piece {
+        fit,
+        nodes: labels.iter().map(|l| *l == label).collect(),
+    };
+    let pieces = fits.into_iter().enumerate().map(piece);
+    Ok(pieces.filter(|piece| count(&piece.nodes) > 0).collect())
+}
+
+/// Sets of pieces with no border between them that the samples bear out, made one.
+fn apart(
+    field: &Field<'_>,
+    pieces: &[Piece],
+    monitor: &dyn Monitor,
+) -> Result<Vec<Set>, Cancelled> {
+    let mut group: Vec<usize> = (0..pieces.len()).collect();
+    let mut unite = |a: usize, b: usize| {
+        let (low, high) = (group[a].min(group[b]), group[a].max(group[b]));
+        group
+            .iter_mut()
+            .filter(|g| **g == high)
+            .for_each(|g| *g = low);
+    };
+    let touching = touching(field, pieces);
+    let mut is_free: Vec<bool> = pieces.iter().map(|piece| piece.fit.is_none()).collect();
+    for &(a, b) in &touching {
+        monitor.check()?;
+        if is_smooth_between(field, &pieces[a], &pieces[b]) {
+            (is_free[a], is_free[b]) = (true, true);
+            unite(a, b);
+        }
+    }
+    // What is of no shape is one free form as far as it hangs together.
+    for &(a, b) in touching.iter().filter(|(a, b)| is_free[*a] && is_free[*b]) {
+        unite(a, b);
+    }
+    let mut sets = Vec::new();
+    for first in 0..pieces.len() {
+        let mut set = vec![false; field.len()];
+        for (piece, _) in pieces.iter().zip(&group).filter(|(_, g)| **g == first) {
+            set.iter_mut()
+                .zip(&piece.nodes)
+                .for_each(|(all, is_in)| *all |= is_in);
+        }
+        if group[first] == first {
+            sets.push(set);
+        }
+    }
+    Ok(sets)
+}
+
+/// Pairs of pieces that touch each other.
+fn touching(field: &Field<'_>, pieces: &[Piece]) -> Vec<(usize, usize)> {
+    let touch = |a: &Piece, b: &Piece| count(&field.near(&a.nodes, &b.nodes, 1)) >= CONTACT;
+    let pairs = (0..pieces.len()).flat_map(|a| (a + 1..pieces.len()).map(move |b| (a, b)));
+    pairs
+        .filter(|(a, b)| touch(&pieces[*a], &pieces[*b]))
+        .collect()
+}
+
+/// Whether two pieces are parts of one smooth surface as well.
+fn is_smooth_between(field: &Field<'_>, a: &Piece, b: &Piece) -> bool {
+    let (Some(fit_a), Some(fit_b)) = (&a.fit, &b.fit) else {
+        return false;
+    };
+    let beside = |own: &Set, other: &Set| {
+        field.samples_at(places(&field.near(own, other, BESIDE)).into_iter())
+    };
+    is_smooth(&[
+        (fit_a, beside(&a.nodes, &b.nodes)),
+        (fit_b, beside(&b.nodes, &a.nodes)),
+    ])
+}
+
+/// What is grown from windows of a size all over what is open.
+fn candidates(
+    field: &Field<'_>,
+    open: &[bool],
+    half: usize,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Piece>, Cancelled> {
+    let whole = (2 * half + 1).pow(2) as f64;
+    let window =
+        |place: usize| -> Vec<usize> { field.around(place, half).filter(|p| open[*p]).collect() };
+    let columns = (0..field.columns()).step_by(half);
+    let lattice = columns.flat_map(|c| {
+        let rows = (0..field.rows()).step_by(half);
+        rows.map(move |r| c * field.rows() + r)
+    });
+    let seeds: Vec<usize> = lattice
+        .filter(|place| open[*place] && window(*place).len() as f64 >= OPEN * whole)
+        .collect();
+    let mut seeds: Vec<usize> = spread(seeds.len(), MOST_SEEDS).map(|k| seeds[k]).collect();
+    let mut found: Vec<Piece> = Vec::new();
+    while !seeds.is_empty() {
+        monitor.check()?;
+        let some: Vec<usize> = seeds.drain(..AT_ONCE.min(seeds.len())).collect();
+        let grown = some
+            .par_iter()
+            .map(|place| grow(field, open, &window(*place)));
+        found.extend(grown.collect::<Vec<_>>().into_iter().flatten());
+        seeds.retain(|place| !found.iter().any(|piece| piece.nodes[*place]));
+    }
+    Ok(found)
+}
+
+/// Whether pieces are for the most part of one smooth surface.
+fn is_free_form(field: &Field<'_>, pieces: &[Piece]) -> bool {
+    let pairs = touching(field, pieces);
+    let smooth = pairs
+        .iter()
+        .filter(|(a, b)| is_smooth_between(field, &pieces[*a], &pieces[*b]));
+    let smooth = smooth.count();
+    smooth >= FEW_PAIRS && 2 * smooth > pairs.len()
+}
+
+/// The parts of what is of no shape that are large enough to be faces.
+fn free_parts(field: &Field<'_>, open: &[bool]) -> Vec<Set> {
+    let is_face =
+        |part: &Set| count(part) >= FREE && !places(&field.within(part, FREE_DEPTH)).is_empty();
+    let parts = field.parts(&field.opened(open)).into_iter();
+    parts.filter(is_face).collect()
+}

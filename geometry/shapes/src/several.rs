@@ -1,0 +1,34 @@
+//! Whether samples are of several shapes that meet, or of one smooth surface.
+
+use crate::evidence::{Scale, Surface, polynomials_of};
+use crate::fit::{Fit, Sample};
+
+/// Whether one polynomial explains samples better than several shapes do, each its own: where
+/// shapes meet, even smoothly, the curvature jumps, which polynomials follow with many terms only;
+/// where a free form was cut into shapes, they leave more than a polynomial of few terms does.
+#[must_use]
+pub fn is_smooth(parts: &[(&Fit, Vec<Sample>)]) -> bool {
+    let samples: Vec<Sample> = parts.iter().flat_map(|(_, own)| own.clone()).collect();
+    let mut surfaces = polynomials_of(&samples, samples.len() as f64);
+    let of_parts = parts
+        .iter()
+        .flat_map(|(fit, own)| fit.offs(own).collect::<Vec<_>>());
+    surfaces.push(Surface {
+        off: of_parts.collect(),
+        freedom: parts
+            .iter()
+            .map(|(fit, _)| fit.shape.family().freedom())
+            .sum(),
+        fit: None,
+    });
+    let scale = Scale {
+        independent: samples.len() as f64,
+        surfaces,
+    };
+    let mut scores = scale
+        .scored()
+        .into_iter()
+        .map(|(candidate, _)| candidate.score);
+    let apart = scores.next_back().unwrap_or(f64::INFINITY);
+    scores.fold(f64::INFINITY, f64::min) < apart
+}
