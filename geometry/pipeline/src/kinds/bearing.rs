@@ -95,7 +95,7 @@ pub(super) fn of_samples(
         let [column, row] = on.nearest(image);
         let label = usize::from(regions.label(column, row));
         if let Some(of_region) = label.checked_sub(1).and_then(|own| by_depth.get_mut(own)) {
-            of_region[usize::from(depth(regions, column, row))].push(on);
+            of_region[usize::from(depth_of(regions, on, label))].push(on);
         }
     }
     let bearing = |by_depth: Vec<Vec<&OnRegion>>| {
@@ -124,6 +124,17 @@ pub(super) fn of_samples(
         bearing
     };
     by_depth.into_iter().map(bearing).collect()
+}
+
+/// How far the nodes around a sample lie from the border of its region, as [`depth`] has it.
+fn depth_of(regions: &RegionMap, on: &OnRegion, label: usize) -> u8 {
+    let [c, r] = on.cell.map(|index| index as usize);
+    let corners = [(c, r), (c + 1, r), (c, r + 1), (c + 1, r + 1)];
+    let depth = |(c, r)| {
+        let is_own = usize::from(regions.label(c, r)) == label;
+        if is_own { depth(regions, c, r) } else { 0 }
+    };
+    corners.into_iter().map(depth).min().unwrap_or(0)
 }
 
 /// The label nearest to a node that is not its own.
