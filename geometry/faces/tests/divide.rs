@@ -129,3 +129,48 @@ fn a_surface_that_was_cut_is_joined_and_another_is_not() {
         .filter(|count| count.abs_diff(SIDE * SIDE / 2) < 2 * SIDE);
     assert_eq!(even.count(), 2, "{counts:?}");
 }
+
+#[test]
+fn a_rim_is_taken_from_the_plane_that_it_hardly_disturbs() {
+    let (edge_mm, from_mm) = (27.0, 22.0);
+    let rounded = |x: f64, y: f64| {
+        let over = if y < from_mm {
+            0.0
+        } else {
+            (x - edge_mm).max(0.0)
+        };
+        libm::sqrt(RADIUS_MM * RADIUS_MM - over * over)
+    };
+    let (image, regions) = divided(rounded, |_, _| 1);
+    assert_eq!(regions.regions(), 2, "{:?}", regions.node_counts());
+    let is_right = |column: usize, row: usize| {
+        let is_rim = image.x_mm(column) >= edge_mm && image.y_mm(row) >= from_mm;
+        (regions.label(column, row) == 1) != is_rim
+    };
+    let nodes = (0..SIDE * SIDE).map(|k| (k / SIDE, k % SIDE));
+    let right = nodes
+        .filter(|(column, row)| is_right(*column, *row))
+        .count();
+    assert!(right > SIDE * SIDE - SIDE, "{right}");
+}
+
+#[test]
+fn nodes_at_a_ragged_border_go_to_the_surface_that_they_lie_on() {
+    let ridge = (MIDDLE_MM / PITCH_MM).round() as usize;
+    let ragged = |column, row| {
+        if column + row * 7 % 3 < ridge + 1 {
+            1
+        } else {
+            2
+        }
+    };
+    let (_, regions) = divided(|x, _| -0.2 * (x - MIDDLE_MM).abs(), ragged);
+    assert_eq!(regions.regions(), 2);
+    let is_wrong = |column: usize, row: usize| {
+        column != ridge && (regions.label(column, row) == 1) != (column < ridge)
+    };
+    let wrong = (0..SIDE * SIDE)
+        .filter(|k| is_wrong(k / SIDE, k % SIDE))
+        .count();
+    assert!(wrong <= 3, "{wrong}");
+}
