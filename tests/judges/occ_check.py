@@ -26,6 +26,8 @@ from OCP.Message import Message
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_REVERSED, TopAbs_VERTEX, TopAbs_WIRE
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS
+from OCP.XCAFDoc import XCAFDoc_DocumentTool
+from OCP.collections import Sequence_TDF_Label
 from OCP.gp import gp_Pnt, gp_Vec
 
 
@@ -160,6 +162,20 @@ def judge_face(face, spacing):
     }
 
 
+def uses_of_edges(faces):
+    """How many of the faces each edge belongs to, without sewing: edges are the same or not."""
+    edges = []
+    for face in faces:
+        for edge in explore(face, TopAbs_EDGE, TopoDS.Edge):
+            for known in edges:
+                if known[0].IsSame(edge):
+                    known[1] += 1
+                    break
+            else:
+                edges.append([edge, 1])
+    return [uses for _, uses in edges]
+
+
 def sew(faces, tolerance):
     sewing = BRepBuilderAPI_Sewing(tolerance)
     for face in faces:
@@ -173,6 +189,19 @@ def sew(faces, tolerance):
     }
 
 
+def labels_of(made):
+    """All labels of shapes, those of parts of shapes included."""
+    shapes = XCAFDoc_DocumentTool.ShapeTool_s(made.Main())
+    top = Sequence_TDF_Label()
+    shapes.GetShapes(top)
+    for k in range(1, top.Length() + 1):
+        yield shapes, top.Value(k)
+        parts = Sequence_TDF_Label()
+        shapes.GetSubShapes_s(top.Value(k), parts)
+        for n in range(1, parts.Length() + 1):
+            yield shapes, parts.Value(n)
+
+
 def names_and_colours(path):
     """Name, colour and layer of each face as a program with a tree would show them."""
     from OCP.IGESCAFControl import IGESCAFControl_Reader
@@ -180,8 +209,7 @@ def names_and_colours(path):
     from OCP.TCollection import TCollection_ExtendedString
     from OCP.TDataStd import TDataStd_Name
     from OCP.TDocStd import TDocStd_Document
-    from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf, XCAFDoc_DocumentTool
-    from OCP.collections import Sequence_TDF_Label
+    from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf
 
     document = TDocStd_Document(TCollection_ExtendedString("judge"))
     reader = IGESCAFControl_Reader()
@@ -190,14 +218,10 @@ def names_and_colours(path):
     reader.SetLayerMode(True)
     if reader.ReadFile(path) != IFSelect_RetDone or not reader.Transfer(document):
         return []
-    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     colours = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
     layers = XCAFDoc_DocumentTool.LayerTool_s(document.Main())
-    labels = Sequence_TDF_Label()
-    shapes.GetShapes(labels)
     found = []
-    for k in range(1, labels.Length() + 1):
-        label = labels.Value(k)
+    for shapes, label in labels_of(document):
         shape = shapes.GetShape_s(label)
         if shape.ShapeType() != TopAbs_FACE:
             continue
@@ -257,14 +281,16 @@ def judge(path, arguments):
         "transfer_fails": transfer_fails,
         "transfer_warnings": transfer_warnings,
         "faces": [judge_face(face, arguments.spacing_mm) for face in faces],
+        "edges_of_two_faces": sum(n == 2 for n in uses_of_edges(faces)),
         "sewing": sew(faces, arguments.sewing_mm),
         "tree": names_and_colours(path),
     }
     problems = []
     if not faces:
         problems.append("no faces")
-    if types.count(144) != len(faces):
-        problems.append(f"{types.count(144)} entities 144 became {len(faces)} faces")
+    written = types.count(144) + types.count(510)
+    if written != len(faces):
+        problems.append(f"{written} entities 144 and 510 became {len(faces)} faces")
     problems += fails + warnings + transfer_fails
     if not arguments.allow_transfer_warnings:
         problems += transfer_warnings
@@ -281,6 +307,9 @@ def judge(path, arguments):
                 problems.append(f"face {number}, loop {k} runs the wrong way")
     if arguments.expect_faces is not None and len(faces) != arguments.expect_faces:
         problems.append(f"{len(faces)} faces instead of {arguments.expect_faces}")
+    shared = report["edges_of_two_faces"]
+    if shared < arguments.min_shared_edges:
+        problems.append(f"{shared} edges of two faces instead of {arguments.min_shared_edges}")
     if arguments.max_free_edges is not None:
         free = report["sewing"]["free_edges"]
         if free > arguments.max_free_edges:
@@ -313,6 +342,9 @@ def options(words=None):
     )
     parser.add_argument("--area-tolerance", type=float, default=1e-3, help="relative")
     parser.add_argument("--max-free-edges", type=int, metavar="N")
+    parser.add_argument(
+        "--min-shared-edges", type=int, metavar="N", default=0, help="without sewing (shells)"
+    )
     parser.add_argument("--sewing-mm", type=float, default=1e-3, help="tolerance for sewing")
     parser.add_argument("--spacing-mm", type=float, default=0.25, help="of the points on loops")
     parser.add_argument(

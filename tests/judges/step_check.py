@@ -28,7 +28,6 @@ from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL, TopAbs_VERTEX
 from OCP.TopoDS import TopoDS
 from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_DocumentTool
-from OCP.collections import Sequence_TDF_Label
 
 import occ_check
 
@@ -48,20 +47,6 @@ def checks(list_of_checks):
         warnings += [f"{where}: {check.CWarning(k)}" for k in range(1, check.NbWarnings() + 1)]
         list_of_checks.Next()
     return fails, warnings
-
-
-def uses_of_edges(shape):
-    """How many faces each edge belongs to, without sewing: edges are the same or not."""
-    edges = []
-    for face in occ_check.explore(shape, TopAbs_FACE, TopoDS.Face):
-        for edge in occ_check.explore(face, TopAbs_EDGE, TopoDS.Edge):
-            for known in edges:
-                if known[0].IsSame(edge):
-                    known[1] += 1
-                    break
-            else:
-                edges.append([edge, 1])
-    return [uses for _, uses in edges]
 
 
 def document(path):
@@ -89,19 +74,6 @@ def attribute(label, kind):
     return found if label.FindAttribute(kind.GetID_s(), found) else None
 
 
-def labels_of(made):
-    """All labels of shapes, those of parts of shapes included."""
-    shapes = XCAFDoc_DocumentTool.ShapeTool_s(made.Main())
-    top = Sequence_TDF_Label()
-    shapes.GetShapes(top)
-    for k in range(1, top.Length() + 1):
-        yield shapes, top.Value(k)
-        parts = Sequence_TDF_Label()
-        shapes.GetSubShapes_s(top.Value(k), parts)
-        for n in range(1, parts.Length() + 1):
-            yield shapes, parts.Value(n)
-
-
 def tree(made):
     """Name and colour of each face."""
     from OCP.Quantity import Quantity_Color, Quantity_TOC_sRGB
@@ -109,7 +81,7 @@ def tree(made):
 
     colours = XCAFDoc_DocumentTool.ColorTool_s(made.Main())
     found = []
-    for shapes, label in labels_of(made):
+    for shapes, label in occ_check.labels_of(made):
         shape = shapes.GetShape_s(label)
         if shape.ShapeType() != TopAbs_FACE:
             continue
@@ -127,7 +99,7 @@ def tree(made):
 def properties(made):
     """Area and centroid that the file states, as OpenCASCADE reads them."""
     stated = {"area_mm2": None, "centroid_mm": None}
-    for _, label in labels_of(made):
+    for _, label in occ_check.labels_of(made):
         area, centroid = attribute(label, XCAFDoc_Area), attribute(label, XCAFDoc_Centroid)
         if area is not None:
             stated["area_mm2"] = area.Get()
@@ -207,7 +179,7 @@ def judge(path, arguments):
     if not faces:
         sys.exit(f"{path}: OpenCASCADE finds no faces in it")
     made = document(path)
-    uses = uses_of_edges(shape)
+    uses = occ_check.uses_of_edges(occ_check.explore(shape, TopAbs_FACE, TopoDS.Face))
     report = {
         "file": path,
         "written": written(path),

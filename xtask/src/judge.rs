@@ -53,6 +53,9 @@ const SHAPES: [&str; 8] = [
     "hollow-torus",
 ];
 
+/// The IGES entities that know their neighbours without sewing.
+const SHELLS: &str = "186";
+
 /// One judged scan.
 struct Case {
     name: String,
@@ -60,6 +63,8 @@ struct Case {
     faces: Option<u32>,
     /// Creases, each of which must be an edge of two faces in the STEP file.
     creases: u32,
+    /// They must be so in the IGES file, too.
+    is_shell: bool,
 }
 
 /// Scans every object through the pseudo-terminal and the service, and has the IGES and the
@@ -118,7 +123,7 @@ fn cases(seeds: u32) -> Vec<Case> {
     let mut cases = Vec::new();
     for object in OBJECTS {
         for seed in FIRST_SEED..FIRST_SEED + seeds {
-            for entities in ["114", "128", "190"] {
+            for entities in ["114", "128", "190", SHELLS] {
                 let words = ["--object", object, "--entities", entities, "--seed"];
                 cases.push(Case {
                     name: format!("{object}-{entities}-{seed}"),
@@ -129,6 +134,7 @@ fn cases(seeds: u32) -> Vec<Case> {
                         .collect(),
                     faces: Some(if object == "house" { 4 } else { 2 }),
                     creases: if object == "house" { 5 } else { 1 },
+                    is_shell: entities == SHELLS,
                 });
             }
         }
@@ -140,6 +146,7 @@ fn cases(seeds: u32) -> Vec<Case> {
             arguments: vec!["--replay".into(), bunny.display().to_string()],
             faces: None,
             creases: 1,
+            is_shell: false,
         });
     } else {
         println!("skipped: no recorded scans beside the repository");
@@ -185,6 +192,11 @@ impl Judges {
             shell::quiet(&self.python, &[check, "--no-points", &file])?;
         }
         let creases = case.creases.to_string();
+        if case.is_shell {
+            let check = "tests/judges/occ_check.py";
+            let words = [check, "--no-points", "--min-shared-edges", &creases, &file];
+            shell::quiet(&self.python, &words)?;
+        }
         let step = file_in(folder, "step")?;
         self.step(&step, &["--iges", &file, "--min-shared-edges", &creases])?;
         let faces = case.faces.map(|n| n.to_string());
@@ -209,7 +221,15 @@ impl Judges {
                 .display()
                 .to_string()
         };
-        let files = [(file("igs"), "190"), (file("step"), "ap242")];
+        let shells = scenes
+            .join(format!("{name}-shell.igs"))
+            .display()
+            .to_string();
+        let files = [
+            (file("igs"), "190"),
+            (shells, SHELLS),
+            (file("step"), "ap242"),
+        ];
         for (file, kind) in &files {
             let example = [
                 "--package",
@@ -225,14 +245,15 @@ impl Judges {
             ];
             shell::quiet("cargo", &words.concat())?;
         }
-        let [(iges, _), (step, _)] = &files;
+        let [(iges, _), (shells, _), (step, _)] = &files;
         let check = "tests/judges/occ_check.py";
-        shell::quiet(
-            &self.python,
-            &[check, "--no-points", "--expect-faces", "1", iges],
-        )?;
-        self.step(step, &["--iges", iges, "--expect-faces", "1"])?;
-        shell::quiet(&self.cadmpeg, &[iges, "1"])
+        for iges in [iges, shells] {
+            let words = [check, "--no-points", "--expect-faces", "1", iges];
+            shell::quiet(&self.python, &words)?;
+            self.step(step, &["--iges", iges, "--expect-faces", "1"])?;
+            shell::quiet(&self.cadmpeg, &[iges, "1"])?;
+        }
+        Ok(())
     }
 
     fn step(&self, file: &str, words: &[&str]) -> Result<()> {

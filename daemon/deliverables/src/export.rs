@@ -26,13 +26,15 @@ pub struct CadOptions {
 }
 
 impl CadOptions {
-    /// Number of the surfaces' entity type; 190, that of a plane, for surfaces by their numbers.
+    /// Number of the surfaces' entity type; 190, that of a plane, for surfaces by their numbers;
+    /// 186, that of a solid, for the same as boundary representation.
     #[must_use]
     pub fn entity_number(&self) -> u16 {
         match self.entities {
             Entities::Parametric114 => 114,
             Entities::Rational128 => 128,
             Entities::Analytic => 190,
+            Entities::Boundary => 186,
         }
     }
 

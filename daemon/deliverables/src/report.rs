@@ -119,7 +119,8 @@ pub struct SettingsReport {
     /// Root mean square distance from the nodes at which a fitted surface is not made
     /// nearer still; no bound on how far it may lie off.
     pub tolerance_mm: f64,
-    /// IGES entities of the surfaces: 114, 128, or 190 for surfaces by their numbers.
+    /// IGES entities of the surfaces: 114, 128, 190 for surfaces by their numbers, or 186 for
+    /// shells of these.
     pub iges_entities: u16,
     /// What the STEP file follows: `ap242`, `ap214`, or `off` where there is none.
     #[serde(default)]

@@ -172,8 +172,9 @@ pub struct ReconstructConfig {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DeliverablesConfig {
-    /// IGES entities of the surfaces: 114 (parametric splines), 128 (rational B-splines), or 190
-    /// (planes, cylinders, cones, spheres and tori by their numbers, other faces as 128).
+    /// IGES entities of the surfaces: 114 (parametric splines), 128 (rational B-splines), 190
+    /// (planes, cylinders, cones, spheres and tori by their numbers, other faces as 128), or 186
+    /// (the same as shells on common edges).
     #[serde(deserialize_with = "entities", skip_serializing_if = "Option::is_none")]
     pub entities: Option<u16>,
     /// What the STEP file beside the IGES file follows, or that there is none.
@@ -219,9 +220,10 @@ fn entities<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<
         None => Ok(None),
         Some(114) => Ok(Some(114)),
         Some(128) => Ok(Some(128)),
+        Some(186) => Ok(Some(186)),
         Some(190) => Ok(Some(190)),
         Some(other) => Err(serde::de::Error::custom(format!(
-            "{other} is no surface entity that can be written: use 114, 128 or 190"
+            "{other} is no surface entity that can be written: use 114, 128, 190 or 186"
         ))),
     }
 }

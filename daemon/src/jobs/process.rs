@@ -370,6 +370,7 @@ fn cad_options(processing: &Processing, scan: &Scan) -> CadOptions {
     CadOptions {
         entities: match wanted.entities {
             Some(128) => Entities::Rational128,
+            Some(186) => Entities::Boundary,
             Some(190) => Entities::Analytic,
             Some(_) => Entities::Parametric114,
             None => Entities::default(),

@@ -88,7 +88,7 @@ fn faults_are_told_with_their_line_and_a_way_out() {
         (
             "[deliverables]\nentities = 144\n",
             "relief.toml, line 2, column 12: 144 is no surface entity that can be written: use \
-             114, 128 or 190",
+             114, 128, 190 or 186",
         ),
         (
             "[deliverables]\nstep_units = \"inches\"\n",

@@ -13,7 +13,7 @@ use cad_exchange::step::{self, LengthUnit, Schema};
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
 
-const USAGE: &str = "usage: write_sample FILE.igs [114|128|190] [SHAPE], \
+const USAGE: &str = "usage: write_sample FILE.igs [114|128|190|186] [SHAPE], \
                      or FILE.step [ap242|ap214|inch] [SHAPE]";
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -35,6 +35,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             None | Some("114") => Entities::Parametric114,
             Some("128") => Entities::Rational128,
             Some("190") => Entities::Analytic,
+            Some("186") => Entities::Boundary,
             Some(_) => return Err(USAGE.into()),
         };
         let options = iges::WriteOptions {

@@ -16,6 +16,7 @@ fn samples() -> Vec<Vec<u8>> {
         Entities::Parametric114,
         Entities::Rational128,
         Entities::Analytic,
+        Entities::Boundary,
     ]
     .into_iter()
     .map(|entities| {
@@ -91,7 +92,7 @@ fn the_samples_themselves_are_sound() {
         .map(|file| read(file).map(Result::ok))
         .collect();
     let model = [None, Some(1)];
-    assert_eq!(counts, [model, model, model, model, [Some(6), None]]);
+    assert_eq!(counts, [model, model, model, model, model, [Some(6), None]]);
 }
 
 #[test]

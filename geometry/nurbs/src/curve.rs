@@ -49,6 +49,21 @@ impl<const D: usize> BSplineCurve<D> {
         &self.points
     }
 
+    /// The same curve run the other way, over the same domain.
+    #[must_use]
+    pub fn reversed(&self) -> Self {
+        let (first, last) = self.knots.domain();
+        let knots = self.knots.knots().iter().rev();
+        // The ends must not pick up rounding from the reflection.
+        let mirrored = knots.map(|&knot| match knot {
+            knot if knot == first => last,
+            knot if knot == last => first,
+            knot => first + (last - knot),
+        });
+        let knots = KnotVector::assembled(self.knots.degree(), mirrored.collect());
+        Self::assembled(knots, self.points.iter().rev().copied().collect())
+    }
+
     /// The point at parameter `t`.
     #[must_use]
     pub fn evaluate(&self, t: f64) -> [f64; D] {
@@ -89,6 +104,21 @@ mod tests {
             assert!((d[0] - 1.0).abs() < 1e-14 && (d[1] - 2.0 * t).abs() < 1e-14);
             assert!(dd[0].abs() < 1e-14 && (dd[1] - 2.0).abs() < 1e-14);
         }
+    }
+
+    #[test]
+    fn the_other_way_is_the_same_curve() {
+        let knots = KnotVector::new(2, vec![0.3, 0.3, 0.3, 0.4, 1.1, 1.1, 1.1]).unwrap();
+        let points = vec![[0.0, 1.0], [1.0, 3.0], [2.0, -1.0], [5.0, 0.0]];
+        let curve = BSplineCurve::new(knots, points).unwrap();
+        let back = curve.reversed();
+        assert_eq!(back.knots().domain(), (0.3, 1.1));
+        for k in 0..=20 {
+            let t = 0.3 + 0.04 * f64::from(k);
+            let (p, q) = (curve.evaluate(t), back.evaluate(0.3 + (1.1 - t)));
+            assert!((p[0] - q[0]).abs() < 1e-12 && (p[1] - q[1]).abs() < 1e-12);
+        }
+        assert_eq!(back.reversed(), curve);
     }
 
     #[test]

@@ -35,6 +35,17 @@ pub(crate) struct Strand {
     pub(crate) curve: PiecewiseCubic<3>,
 }
 
+impl Strand {
+    /// The curve from start to end, or the other way.
+    pub(crate) fn directed(&self, forward: bool) -> PiecewiseCubic<3> {
+        if forward {
+            self.curve.clone()
+        } else {
+            self.curve.reversed()
+        }
+    }
+}
+
 /// What is written once, however many faces it belongs to.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Topology {

@@ -1,7 +1,8 @@
 //! IGES 5.3 in fixed 80-column ASCII.
 //!
 //! [`write()`] turns a [`reconstruct::Model`] into trimmed surfaces (entity 144 on 142 on
-//! 114 and 112, on 128 and 126, or on 190 to 198), one per face, with name, colour and level;
+//! 114 and 112, on 128 and 126, or on 190 to 198), one per face, or into shells (514) of faces on
+//! common edges, with name, colour and level;
 //! [`read_points`] takes measured points (106, 116) from anybody's file; [`read_model`]
 //! reads back what [`write()`] writes.
 //!
@@ -13,7 +14,7 @@ mod read;
 mod write;
 
 pub use read::{
-    AnalyticSurface, MAX_FILE_BYTES, ReadError, SplineCurve, SurfaceFrame, TrimmedCurve,
+    AnalyticSurface, MAX_FILE_BYTES, ReadError, Shell, SplineCurve, SurfaceFrame, TrimmedCurve,
     TrimmedFace, TrimmedModel, TrimmedSurface, read_model, read_points,
 };
 pub use write::{DEFAULT_PALETTE, Entities, FaceDefect, Summary, WriteError, WriteOptions, write};

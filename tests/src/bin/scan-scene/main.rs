@@ -71,7 +71,7 @@ struct Options {
     /// The road from samples to surfaces: relief or shim-lee
     #[arg(long, value_name = "METHOD")]
     method: Option<String>,
-    /// IGES entities of the surfaces: 114, 128 or 190
+    /// IGES entities of the surfaces: 114, 128, 190 or 186
     #[arg(long, value_name = "TYPE")]
     entities: Option<u16>,
     /// Fail if the result takes longer than this after the last column, seconds

@@ -40,8 +40,9 @@ pub(crate) struct Args {
     /// millimetres
     #[arg(long, value_name = "MM")]
     tolerance_mm: Option<f64>,
-    /// IGES entities of the surfaces: 114 (parametric splines), 128 (rational B-splines), or 190
-    /// (planes, cylinders, cones, spheres and tori by their numbers, other faces as 128)
+    /// IGES entities of the surfaces: 114 (parametric splines), 128 (rational B-splines), 190
+    /// (planes, cylinders, cones, spheres and tori by their numbers, other faces as 128), or 186
+    /// (the same as boundary representation: shells of faces on common edges)
     #[arg(long, value_name = "TYPE", value_enum, default_value_t = EntityType::Parametric)]
     entities: EntityType,
     /// What a STEP file follows: AP242, or AP214 for programs that do not know the former
@@ -115,6 +116,8 @@ enum EntityType {
     Rational,
     #[value(name = "190")]
     Analytic,
+    #[value(name = "186")]
+    Boundary,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -262,6 +265,7 @@ impl Args {
                 EntityType::Parametric => Entities::Parametric114,
                 EntityType::Rational => Entities::Rational128,
                 EntityType::Analytic => Entities::Analytic,
+                EntityType::Boundary => Entities::Boundary,
             },
             step: match (format, self.step_schema) {
                 (CadFormat::Iges, _) => None,

@@ -1,6 +1,7 @@
 //! The reader, in layers: bytes to lines to sections ([`lines`]), the Global section
 //! ([`global`]), directory entries and parameter records ([`mod@file`] on [`values`]), and on
-//! top of these what is wanted: points ([`points`]) or trimmed faces ([`model`]).
+//! top of these what is wanted: points ([`points`]), trimmed faces ([`model`]) or those of shells
+//! ([`shell`]).
 //!
 //! Files come from anywhere: nothing is allocated by a count before the values are there.
 
@@ -11,6 +12,7 @@ mod global;
 mod lines;
 mod model;
 mod points;
+mod shell;
 mod transform;
 mod values;
 
@@ -19,3 +21,4 @@ pub use error::ReadError;
 pub use lines::MAX_FILE_BYTES;
 pub use model::{SplineCurve, TrimmedCurve, TrimmedFace, TrimmedModel, TrimmedSurface, read_model};
 pub use points::read_points;
+pub use shell::Shell;

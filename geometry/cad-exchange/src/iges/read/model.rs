@@ -1,5 +1,5 @@
-//! Trimmed faces as [`crate::iges::write()`] writes them: 144 on 142 on 114 and 112, on 128 and
-//! 126, or on 190 to 198 and 126.
+//! Faces as [`crate::iges::write()`] writes them: 144 on 142 on 114 and 112, on 128 and 126, or on
+//! 190 to 198 and 126; or those of shells.
 
 use std::io::Read;
 
@@ -8,8 +8,9 @@ use nurbs::{BSplineCurve, BSplineSurface, KnotVector, PatchSurface, PiecewiseCub
 use super::analytic::{AnalyticSurface, SURFACES, analytic, is_analytic};
 use super::error::ReadError;
 use super::file::{Entity, File, Record};
+use super::shell::{Shell, shells};
 
-/// What a file of trimmed surfaces holds. Millimetres.
+/// What a file of trimmed surfaces or shells holds. Millimetres.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrimmedModel {
     /// Name of the part.
@@ -24,6 +25,8 @@ pub struct TrimmedModel {
     pub resolution_mm: f64,
     /// The faces, in the order of the file.
     pub faces: Vec<TrimmedFace>,
+    /// Which of them hang together, where the file says so.
+    pub shells: Vec<Shell>,
 }
 
 /// A trimmed surface.
@@ -81,6 +84,15 @@ impl<const D: usize> SplineCurve<D> {
             Self::BSpline(curve) => curve.evaluate(t),
         }
     }
+
+    /// The same curve run the other way, over the same domain.
+    #[must_use]
+    pub fn reversed(&self) -> Self {
+        match self {
+            Self::Cubic(curve) => Self::Cubic(curve.reversed()),
+            Self::BSpline(curve) => Self::BSpline(curve.reversed()),
+        }
+    }
 }
 
 /// A part of a border, given twice.
@@ -92,11 +104,11 @@ pub struct TrimmedCurve {
     pub space_curve: SplineCurve<3>,
 }
 
-/// Reads the trimmed faces of a file that [`crate::iges::write()`] wrote.
+/// Reads the trimmed faces of a file that [`crate::iges::write()`] wrote, or those of its shells.
 ///
 /// # Errors
 /// [`ReadError`], naming line and entity, also for entities that other programs write
-/// and this one does not; [`ReadError::Nothing`] when there are no trimmed surfaces.
+/// and this one does not; [`ReadError::Nothing`] when there are neither trimmed surfaces nor shells.
 pub fn read_model(source: impl Read) -> Result<TrimmedModel, ReadError> {
     let file = File::read(source)?;
     if file.global.unit_mm != 1.0 {
@@ -106,15 +118,21 @@ pub fn read_model(source: impl Read) -> Result<TrimmedModel, ReadError> {
             reason: "models are read in millimetres at scale 1 only".to_owned(),
         });
     }
-    let faces = file
+    let mut faces = file
         .entities
         .iter()
         .filter(|entity| entity.entity == 144)
         .map(|entity| face(&file, entity))
         .collect::<Result<Vec<_>, _>>()?;
+    let loose = faces.len();
+    let (mut shells, hung) = shells(&file)?;
+    for face in shells.iter_mut().flat_map(|shell| &mut shell.faces) {
+        *face += loose;
+    }
+    faces.extend(hung);
     if faces.is_empty() {
         return Err(ReadError::Nothing {
-            wanted: "trimmed surfaces (entity 144)",
+            wanted: "trimmed surfaces (entity 144) and no shells (514)",
             found: format!("but {}", file.census()),
         });
     }
@@ -126,6 +144,7 @@ pub fn read_model(source: impl Read) -> Result<TrimmedModel, ReadError> {
         timestamp: global.timestamp,
         resolution_mm: global.resolution,
         faces,
+        shells,
     })
 }
 
@@ -157,7 +176,7 @@ fn face(file: &File, entity: &Entity) -> Result<TrimmedFace, ReadError> {
 }
 
 /// The record of an entity that has no transformation matrix.
-fn placed<'a>(file: &'a File, entity: &'a Entity) -> Result<Record<'a>, ReadError> {
+pub(super) fn placed<'a>(file: &'a File, entity: &'a Entity) -> Result<Record<'a>, ReadError> {
     if entity.transformation != 0 {
         return Err(file.defect(entity, "transformed surfaces and curves are not read"));
     }
@@ -165,7 +184,7 @@ fn placed<'a>(file: &'a File, entity: &'a Entity) -> Result<Record<'a>, ReadErro
 }
 
 /// The first name among the properties after the parameters.
-fn name(file: &File, record: &mut Record<'_>) -> Result<Option<String>, ReadError> {
+pub(super) fn name(file: &File, record: &mut Record<'_>) -> Result<Option<String>, ReadError> {
     if record.ended() {
         return Ok(None);
     }
@@ -189,7 +208,7 @@ fn name(file: &File, record: &mut Record<'_>) -> Result<Option<String>, ReadErro
     Ok(None)
 }
 
-fn colour(file: &File, entity: &Entity) -> Result<Option<[u8; 3]>, ReadError> {
+pub(super) fn colour(file: &File, entity: &Entity) -> Result<Option<[u8; 3]>, ReadError> {
     if entity.colour >= 0 {
         return Ok(None);
     }
@@ -265,7 +284,10 @@ fn curves<const D: usize>(file: &File, entity: &Entity) -> Result<Vec<SplineCurv
     Ok(parts)
 }
 
-fn curve<const D: usize>(file: &File, entity: &Entity) -> Result<SplineCurve<D>, ReadError> {
+pub(super) fn curve<const D: usize>(
+    file: &File,
+    entity: &Entity,
+) -> Result<SplineCurve<D>, ReadError> {
     let mut record = placed(file, entity)?;
     if entity.entity == 112 {
         cubic_curve(&mut record).map(SplineCurve::Cubic)
@@ -332,7 +354,7 @@ fn parameter(start: f64, linear_at: usize) -> [f64; 16] {
     coefficients
 }
 
-fn surface(file: &File, entity: &Entity) -> Result<TrimmedSurface, ReadError> {
+pub(super) fn surface(file: &File, entity: &Entity) -> Result<TrimmedSurface, ReadError> {
     let mut record = placed(file, entity)?;
     match entity.entity {
         114 => patches(&mut record).map(TrimmedSurface::Patches),

@@ -9,7 +9,6 @@ use reconstruct::{Face, Surface};
 use shapes::Family;
 
 use super::error::WriteError;
-use super::options::Entities;
 use super::shapes::{Joined, curve, curve_status, plain_entry, surface};
 use super::sheet::{Entry, Pointer, Sheet, Status};
 use super::{PREFER_SPACE_CURVE, Style};
@@ -23,32 +22,39 @@ pub(super) fn bounded_surface(
     topology: &Topology,
     loops: &[Vec<Use>],
 ) -> Result<(Pointer, Vec<Pointer>), WriteError> {
-    let Surface::Patches(patches) = &face.surface;
-    let (surface, is_spline) = match carrier {
-        Carrier::Plane(flat) => (plane(sheet, style.level, flat)?, false),
-        Carrier::Round(round) => (round_surface(sheet, style.level, round)?, false),
-        Carrier::Spline => {
-            let spline = surface(sheet, Entities::Rational128, style.level, patches)?;
-            (spline, true)
-        }
-    };
+    let (surface, is_spline) = carrier_surface(sheet, style, face, carrier)?;
     let borders = loops
         .iter()
         .map(|uses| {
-            let uses = match carrier.same_sense() {
-                true => uses.clone(),
-                false => backwards(uses),
-            };
+            let uses = as_the_surface_sees(carrier, uses);
             border(sheet, style, (surface, is_spline), topology, &uses)
         })
         .collect::<Result<Vec<_>, _>>()?;
     Ok((surface, borders))
 }
 
-/// A loop run the other way. Outer loops are counter-clockwise as the surface's own normal sees
-/// them, which of these entities always points outwards: a face that is seen from within
-/// shows its back.
-fn backwards(uses: &[Use]) -> Vec<Use> {
+/// What a face lies on, and whether that is a B-spline over x and y.
+pub(super) fn carrier_surface(
+    sheet: &mut Sheet,
+    style: Style,
+    face: &Face,
+    carrier: &Carrier,
+) -> Result<(Pointer, bool), WriteError> {
+    let Surface::Patches(patches) = &face.surface;
+    Ok(match carrier {
+        Carrier::Plane(flat) => (plane(sheet, style.level, flat)?, false),
+        Carrier::Round(round) => (round_surface(sheet, style.level, round)?, false),
+        Carrier::Spline => (surface(sheet, style.entities, style.level, patches)?, true),
+    })
+}
+
+/// A loop in the sense in which the surface's own normal sees it: outer ones counter-clockwise.
+/// The normal of entities 192 to 198 always points outwards: a face that is seen from within shows
+/// its back, and its loops run the other way.
+pub(super) fn as_the_surface_sees(carrier: &Carrier, uses: &[Use]) -> Vec<Use> {
+    if carrier.same_sense() {
+        return uses.to_vec();
+    }
     let reversed = uses.iter().rev().map(|of| Use {
         forward: !of.forward,
         ..*of
@@ -66,14 +72,7 @@ fn border(
 ) -> Result<Pointer, WriteError> {
     let spatial: Vec<PiecewiseCubic<3>> = uses
         .iter()
-        .map(|of| {
-            let strand = &topology.edges[of.edge];
-            if of.forward {
-                strand.curve.clone()
-            } else {
-                strand.curve.reversed()
-            }
-        })
+        .map(|of| topology.edges[of.edge].directed(of.forward))
         .collect();
     let flat = is_spline.then(|| spatial.iter().map(plan).collect::<Vec<_>>());
     let flat = flat.map(|flat| chain(sheet, style, &flat)).transpose()?;
@@ -93,7 +92,7 @@ fn border(
 }
 
 /// x and y of a curve.
-fn plan(curve: &PiecewiseCubic<3>) -> PiecewiseCubic<2> {
+pub(super) fn plan(curve: &PiecewiseCubic<3>) -> PiecewiseCubic<2> {
     PiecewiseCubic {
         breaks: curve.breaks.clone(),
         pieces: curve.pieces.iter().map(|&[x, y, _]| [x, y]).collect(),
@@ -114,7 +113,7 @@ fn chain<const D: usize>(
             closed: curves.len() == 1,
             flat_mm: style.resolution_mm,
         };
-        pointers.push(curve(sheet, Entities::Rational128, style.level, &joined)?);
+        pointers.push(curve(sheet, style.entities, style.level, &joined)?);
     }
     if let &[single] = pointers.as_slice() {
         return Ok(single);

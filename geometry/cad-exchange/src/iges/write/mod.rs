@@ -1,7 +1,7 @@
 //! The writer: a model in, five sections out.
 //!
-//! By [`Entities::Analytic`] faces are written on the edges that they share ([`analytic`]); else
-//! each face becomes, in this order: its surface (114 or 128); for each loop the curves
+//! By [`Entities::Analytic`] faces are written on the edges that they share ([`analytic`]), by
+//! [`Entities::Boundary`] as shells of these ([`shell`]); else each face becomes, in this order: its surface (114 or 128); for each loop the curves
 //! of its edges in the parameter plane and in space (112 or 126), a composite of each
 //! (102) where there are several, and the curve on the surface that pairs them (142);
 //! its name (406 form 15); and the trimmed surface (144) over all of these. Colours (314)
@@ -14,6 +14,7 @@ mod fields;
 mod options;
 mod shapes;
 mod sheet;
+mod shell;
 
 use std::io;
 
@@ -49,7 +50,7 @@ struct Style {
 /// What was written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Summary {
-    /// Trimmed surfaces.
+    /// Trimmed surfaces, or faces of shells.
     pub faces: usize,
     /// Entities of all kinds.
     pub entities: usize,
@@ -60,10 +61,10 @@ pub struct Summary {
     pub resolution_mm: f64,
 }
 
-/// Writes a model as an IGES 5.3 file of trimmed surfaces.
+/// Writes a model as an IGES 5.3 file of trimmed surfaces, or of shells.
 ///
 /// The same model and options give the same bytes. Curves are written as they are
-/// ([`Entities::Analytic`] puts them on what both faces are), but for slight kinks, which are
+/// ([`Entities::Analytic`] and [`Entities::Boundary`] put them on what both faces are), but for slight kinks, which are
 /// rounded within half the resolution: readers would split the edge there. Nothing is written unless the whole
 /// model can be.
 ///
@@ -78,7 +79,7 @@ pub fn write(
 ) -> Result<Summary, WriteError> {
     options.validate()?;
     let gap_mm = check(model, options.resolution_mm)?;
-    let shared = (options.entities == Entities::Analytic).then(|| {
+    let shared = options.entities.shares_edges().then(|| {
         let sharing = Sharing {
             sharing_mm: options.sharing_mm,
             resolution_mm: options.resolution_mm,
@@ -89,31 +90,21 @@ pub fn write(
     let resolution_mm = (gap_mm + shared_mm).max(options.resolution_mm);
     let mut sheet = Sheet::default();
     let colours = Colours::define(&mut sheet, model, options)?;
-    for (index, face) in model.faces.iter().enumerate() {
-        let colour = colours.of(face.region, options);
-        let style = Style {
-            entities: options.entities,
-            level: face.region,
-            resolution_mm,
-        };
-        let (surface, borders) = match &shared {
-            Some(Brep { carriers, topology }) => {
-                let (of, loops) = ((face, &carriers[index]), &topology.uses[index]);
-                analytic::bounded_surface(&mut sheet, style, of, topology, loops)?
-            }
-            None => bounded_surface(&mut sheet, style, face)?,
-        };
-        write_face(
-            &mut sheet,
-            style,
-            face,
-            index + 1,
-            colour,
-            surface,
-            &borders,
-        )?;
+    match &shared {
+        Some(brep) if options.entities == Entities::Boundary => {
+            let looks = (&colours, options);
+            shell::shells(&mut sheet, model, brep, looks, resolution_mm)?;
+        }
+        _ => {
+            let looks = (&colours, options);
+            trimmed_surfaces(&mut sheet, model, shared.as_ref(), looks, resolution_mm)?;
+        }
     }
-    let start = format!("{}: trimmed surfaces from a range scan", options.system);
+    let what = match options.entities {
+        Entities::Boundary => "shells of faces",
+        _ => "trimmed surfaces",
+    };
+    let start = format!("{}: {what} from a range scan", options.system);
     let global = global_fields(model, options, resolution_mm);
     let bytes = sheet.write(&start, &global, out)?;
     Ok(Summary {
@@ -122,6 +113,33 @@ pub fn write(
         bytes,
         resolution_mm,
     })
+}
+
+/// Each face as a thing of its own, on the edges that it shares if these are known.
+fn trimmed_surfaces(
+    sheet: &mut Sheet,
+    model: &Model,
+    shared: Option<&Brep>,
+    (colours, options): (&Colours, &WriteOptions),
+    resolution_mm: f64,
+) -> Result<(), WriteError> {
+    for (index, face) in model.faces.iter().enumerate() {
+        let colour = colours.of(face.region, options);
+        let style = Style {
+            entities: options.entities,
+            level: face.region,
+            resolution_mm,
+        };
+        let (surface, borders) = match shared {
+            Some(Brep { carriers, topology }) => {
+                let (of, loops) = ((face, &carriers[index]), &topology.uses[index]);
+                analytic::bounded_surface(sheet, style, of, topology, loops)?
+            }
+            None => bounded_surface(sheet, style, face)?,
+        };
+        write_face(sheet, style, face, index + 1, colour, surface, &borders)?;
+    }
+    Ok(())
 }
 
 /// The surface of a face and its borders, the outer one first: entities 142.
@@ -150,15 +168,7 @@ fn write_face(
     borders: &[Pointer],
 ) -> Result<(), WriteError> {
     let level = style.level;
-    let mut name = sheet.begin(Entry {
-        form: 15,
-        line_font: 0,
-        ..plain_entry(406, level, Status::Dependent)
-    });
-    name.integer(1);
-    name.text(&face.name);
-    let name = name.finish()?;
-
+    let name = write_name(sheet, level, &face.name)?;
     let mut trimmed = sheet.begin(Entry {
         colour,
         label: "FACE",
@@ -178,6 +188,18 @@ fn write_face(
     trimmed.pointer(name);
     trimmed.finish()?;
     Ok(())
+}
+
+/// Entity 406, form 15.
+fn write_name(sheet: &mut Sheet, level: u16, name: &str) -> Result<Pointer, WriteError> {
+    let mut record = sheet.begin(Entry {
+        form: 15,
+        line_font: 0,
+        ..plain_entry(406, level, Status::Dependent)
+    });
+    record.integer(1);
+    record.text(name);
+    record.finish()
 }
 
 /// Entity 142 and the curves below it.

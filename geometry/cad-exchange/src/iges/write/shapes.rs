@@ -37,7 +37,7 @@ pub(super) fn surface(
 ) -> Result<Pointer, WriteError> {
     match entities {
         Entities::Parametric114 => parametric_surface(sheet, level, surface),
-        Entities::Rational128 | Entities::Analytic => bspline_surface(sheet, level, surface),
+        _ => bspline_surface(sheet, level, surface),
     }
 }
 
@@ -51,7 +51,7 @@ pub(super) fn curve<const D: usize>(
 ) -> Result<Pointer, WriteError> {
     match entities {
         Entities::Parametric114 => parametric_curve(sheet, level, joined),
-        Entities::Rational128 | Entities::Analytic => bspline_curve(sheet, level, joined),
+        _ => bspline_curve(sheet, level, joined),
     }
 }
 
