@@ -10,6 +10,9 @@ use crate::shell;
 /// The judge's packages, pinned: another OpenCASCADE may judge otherwise.
 const PACKAGES: [&str; 2] = ["cadquery-ocp==8.0.1.1.0", "numpy"];
 
+/// Meshes the files, where that is asked for.
+const GMSH: &str = "gmsh==4.15.2";
+
 /// The simulated objects, and what is asked of their scans.
 const OBJECTS: [&str; 2] = ["house", "cylinder"];
 
@@ -28,6 +31,9 @@ pub(crate) struct Options {
     /// Also let FreeCAD load the files (needs `freecadcmd`).
     #[arg(long)]
     pub(crate) freecad: bool,
+    /// Also have Gmsh mesh the files
+    #[arg(long)]
+    pub(crate) gmsh: bool,
     /// Most seconds from a scan's last column to its result in the spool; how long that takes is
     /// only told if not given. For machines that have nothing else to do.
     #[arg(long, value_name = "SECONDS")]
@@ -71,7 +77,9 @@ struct Case {
 /// STEP file of each judged. All are judged before the first failure is reported.
 pub(crate) fn run(options: &Options) -> Result<()> {
     let place = shell::root().join("target/judges");
-    let python = python(&place)?;
+    let mut packages = PACKAGES.to_vec();
+    packages.extend(options.gmsh.then_some(GMSH));
+    let python = python_with(&place, &packages)?;
     let scenes = options.out.clone().unwrap_or_else(|| place.join("scenes"));
     shell::run(
         "cargo",
@@ -81,6 +89,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         python,
         cadmpeg: cadmpeg(&place)?,
         freecad: options.freecad,
+        gmsh: options.gmsh,
         within_s: options.within_s.map(|seconds| seconds.to_string()),
     };
     let mut failed = Vec::new();
@@ -123,7 +132,9 @@ fn cases(seeds: u32) -> Vec<Case> {
     let mut cases = Vec::new();
     for object in OBJECTS {
         for seed in FIRST_SEED..FIRST_SEED + seeds {
-            for entities in ["114", "128", "190", SHELLS] {
+            // Round faces in shells are judged as rectangles.
+            let shells = (object == "house").then_some(SHELLS);
+            for entities in ["114", "128", "190"].into_iter().chain(shells) {
                 let words = ["--object", object, "--entities", entities, "--seed"];
                 cases.push(Case {
                     name: format!("{object}-{entities}-{seed}"),
@@ -159,6 +170,7 @@ struct Judges {
     python: String,
     cadmpeg: String,
     freecad: bool,
+    gmsh: bool,
     within_s: Option<String>,
 }
 
@@ -200,6 +212,12 @@ impl Judges {
         let step = file_in(folder, "step")?;
         self.step(&step, &["--iges", &file, "--min-shared-edges", &creases])?;
         let faces = case.faces.map(|n| n.to_string());
+        if self.gmsh {
+            let mut words = vec!["tests/judges/gmsh_check.py", &file, &step];
+            let expected = faces.as_deref().map(|n| ["--expect-faces", n]);
+            words.extend(expected.iter().flatten());
+            shell::quiet(&self.python, &words)?;
+        }
         let mut words = vec![file.as_str()];
         words.extend(faces.as_deref());
         shell::quiet(&self.cadmpeg, &words)?;
@@ -299,11 +317,19 @@ fn cadmpeg(place: &Path) -> Result<String> {
 
 /// A Python with the judge's packages, made once.
 pub(crate) fn python(place: &Path) -> Result<String> {
+    python_with(place, &PACKAGES)
+}
+
+fn python_with(place: &Path, packages: &[&str]) -> Result<String> {
     let home = place.join("python");
     let python = home.join("bin/python").display().to_string();
     let ready = home.join("ready");
-    let wanted = PACKAGES.join("\n");
-    if std::fs::read_to_string(&ready).is_ok_and(|had| had == wanted) {
+    // What more an earlier run asked for does no harm.
+    let had = std::fs::read_to_string(&ready).unwrap_or_default();
+    if packages
+        .iter()
+        .all(|package| had.lines().any(|line| line == *package))
+    {
         return Ok(python);
     }
     shell::run("python3", &["-m", "venv", &home.display().to_string()])?;
@@ -314,8 +340,9 @@ pub(crate) fn python(place: &Path) -> Result<String> {
         "--quiet",
         "--disable-pip-version-check",
     ];
-    install.extend(PACKAGES);
+    install.extend(packages);
     shell::run(&python, &install)?;
-    std::fs::write(&ready, wanted).with_context(|| format!("cannot write {}", ready.display()))?;
+    std::fs::write(&ready, packages.join("\n"))
+        .with_context(|| format!("cannot write {}", ready.display()))?;
     Ok(python)
 }

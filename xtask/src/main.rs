@@ -108,6 +108,7 @@ fn full() -> anyhow::Result<()> {
     judge::run(&judge::Options {
         seeds: 10,
         freecad: true,
+        gmsh: true,
         within_s: Some(SLOWEST_S),
         out: None,
     })?;

@@ -145,6 +145,31 @@ fn shells_are_what_trimmed_surfaces_are() {
     }
 }
 
+/// Numbers of edges and vertices may be far greater than what is left of the record they stand in.
+#[test]
+fn lists_may_be_long() {
+    let mut model = Model::default();
+    for number in 0..200 {
+        let one = sample::of_shape("cylinder").unwrap();
+        let (vertices, edges) = (model.vertices.len(), model.edges.len());
+        model.vertices.extend(one.vertices);
+        model.edges.extend(one.edges.into_iter().map(|mut edge| {
+            edge.start.0 += vertices;
+            edge.end.0 += vertices;
+            edge
+        }));
+        model.faces.extend(one.faces.into_iter().map(|mut face| {
+            for coedge in &mut face.outer.coedges {
+                coedge.edge.0 += edges;
+            }
+            face.name = format!("Rectangle {number}");
+            face
+        }));
+    }
+    let read = read(&file(&model, Entities::Boundary));
+    assert_eq!((read.faces.len(), read.shells.len()), (200, 200));
+}
+
 /// An edge that ends elsewhere than at its vertex is told, with its number and how far.
 #[test]
 fn edges_end_at_their_vertices() {

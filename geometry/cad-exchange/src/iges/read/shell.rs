@@ -5,7 +5,7 @@ use std::collections::btree_map::Entry;
 
 use super::analytic::{SURFACES, is_analytic};
 use super::error::ReadError;
-use super::file::{Entity, File};
+use super::file::{Entity, File, Record};
 use super::model::{SplineCurve, TrimmedCurve, TrimmedFace, colour, curve, name, placed, surface};
 
 /// How much farther than the file's resolution an edge may end from its vertex: a number has as
@@ -88,13 +88,13 @@ fn border_loop(
             return Err(record.defect("loops with a vertex in place of an edge are not read"));
         }
         let list = record.pointer("a list of edges", &[504])?;
-        let number = record.count("the number of an edge")?;
+        let number = index(&mut record, "the number of an edge")?;
         let forward = record.integer("the sense of an edge")? == 1;
         let edges = match lists.entry(list.directory) {
             Entry::Occupied(known) => known.into_mut(),
             Entry::Vacant(place) => place.insert(edge_list(file, list)?),
         };
-        let Some(edge) = number.checked_sub(1).and_then(|index| edges.get(index)) else {
+        let Some(edge) = number.checked_sub(1).and_then(|k| edges.get(k)) else {
             let reason = format!("edge {number} is not among the {} of its list", edges.len());
             return Err(record.defect(reason));
         };
@@ -137,14 +137,14 @@ fn edge_list(file: &File, entity: &Entity) -> Result<Vec<SplineCurve<3>>, ReadEr
         let (first, last) = of.domain();
         for at in [first, last] {
             let list = record.pointer("a list of vertices", &[502])?;
-            let vertex = record.count("the number of a vertex")?;
+            let vertex = index(&mut record, "the number of a vertex")?;
             let known = match vertices.entry(list.directory) {
                 Entry::Occupied(known) => known.into_mut(),
                 Entry::Vacant(place) => place.insert(vertex_list(file, list)?),
             };
             let place = vertex
                 .checked_sub(1)
-                .and_then(|index| known.chunks_exact(3).nth(index));
+                .and_then(|k| known.chunks_exact(3).nth(k));
             let Some(place) = place else {
                 let reason = format!("vertex {vertex} of edge {number} is not in its list");
                 return Err(record.defect(reason));
@@ -166,6 +166,12 @@ fn edge_list(file: &File, entity: &Entity) -> Result<Vec<SplineCurve<3>>, ReadEr
         edges.push(of);
     }
     Ok(edges)
+}
+
+/// A number in a list of another entity, which the record need not have room for.
+fn index(record: &mut Record<'_>, name: &str) -> Result<usize, ReadError> {
+    let number = record.integer(name)?;
+    usize::try_from(number).map_err(|_| record.defect(format!("{name} is {number}")))
 }
 
 /// Entity 502: its coordinates, three by three.
