@@ -28,6 +28,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("faces", &["range-image", "shapes"]),
     ("reconstruct", &["nurbs", "range-image", "shapes"]),
     ("cad-exchange", &["nurbs", "reconstruct", "shapes"]),
+    (
+        "tessellate",
+        &["nurbs", "range-image", "reconstruct", "shapes"],
+    ),
+    ("mesh-exchange", &["shapes", "tessellate"]),
     ("compare", &["range-image"]),
     (
         "pipeline",
@@ -83,9 +88,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-const DELIVERABLES: [&str; 10] = [
+const DELIVERABLES: [&str; 12] = [
     "cad-exchange",
     "compare",
+    "mesh-exchange",
     "nurbs",
     "pipeline",
     "range-image",
@@ -94,6 +100,7 @@ const DELIVERABLES: [&str; 10] = [
     "segment",
     "shapes",
     "storage",
+    "tessellate",
 ];
 
 const DAEMON: [&str; 15] = [
