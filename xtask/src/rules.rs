@@ -32,7 +32,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "tessellate",
         &["nurbs", "range-image", "reconstruct", "shapes"],
     ),
-    ("mesh-exchange", &["shapes", "tessellate"]),
     ("compare", &["range-image"]),
     (
         "pipeline",
@@ -50,6 +49,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "scan-record",
         &["range-image", "scanner-protocol", "storage"],
     ),
+    ("mesh-files", &["shapes", "tessellate"]),
     ("deliverables", &DELIVERABLES),
     ("relief-api", &[]),
     ("reliefd", &DAEMON),
@@ -91,7 +91,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
 const DELIVERABLES: [&str; 12] = [
     "cad-exchange",
     "compare",
-    "mesh-exchange",
+    "mesh-files",
     "nurbs",
     "pipeline",
     "range-image",
