@@ -209,8 +209,8 @@ pub(crate) fn write_extras(
         )
     };
     let put = |written: &mut Written,
-                   name: String,
-                   content: &dyn Fn(&mut dyn Write) -> Result<(), WriteError>|
+               name: String,
+               content: &dyn Fn(&mut dyn Write) -> Result<(), WriteError>|
      -> Result<(), DeliverError> {
         monitor.check()?;
         if is_short_of_room {
@@ -226,7 +226,9 @@ pub(crate) fn write_extras(
             }
             Err(DeliverError::Export(WriteError::Mesh(error))) if error.io().is_none() => {
                 remove_file_if_there(disk, &directory.join(&name))?;
-                written.warnings.push(format!("{name} was left out: {error}"));
+                written
+                    .warnings
+                    .push(format!("{name} was left out: {error}"));
             }
             Err(error) => return Err(error),
         }
@@ -282,7 +284,11 @@ mod tests {
         let digits = crate::file::hexadecimal(&[0xab; 32]);
         let id = guid(&digits);
         assert_eq!(id, "{abababab-abab-8aba-8bab-abababababab}");
-        let groups: Vec<usize> = id.trim_matches(['{', '}']).split('-').map(str::len).collect();
+        let groups: Vec<usize> = id
+            .trim_matches(['{', '}'])
+            .split('-')
+            .map(str::len)
+            .collect();
         assert_eq!(groups, [8, 4, 4, 4, 12]);
     }
 

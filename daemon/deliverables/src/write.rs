@@ -13,8 +13,8 @@ use reconstruct::RegionFit;
 
 use crate::export::{CadOptions, WriteError, file_stem, write_iges, write_step};
 use crate::file::write_synced;
-use crate::meshes::{MeasuredPoints, write_extras};
 use crate::manifest::{MANIFEST_NAME, Manifest, ManifestFile};
+use crate::meshes::{MeasuredPoints, write_extras};
 use crate::picture;
 use crate::report::{Report, ScanReport};
 use crate::stopwatch::Stopwatch;

@@ -11,7 +11,9 @@ use gltf::json::material::{PbrBaseColorFactor, PbrMetallicRoughness, StrengthFac
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked::Valid;
 use gltf::json::validation::USize64;
-use gltf::json::{Accessor, Asset, Buffer, Index, Material, Mesh as Shape, Node, Root, Scene, Value};
+use gltf::json::{
+    Accessor, Asset, Buffer, Index, Material, Mesh as Shape, Node, Root, Scene, Value,
+};
 use tessellate::{Mesh, MeshFace};
 
 use crate::MeshDetails;
@@ -48,7 +50,10 @@ pub(crate) fn write(
     if u32::try_from(bytes.binary.len() + bytes.json_hint).is_err() {
         return Err(refused("it would be longer than 4 GiB".to_owned()));
     }
-    let json = bytes.root.to_vec().map_err(|error| refused(error.to_string()))?;
+    let json = bytes
+        .root
+        .to_vec()
+        .map_err(|error| refused(error.to_string()))?;
     let glb = Glb {
         header: Header {
             magic: *b"glTF",
@@ -128,7 +133,10 @@ impl File {
             .iter()
             .map(|corner| mesh.vertices_mm[corner.vertex as usize].map(|mm| (mm * M) as f32))
             .collect();
-        let normals = face.corners.iter().map(|corner| corner.normal.map(|c| c as f32));
+        let normals = face
+            .corners
+            .iter()
+            .map(|corner| corner.normal.map(|c| c as f32));
         let normals: Vec<[f32; 3]> = normals.collect();
         let mut low = [f32::INFINITY; 3];
         let mut high = [f32::NEG_INFINITY; 3];
@@ -139,7 +147,11 @@ impl File {
             }
         }
         let bytes = |vectors: &[[f32; 3]]| -> Vec<u8> {
-            vectors.iter().flatten().flat_map(|c| c.to_le_bytes()).collect()
+            vectors
+                .iter()
+                .flatten()
+                .flat_map(|c| c.to_le_bytes())
+                .collect()
         };
         let limits = |limits: [f32; 3]| Some(Value::from(limits.to_vec()));
         let position = self.accessor(&bytes(&places), places.len(), Some(Target::ArrayBuffer));
@@ -147,8 +159,12 @@ impl File {
             (accessor.min, accessor.max) = (limits(low), limits(high));
         }
         let normal = self.accessor(&bytes(&normals), normals.len(), Some(Target::ArrayBuffer));
-        let indices: Vec<u8> =
-            face.triangles.iter().flatten().flat_map(|k| k.to_le_bytes()).collect();
+        let indices: Vec<u8> = face
+            .triangles
+            .iter()
+            .flatten()
+            .flat_map(|k| k.to_le_bytes())
+            .collect();
         let count = 3 * face.triangles.len();
         let index = self.accessor(&indices, count, Some(Target::ElementArrayBuffer));
         if let Some(accessor) = self.root.accessors.get_mut(index.value()) {

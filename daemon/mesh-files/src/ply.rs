@@ -81,7 +81,9 @@ fn element(name: &str, count: usize, properties: &[(&str, PropertyType)]) -> Ele
     let mut element = ElementDef::new(name.to_owned());
     element.count = count;
     for (name, kind) in properties {
-        element.properties.add(PropertyDef::new((*name).to_owned(), kind.clone()));
+        element
+            .properties
+            .add(PropertyDef::new((*name).to_owned(), kind.clone()));
     }
     element
 }
@@ -98,7 +100,13 @@ fn header(comments: Vec<String>, elements: &[&ElementDef]) -> Header {
 
 /// A comment is one line of ASCII.
 fn comment(text: &str) -> String {
-    let plain = |c: char| if c.is_ascii_graphic() || c == ' ' { c } else { '_' };
+    let plain = |c: char| {
+        if c.is_ascii_graphic() || c == ' ' {
+            c
+        } else {
+            '_'
+        }
+    };
     text.chars().map(plain).collect()
 }
 
@@ -146,9 +154,12 @@ pub(crate) fn write_mesh(
         format!("part {}", comment(details.name)),
         "lengths in millimetres, y up, z towards the camera".to_owned(),
     ];
-    comments.extend(mesh.faces.iter().enumerate().map(|(k, face)| {
-        comment(&format!("face {k}: {}, {}", face.name, threemf::kind(face)))
-    }));
+    comments.extend(
+        mesh.faces
+            .iter()
+            .enumerate()
+            .map(|(k, face)| comment(&format!("face {k}: {}, {}", face.name, threemf::kind(face)))),
+    );
     let header = header(comments, &[&vertices, &facets]);
     Writer::<Vertex>::new().write_header(&mut sink, &header)?;
     let writer = Writer::<Vertex>::new();

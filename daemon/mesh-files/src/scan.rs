@@ -2,9 +2,7 @@
 
 use std::io::{Cursor, Write};
 
-use e57::{
-    DateTime, E57Writer, IntensityLimits, Record, RecordDataType, RecordName, RecordValue,
-};
+use e57::{DateTime, E57Writer, IntensityLimits, Record, RecordDataType, RecordName, RecordValue};
 
 use crate::error::MeshFileError;
 use crate::points::{Census, Points};

@@ -31,7 +31,13 @@ fn mesh() -> Mesh {
             [20.0, 5.0, 0.0],
         ],
         faces: vec![
-            face("R1", 1, Some(Family::Plane), [0, 1, 2, 3], [-half, 0.0, half]),
+            face(
+                "R1",
+                1,
+                Some(Family::Plane),
+                [0, 1, 2, 3],
+                [-half, 0.0, half],
+            ),
             face("R2", 12, None, [1, 4, 5, 2], [half, 0.0, half]),
         ],
         accuracy: Accuracy::default(),
@@ -124,9 +130,18 @@ fn ply_has_colours_regions_and_names() {
     let parser = ply_rs_bw::parser::Parser::<DefaultElement>::new();
     let ply = parser.read_ply(&mut Cursor::new(&bytes)).unwrap();
     let comments = &ply.header.comments;
-    assert!(comments.contains(&"face 0: R1, plane".to_owned()), "{comments:?}");
-    assert!(comments.contains(&"face 1: R2, free form".to_owned()), "{comments:?}");
-    assert!(comments.iter().any(|c| c == "part roof <&> \"7\" ]]>__"), "{comments:?}");
+    assert!(
+        comments.contains(&"face 0: R1, plane".to_owned()),
+        "{comments:?}"
+    );
+    assert!(
+        comments.contains(&"face 1: R2, free form".to_owned()),
+        "{comments:?}"
+    );
+    assert!(
+        comments.iter().any(|c| c == "part roof <&> \"7\" ]]>__"),
+        "{comments:?}"
+    );
     let number = |element: &DefaultElement, key: &str| match element[key] {
         Property::Float(value) => f64::from(value),
         Property::UChar(value) => f64::from(value),
@@ -179,7 +194,10 @@ fn threemf_is_a_surface_in_millimetres_with_a_material_for_each_face() {
         .map(|base| (base.name.to_string(), base.displaycolor.to_string()))
         .collect();
     let expected = [("R1 (plane)", "#FF8000"), ("R2 (free form)", "#0040FF")];
-    assert_eq!(named, expected.map(|(name, colour)| (name.into(), colour.into())));
+    assert_eq!(
+        named,
+        expected.map(|(name, colour)| (name.into(), colour.into()))
+    );
     let Some(ObjectKind::Mesh(mesh)) = &object.kind else {
         panic!("no mesh");
     };
@@ -188,7 +206,10 @@ fn threemf_is_a_surface_in_millimetres_with_a_material_for_each_face() {
         [vertex.x.value(), vertex.y.value(), vertex.z.value()]
     };
     let facets = &mesh.triangles.triangle;
-    let triangles: Vec<_> = facets.iter().map(|t| [t.v1, t.v2, t.v3].map(place)).collect();
+    let triangles: Vec<_> = facets
+        .iter()
+        .map(|t| [t.v1, t.v2, t.v3].map(place))
+        .collect();
     is_the_mesh(&triangles, 1.0);
     let materials: Vec<_> = facets.iter().map(|t| t.p1.get()).collect();
     assert_eq!(materials, [Some(0), Some(0), Some(1), Some(1)]);
@@ -203,7 +224,10 @@ fn glb_has_metres_and_a_named_node_for_each_face() {
     assert_eq!(file.buffers().next().unwrap().length(), binary.len());
     let part = file.default_scene().unwrap().nodes().next().unwrap();
     assert_eq!(part.name(), Some(details().name));
-    let names: Vec<_> = part.children().map(|node| node.name().unwrap().to_owned()).collect();
+    let names: Vec<_> = part
+        .children()
+        .map(|node| node.name().unwrap().to_owned())
+        .collect();
     assert_eq!(names, ["R1", "R2"]);
     let mut triangles = Vec::new();
     for node in part.children() {
@@ -218,8 +242,17 @@ fn glb_has_metres_and_a_named_node_for_each_face() {
             assert_eq!(along().fold(f32::NEG_INFINITY, f32::max), bounds.max[d]);
         }
         let half = std::f32::consts::FRAC_1_SQRT_2;
-        let side = if node.name() == Some("R1") { -half } else { half };
-        assert!(reader.read_normals().unwrap().all(|n| n == [side, 0.0, half]));
+        let side = if node.name() == Some("R1") {
+            -half
+        } else {
+            half
+        };
+        assert!(
+            reader
+                .read_normals()
+                .unwrap()
+                .all(|n| n == [side, 0.0, half])
+        );
         let indices: Vec<u32> = reader.read_indices().unwrap().into_u32().collect();
         for corners in indices.chunks(3) {
             triangles.push([0, 1, 2].map(|k| places[corners[k] as usize].map(f64::from)));
@@ -277,10 +310,7 @@ fn written_points(points: &[Point], format: PointFormat) -> Vec<u8> {
 struct Source<'a>(&'a [Point]);
 
 impl Points for Source<'_> {
-    fn visit(
-        &self,
-        take: &mut dyn FnMut(Point) -> std::io::Result<()>,
-    ) -> std::io::Result<()> {
+    fn visit(&self, take: &mut dyn FnMut(Point) -> std::io::Result<()>) -> std::io::Result<()> {
         self.0.visit(take)
     }
 }
