@@ -28,6 +28,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("faces", &["range-image", "shapes"]),
     ("reconstruct", &["nurbs", "range-image", "shapes"]),
     ("cad-exchange", &["nurbs", "reconstruct", "shapes"]),
+    (
+        "tessellate",
+        &["nurbs", "range-image", "reconstruct", "shapes"],
+    ),
     ("compare", &["range-image"]),
     (
         "pipeline",
@@ -45,6 +49,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "scan-record",
         &["range-image", "scanner-protocol", "storage"],
     ),
+    ("mesh-files", &["shapes", "tessellate"]),
     ("deliverables", &DELIVERABLES),
     ("relief-api", &[]),
     ("reliefd", &DAEMON),
@@ -83,9 +88,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-const DELIVERABLES: [&str; 10] = [
+const DELIVERABLES: [&str; 12] = [
     "cad-exchange",
     "compare",
+    "mesh-files",
     "nurbs",
     "pipeline",
     "range-image",
@@ -94,6 +100,7 @@ const DELIVERABLES: [&str; 10] = [
     "segment",
     "shapes",
     "storage",
+    "tessellate",
 ];
 
 const DAEMON: [&str; 15] = [

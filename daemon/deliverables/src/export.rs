@@ -7,6 +7,8 @@ use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use reconstruct::Model;
 
+use crate::meshes::MeshOptions;
+
 pub use cad_exchange::iges::Entities;
 pub use cad_exchange::step::{LengthUnit, Schema};
 
@@ -19,6 +21,8 @@ pub struct CadOptions {
     pub step: Option<Schema>,
     /// The unit of lengths in the STEP file.
     pub step_units: LengthUnit,
+    /// Files of triangles and points beside the CAD files.
+    pub meshes: MeshOptions,
     /// Who made the model; may be empty.
     pub author: String,
     /// The author's organisation; may be empty.
@@ -67,6 +71,12 @@ pub enum WriteError {
     /// As STEP.
     #[error(transparent)]
     Step(#[from] step::WriteError),
+    /// As triangles or points.
+    #[error(transparent)]
+    Mesh(#[from] mesh_files::MeshFileError),
+    /// What the destination said.
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
 }
 
 impl WriteError {
@@ -77,6 +87,8 @@ impl WriteError {
             Self::Iges(iges::WriteError::Io(error)) | Self::Step(step::WriteError::Io(error)) => {
                 Some(error)
             }
+            Self::Io(error) => Some(error),
+            Self::Mesh(error) => error.io(),
             _ => None,
         }
     }

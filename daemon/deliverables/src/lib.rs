@@ -1,4 +1,5 @@
-//! What a processed scan leaves behind: CAD files, pictures, report, manifest.
+//! What a processed scan leaves behind: CAD files, triangles and points where they are asked for,
+//! pictures, report, manifest.
 //!
 //! [`write`](fn@write) fills a directory that nobody looks at yet and syncs it; the caller
 //! puts it in place by one rename. [`write_atomically`] is for a single file.
@@ -10,6 +11,7 @@ pub mod comparison;
 mod export;
 mod file;
 mod manifest;
+mod meshes;
 pub mod picture;
 pub mod report;
 mod shape;
@@ -23,7 +25,11 @@ pub use export::{
 };
 pub use file::{hexadecimal, sha256_of, write_atomically};
 pub use manifest::{MANIFEST_NAME, Manifest, ManifestFile};
-pub use report::{Report, ScanReport};
+pub use meshes::{
+    MeasuredPoints, MeshFormat, MeshOptions, PointFormat, mesh_report, triangles, write_measured,
+    write_triangles,
+};
+pub use report::{MeshReport, Report, ScanReport};
 pub use stopwatch::Stopwatch;
 pub use write::{
     DeliverError, Delivered, INLIERS_PICTURE_NAME, Inputs, Pictures, RANGE_PICTURE_NAME,

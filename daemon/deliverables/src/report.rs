@@ -30,6 +30,9 @@ pub struct Report {
     pub crumbs: CrumbsReport,
     /// The trimmed faces made of them.
     pub model: ModelReport,
+    /// The triangles of the model; absent where no file of them is asked for.
+    #[serde(default)]
+    pub mesh: Option<MeshReport>,
     /// Signal-to-noise ratio of the whole restored image against the range image, its nodes next
     /// to outlines decided anew ([`RangeImageReport::dropped_nodes`]), decibels, as in Shim & Lee 1995: R in 0.1 mm, 7000 to 8000; a node that one has
     /// and the other lacks counts with its full value. Larger is nearer; `null` where
@@ -128,6 +131,15 @@ pub struct SettingsReport {
     /// The unit of lengths in the STEP file: `mm` or `inch`.
     #[serde(default)]
     pub step_units: String,
+    /// Formats of the files of triangles: `stl`, `ply`, `3mf`, `glb`.
+    #[serde(default)]
+    pub meshes: Vec<String>,
+    /// Farthest that a triangle may lie off the model.
+    #[serde(default)]
+    pub mesh_tolerance_mm: f64,
+    /// Formats of the files of measured points: `ply`, `e57`.
+    #[serde(default)]
+    pub points: Vec<String>,
 }
 
 /// The uniform range image.
@@ -309,6 +321,21 @@ pub struct ModelReport {
     /// How it is known where they run.
     #[serde(default)]
     pub edge_lengths: EdgeLengthsReport,
+}
+
+/// The triangles of the model.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MeshReport {
+    /// How many there are.
+    pub triangles: usize,
+    /// Sides that belong to one of them only.
+    pub free_edges: usize,
+    /// Their area.
+    pub area_mm2: f64,
+    /// Farthest that one lies off the surface of its face.
+    pub surface_mm: f64,
+    /// Farthest that a point of a crease lies off one of its two surfaces, along z.
+    pub seam_mm: f64,
 }
 
 /// Lengths of edges as the camera sees them, by how it is known where they run.

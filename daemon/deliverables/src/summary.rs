@@ -33,6 +33,7 @@ impl Report {
             background: background(inputs.outcome),
             crumbs: crumbs(inputs.outcome),
             model: model(&reconstruction.model),
+            mesh: None,
             snr_db: finite(reconstruction.metrics.snr_db),
             lost_nodes: reconstruction.metrics.lost_nodes,
             invented_nodes: reconstruction.metrics.invented_nodes,
@@ -71,7 +72,14 @@ fn settings(settings: &Settings, cad: &CadOptions) -> SettingsReport {
         iges_entities: cad.entity_number(),
         step: cad.step_name().to_owned(),
         step_units: cad.step_units_name().to_owned(),
+        meshes: names(cad.meshes.meshes.iter().map(|format| format.ending())),
+        mesh_tolerance_mm: cad.meshes.tolerance_mm,
+        points: names(cad.meshes.points.iter().map(|format| format.ending())),
     }
+}
+
+fn names<'a>(endings: impl Iterator<Item = &'a str>) -> Vec<String> {
+    endings.map(str::to_owned).collect()
 }
 
 fn limits((low, high): (f64, f64)) -> [Option<f64>; 2] {

@@ -14,6 +14,7 @@ use reconstruct::RegionFit;
 use crate::export::{CadOptions, WriteError, file_stem, write_iges, write_step};
 use crate::file::write_synced;
 use crate::manifest::{MANIFEST_NAME, Manifest, ManifestFile};
+use crate::meshes::{MeasuredPoints, write_extras};
 use crate::picture;
 use crate::report::{Report, ScanReport};
 use crate::stopwatch::Stopwatch;
@@ -33,6 +34,8 @@ pub struct Inputs<'a> {
     pub settings: &'a Settings,
     /// About the CAD files.
     pub cad: &'a CadOptions,
+    /// The samples, for files of them.
+    pub points: Option<MeasuredPoints<'a>>,
     /// Where the samples came from.
     pub scan: ScanReport,
     /// What the user should know about the source, before the pipeline's own warnings.
@@ -96,9 +99,10 @@ const NO_STEP: &str = "the STEP file was left out, since the disk is nearly full
 const NO_PICTURES: &str = "the pictures were left out, since the disk is nearly full: make room \
      and run the scan again to have them";
 
-/// Writes `<name>.igs`, `<name>.step` if it is asked for, the pictures, `report.json` and `manifest.json` into an existing
-/// directory of this disk that nobody else looks at, and syncs them and it. The caller then
-/// puts the directory in its place by one rename.
+/// Writes `<name>.igs`, `<name>.step` and files of triangles and points if they are asked for, the
+/// pictures, `report.json` and `manifest.json` into an existing directory of this disk that nobody
+/// else looks at, and syncs them and it. The caller then puts the directory in its place by one
+/// rename.
 ///
 /// The stopwatch that has timed the pipeline goes on with the stages here, so that the
 /// report holds them all; only the time of writing the report itself is missing from it.
@@ -137,6 +141,8 @@ pub fn write(
         Pictures::Drawn => step_on(disk, directory, inputs)?.map(Some),
         Pictures::LeftOut => None,
     };
+    let is_short_of_room = pictures == Pictures::LeftOut;
+    let extras = write_extras(disk, directory, inputs, is_short_of_room, watch)?;
     watch.progress(1.0);
 
     watch.check()?;
@@ -150,6 +156,9 @@ pub fn write(
         Some(step) => files.extend(step),
         None => report.warnings.push(NO_STEP.to_owned()),
     }
+    files.extend(extras.files);
+    report.mesh = extras.mesh;
+    report.warnings.extend(extras.warnings);
     match drawn {
         Some(drawn) => files.extend(drawn),
         None => {
@@ -200,15 +209,14 @@ fn step_on(
         )?)
     });
     match written {
-        Err(DeliverError::Io(error)) if is_full(&error) => {}
-        Err(DeliverError::Export(error)) if error.io().is_some_and(is_full) => {}
+        Err(error) if error.is_for_want_of_room() => {}
         other => return other.map(Some),
     }
     remove_file_if_there(disk, &directory.join(name))?;
     Ok(None)
 }
 
-fn is_full(error: &io::Error) -> bool {
+pub(crate) fn is_full(error: &io::Error) -> bool {
     matches!(
         error.kind(),
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded

@@ -3,6 +3,7 @@
 //! A key that does not exist, or a value that cannot be, is refused with its line and a
 //! way out; nothing is silently ignored.
 
+mod formats;
 mod http;
 mod load;
 mod processing;

@@ -1,12 +1,15 @@
 //! Settings that decide what a job makes of a scan. They are kept with the scan.
 
+use std::collections::BTreeSet;
+
+use deliverables::{MeshFormat, MeshOptions, PointFormat};
 use pipeline::Settings;
 use relief_api::SettingOverrides;
 use scan_files::recommended_pitch_mm;
 use serde::{Deserialize, Serialize};
 
 use super::load::with_nearest_name;
-use super::value;
+use super::{formats, value};
 
 /// Settings that decide what a job makes of a scan. Whatever is left out follows the
 /// default of its stage.
@@ -183,12 +186,45 @@ pub struct DeliverablesConfig {
     /// The unit of lengths in the STEP file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step_units: Option<StepUnits>,
+    /// Formats of the files of triangles: `stl`, `ply`, `3mf`, `glb`. None if left out.
+    #[serde(
+        deserialize_with = "formats::meshes",
+        serialize_with = "formats::meshes_told",
+        skip_serializing_if = "BTreeSet::is_empty"
+    )]
+    pub meshes: BTreeSet<MeshFormat>,
+    /// Farthest that a triangle may lie off the model.
+    #[serde(
+        deserialize_with = "value::positive",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub mesh_tolerance_mm: Option<f64>,
+    /// Formats of the files of measured points: `ply`, `e57`. None if left out.
+    #[serde(
+        deserialize_with = "formats::points",
+        serialize_with = "formats::points_told",
+        skip_serializing_if = "BTreeSet::is_empty"
+    )]
+    pub points: BTreeSet<PointFormat>,
     /// Author in the CAD file's header; the scan's operator if left out.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub author: String,
     /// Organisation in the CAD file's header.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub organisation: String,
+}
+
+impl DeliverablesConfig {
+    /// Which files of triangles and of points are written.
+    #[must_use]
+    pub fn mesh_options(&self) -> MeshOptions {
+        let defaults = MeshOptions::default();
+        MeshOptions {
+            meshes: self.meshes.clone(),
+            tolerance_mm: self.mesh_tolerance_mm.unwrap_or(defaults.tolerance_mm),
+            points: self.points.clone(),
+        }
+    }
 }
 
 /// What a STEP file follows.
@@ -320,6 +356,8 @@ impl Processing {
 
     /// The first section that cannot be used, and why.
     pub(super) fn check(&self) -> Result<(), (&'static str, String)> {
+        let meshes = self.deliverables.mesh_options().check();
+        meshes.map_err(|error| ("deliverables", format!("mesh_{error}")))?;
         // The pitch is checked where it is read; any other serves here.
         self.pipeline_settings(FALLBACK_PITCH_MM, FALLBACK_PITCH_MM)
             .validate()

@@ -92,6 +92,10 @@ fn content_type(name: &str) -> &'static str {
     match name.rsplit_once('.').map(|(_, ending)| ending) {
         Some("igs" | "iges") => "model/iges",
         Some("stp" | "step") => "model/step",
+        Some("stl") => "model/stl",
+        Some("3mf") => "model/3mf",
+        Some("glb") => "model/gltf-binary",
+        Some("e57") => "model/e57",
         Some("png") => "image/png",
         Some("json") => "application/json",
         Some("txt") => "text/plain; charset=utf-8",

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use deliverables::{
-    CadOptions, DeliverError, Entities, Inputs, LengthUnit, Pictures, ScanReport, Schema, Stopwatch,
+    CadOptions, DeliverError, Entities, Inputs, LengthUnit, MeasuredPoints, Pictures, ScanReport,
+    Schema, Stopwatch,
 };
 use pipeline::{Columns, Observer, PipelineError, ReadAgainError, Stage, View};
 use range_image::calibration::Head;
@@ -146,6 +147,7 @@ fn attempt(
         outcome: &outcome,
         settings: &settings,
         cad: &cad,
+        points: Some(MeasuredPoints(&columns)),
         scan: scan_report(&scan, &header, &kept),
         warnings: kept.warnings,
         versions: versions(&header),
@@ -384,6 +386,7 @@ fn cad_options(processing: &Processing, scan: &Scan) -> CadOptions {
             StepUnits::Mm => LengthUnit::Millimetre,
             StepUnits::Inch => LengthUnit::Inch,
         },
+        meshes: wanted.mesh_options(),
         author: if wanted.author.is_empty() {
             scan.operator.clone()
         } else {

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use deliverables::{CadOptions, Entities, LengthUnit, Schema, file_stem};
+use deliverables::{
+    CadOptions, Entities, LengthUnit, MeshFormat, MeshOptions, PointFormat, Schema, file_stem,
+};
 use jiff::Timestamp;
 use pipeline::{Kinds, Method, Settings};
 use scan_files::Units;
@@ -11,7 +13,7 @@ use scan_files::Units;
 use crate::command::part::PartArgs;
 use crate::failure::Failure;
 
-/// Turn a scan file into a CAD file, without a service
+/// Turn a scan file into a CAD file or triangles, without a service
 ///
 /// Reads text (.xyz .asc .csv .txt: x y z in mm, a point each line), PLY, IGES points
 /// (entities 106 and 116) and the service's own .scan files, each plain or
@@ -21,9 +23,10 @@ pub(crate) struct Args {
     /// The scan file
     #[arg(value_name = "INPUT")]
     pub(super) input: PathBuf,
-    /// The CAD file; its ending picks the format: IGES (.igs or .iges) or STEP (.step or
-    /// .stp). Default: the input's name with .igs, in the current directory
-    #[arg(short, long, value_name = "OUT.igs|OUT.step")]
+    /// The file to write; its ending picks the format: IGES (.igs or .iges), STEP (.step or
+    /// .stp), or triangles as .stl, .ply, .3mf or .glb. Default: the input's name with .igs, in
+    /// the current directory
+    #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
     /// Distance of the grid's nodes, millimetres; default: after the scan's density
     #[arg(long, value_name = "MM")]
@@ -42,15 +45,22 @@ pub(crate) struct Args {
     tolerance_mm: Option<f64>,
     /// IGES entities of the surfaces: 114 (parametric splines), 128 (rational B-splines), 190
     /// (planes, cylinders, cones, spheres and tori by their numbers, other faces as 128), or 186
-    /// (the same as boundary representation: shells of faces on common edges)
-    #[arg(long, value_name = "TYPE", value_enum, default_value_t = EntityType::Parametric)]
-    entities: EntityType,
-    /// What a STEP file follows: AP242, or AP214 for programs that do not know the former
-    #[arg(long, value_name = "SCHEMA", value_enum, default_value_t = SchemaName::Ap242)]
-    step_schema: SchemaName,
-    /// Unit of lengths in a STEP file
-    #[arg(long, value_name = "UNIT", value_enum, default_value_t = StepUnitName::Mm)]
-    step_units: StepUnitName,
+    /// (the same as boundary representation: shells of faces on common edges); default: 114
+    #[arg(long, value_name = "TYPE", value_enum)]
+    entities: Option<EntityType>,
+    /// What a STEP file follows: AP242, or AP214 for programs that do not know the former;
+    /// default: ap242
+    #[arg(long, value_name = "SCHEMA", value_enum)]
+    step_schema: Option<SchemaName>,
+    /// Unit of lengths in a STEP file; default: mm
+    #[arg(long, value_name = "UNIT", value_enum)]
+    step_units: Option<StepUnitName>,
+    /// Farthest that a triangle may lie off the model, millimetres; default: 0.01
+    #[arg(long, value_name = "MM")]
+    mesh_tolerance_mm: Option<f64>,
+    /// Write the points as they were read, too: as .ply (millimetres) or .e57 (metres)
+    #[arg(long, value_name = "OUT.ply|OUT.e57")]
+    pub(super) points: Option<PathBuf>,
     /// Write a report as JSON, too
     #[arg(long, value_name = "FILE.json")]
     pub(super) report: Option<PathBuf>,
@@ -141,19 +151,20 @@ enum StepUnitName {
 
 /// What is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum CadFormat {
+pub(super) enum OutputFormat {
     Iges,
     Step,
+    Mesh(MeshFormat),
 }
 
-impl CadFormat {
+impl OutputFormat {
     /// The format that a path's ending means.
     pub(super) fn of(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_string_lossy().to_ascii_lowercase();
         match ending.as_str() {
             "igs" | "iges" => Some(Self::Iges),
             "step" | "stp" => Some(Self::Step),
-            _ => None,
+            other => MeshFormat::of_ending(other).map(Self::Mesh),
         }
     }
 }
@@ -174,10 +185,15 @@ impl Args {
             }
             return Ok(path);
         };
-        if CadFormat::of(path).is_none() {
+        if OutputFormat::of(path).is_none() {
+            let more = match path.extension().map(|e| e.to_ascii_lowercase()) {
+                Some(ending) if ending == "e57" => "; points are written with --points",
+                Some(ending) if ending == "gltf" => "; glTF is written as .glb, in one file",
+                _ => "",
+            };
             return Err(Failure::Usage(format!(
                 "the ending of {} names no format that can be written; known: .igs, .iges, \
-                 .step, .stp",
+                 .step, .stp, .stl, .ply, .3mf, .glb{more}",
                 path.display()
             )));
         }
@@ -188,6 +204,88 @@ impl Args {
             )));
         }
         Ok(path.clone())
+    }
+
+    /// Where the points go, and as what.
+    pub(super) fn points(&self, output: &Path) -> Result<Option<(&Path, PointFormat)>, Failure> {
+        let Some(path) = self.points.as_deref() else {
+            return Ok(None);
+        };
+        let ending = path.extension().map(|ending| ending.to_string_lossy());
+        let format = ending.and_then(|ending| PointFormat::of_ending(&ending));
+        let Some(format) = format else {
+            return Err(Failure::Usage(format!(
+                "the ending of {} names no format in which points can be written; known: .ply, \
+                 .e57",
+                path.display()
+            )));
+        };
+        if path == output || same_file(path, output) {
+            return Err(Failure::Usage(format!(
+                "{} is the output already; name another file for the points",
+                path.display()
+            )));
+        }
+        if same_file(path, &self.input) {
+            return Err(Failure::Usage(format!(
+                "{} is the scan file itself; name another file for the points",
+                path.display()
+            )));
+        }
+        Ok(Some((path, format)))
+    }
+
+    /// Refuses options that have no effect on a format.
+    pub(super) fn check_options(&self, format: OutputFormat) -> Result<(), Failure> {
+        let is_mesh = matches!(format, OutputFormat::Mesh(_));
+        let (iges, step) = (format == OutputFormat::Iges, format == OutputFormat::Step);
+        let mesh = "files of triangles (.stl, .ply, .3mf, .glb)";
+        let options = [
+            ("--entities", self.entities.is_some() && !iges, "IGES files"),
+            (
+                "--step-schema",
+                self.step_schema.is_some() && !step,
+                "STEP files",
+            ),
+            (
+                "--step-units",
+                self.step_units.is_some() && !step,
+                "STEP files",
+            ),
+            (
+                "--mesh-tolerance-mm",
+                self.mesh_tolerance_mm.is_some() && !is_mesh,
+                mesh,
+            ),
+        ];
+        let written = match format {
+            OutputFormat::Iges => "an IGES file",
+            OutputFormat::Step => "a STEP file",
+            OutputFormat::Mesh(_) => "a file of triangles",
+        };
+        if let Some((option, _, of)) = options.into_iter().find(|(_, is_idle, _)| *is_idle) {
+            return Err(Failure::Usage(format!(
+                "{option} is for {of}, but {written} is written; leave it out, or choose another \
+                 ending with -o"
+            )));
+        }
+        self.mesh_options(format)
+            .check()
+            .map_err(|error| Failure::Usage(format!("mesh_{error}")))
+    }
+
+    fn mesh_options(&self, format: OutputFormat) -> MeshOptions {
+        let mut options = MeshOptions::default();
+        if let Some(tolerance_mm) = self.mesh_tolerance_mm {
+            options.tolerance_mm = tolerance_mm;
+        }
+        if let OutputFormat::Mesh(format) = format {
+            options.meshes.insert(format);
+        }
+        let ending = self.points.as_deref().and_then(Path::extension);
+        let format = ending.and_then(|ending| PointFormat::of_ending(&ending.to_string_lossy()));
+        options.points.extend(format);
+        options
     }
 
     /// Refuses a name that would be cut.
@@ -259,23 +357,25 @@ impl Args {
         Ok(settings)
     }
 
-    pub(super) fn cad(&self, format: CadFormat, operator: Option<&str>) -> CadOptions {
+    pub(super) fn cad(&self, format: OutputFormat, operator: Option<&str>) -> CadOptions {
         CadOptions {
             entities: match self.entities {
-                EntityType::Parametric => Entities::Parametric114,
-                EntityType::Rational => Entities::Rational128,
-                EntityType::Analytic => Entities::Analytic,
-                EntityType::Boundary => Entities::Boundary,
+                Some(EntityType::Parametric) => Entities::Parametric114,
+                Some(EntityType::Rational) => Entities::Rational128,
+                Some(EntityType::Analytic) => Entities::Analytic,
+                Some(EntityType::Boundary) => Entities::Boundary,
+                None => Entities::default(),
             },
             step: match (format, self.step_schema) {
-                (CadFormat::Iges, _) => None,
-                (CadFormat::Step, SchemaName::Ap242) => Some(Schema::Ap242),
-                (CadFormat::Step, SchemaName::Ap214) => Some(Schema::Ap214),
+                (OutputFormat::Iges | OutputFormat::Mesh(_), _) => None,
+                (OutputFormat::Step, Some(SchemaName::Ap214)) => Some(Schema::Ap214),
+                (OutputFormat::Step, _) => Some(Schema::Ap242),
             },
             step_units: match self.step_units {
-                StepUnitName::Mm => LengthUnit::Millimetre,
-                StepUnitName::Inch => LengthUnit::Inch,
+                Some(StepUnitName::Inch) => LengthUnit::Inch,
+                _ => LengthUnit::Millimetre,
             },
+            meshes: self.mesh_options(format),
             author: self
                 .author
                 .as_deref()

@@ -5,13 +5,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use deliverables::{Inputs, ManifestFile, Report, Stopwatch, write_atomically};
+use deliverables::{
+    DeliverError, Inputs, ManifestFile, MeasuredPoints, Report, Stopwatch, WriteError, mesh_report,
+    write_atomically,
+};
 use pipeline::{Extent, InMemory, Observer, PipelineError, Settings, Stage};
 use range_image::Monitor;
 use serde::Serialize;
 
 use super::Args;
-use super::args::CadFormat;
+use super::args::OutputFormat;
 use crate::command::places;
 use crate::failure::Failure;
 use crate::input::{self, Input};
@@ -26,6 +29,9 @@ const FINEST_PITCH_MM: f64 = 0.001;
 struct Converted {
     output: PathBuf,
     file: ManifestFile,
+    /// Where the points were written, if they were.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    points: Option<PathBuf>,
     report: Report,
     /// Remarks on the input, told on standard error.
     #[serde(skip)]
@@ -98,7 +104,11 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
 fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
     let output = args.output()?;
     args.check_name()?;
+    let format = OutputFormat::of(&output).unwrap_or(OutputFormat::Iges);
+    args.check_options(format)?;
+    let points = args.points(&output)?;
     places::check_file(&output)?;
+    points.map_or(Ok(()), |(path, _)| places::check_file(path))?;
     args.report.as_deref().map_or(Ok(()), places::check_file)?;
     args.pictures
         .as_deref()
@@ -117,7 +127,6 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
             other => other,
         })?;
     check_extent(args, &input, &settings)?;
-    let format = CadFormat::of(&output).unwrap_or(CadFormat::Iges);
     let cad = args.cad(format, input.scan.operator.as_deref());
     let timestamp = args.timestamp(input.timestamp)?;
     let name = args.name(input.name.as_deref());
@@ -144,20 +153,51 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
         outcome: &outcome,
         settings: &settings,
         cad: &cad,
+        points: Some(MeasuredPoints(&scan)),
         scan: input.scan,
         warnings: notes.clone(),
         versions: std::collections::BTreeMap::default(),
     };
     watch.stage(Stage::Export);
     let model = &outcome.reconstruction.model;
-    let written = write_atomically::<deliverables::DeliverError>(&output, |sink| {
-        match format {
-            CadFormat::Iges => deliverables::write_iges(model, &name, timestamp, &cad, sink)?,
-            CadFormat::Step => deliverables::write_step(model, &name, timestamp, &cad, sink)?,
+    let cannot = |path: &Path, error: DeliverError| match error {
+        DeliverError::Cancelled(_) => Failure::Interrupted,
+        DeliverError::Export(WriteError::Io(error)) => {
+            Failure::at(format!("cannot write {}", path.display()), &error)
+        }
+        error => Failure::at(format!("cannot write {}", path.display()), &error),
+    };
+    let mesh = match format {
+        OutputFormat::Mesh(_) => {
+            let mesh = deliverables::triangles(model, cad.meshes.tolerance_mm, &watch);
+            Some(mesh.map_err(|error| Failure::Failed(format!("{file}: {error}")))?)
+        }
+        _ => None,
+    };
+    let written = write_atomically::<DeliverError>(&output, |sink| {
+        match (format, &mesh) {
+            (OutputFormat::Step, _) => {
+                deliverables::write_step(model, &name, timestamp, &cad, sink)?;
+            }
+            (OutputFormat::Mesh(format), Some(mesh)) => {
+                deliverables::write_triangles(mesh, format, &name, sink)?;
+            }
+            _ => deliverables::write_iges(model, &name, timestamp, &cad, sink)?,
         }
         Ok(())
     })
-    .map_err(|error| Failure::at(format!("cannot write {}", output.display()), &error))?;
+    .map_err(|error| cannot(&output, error))?;
+    if let Some((path, format)) = points {
+        let measured = MeasuredPoints(&scan);
+        let named = (name.as_str(), timestamp);
+        write_atomically::<DeliverError>(path, |sink| {
+            let scan = &inputs.scan;
+            Ok(deliverables::write_measured(
+                measured, format, named, scan, sink,
+            )?)
+        })
+        .map_err(|error| cannot(path, error))?;
+    }
     watch.progress(1.0);
     if let Some(directory) = &args.pictures {
         watch.stage(Stage::Pictures);
@@ -168,7 +208,8 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
             })?;
         watch.progress(1.0);
     }
-    let report = Report::new(&inputs, watch.read());
+    let mut report = Report::new(&inputs, watch.read());
+    report.mesh = mesh.as_ref().map(mesh_report);
     shown.end("done");
     if let Some(path) = &args.report {
         write_report(path, &report)?;
@@ -176,6 +217,7 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
     Ok(Converted {
         output,
         file: written,
+        points: args.points.clone(),
         report,
         notes: notes.iter().map(|note| format!("{file}: {note}")).collect(),
     })
@@ -235,6 +277,12 @@ fn refused(input: &Path, error: &PipelineError, suspicion: Option<&str>) -> Fail
 fn told(converted: &Converted) -> String {
     let report = &converted.report;
     let mut lines = vec![converted.output.display().to_string()];
+    lines.extend(
+        converted
+            .points
+            .iter()
+            .map(|path| path.display().to_string()),
+    );
     let mut report = report.clone();
     report.warnings.retain(|warning| {
         !converted

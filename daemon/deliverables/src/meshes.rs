@@ -1,0 +1,306 @@
+//! The model as triangles, and the points that it was made of, where they are asked for.
+
+use std::collections::BTreeSet;
+use std::io::{self, Write};
+use std::path::Path;
+
+use cad_exchange::step::DEFAULT_PALETTE;
+use jiff::Timestamp;
+use mesh_files::{MeshDetails, Point, Points, ScanDetails, write_mesh, write_points};
+use pipeline::{Columns, ReadAgainError};
+use range_image::Monitor;
+use reconstruct::Model;
+use storage::{Disk, remove_file_if_there};
+use tessellate::{Mesh, SettingsError, TessellateError, TessellateSettings, tessellate};
+
+pub use mesh_files::{MeshFormat, PointFormat};
+
+use crate::export::{WriteError, file_stem};
+use crate::file::{sha256_of, write_synced};
+use crate::manifest::ManifestFile;
+use crate::report::{MeshReport, ScanReport};
+use crate::write::{DeliverError, Inputs, is_full};
+
+/// Name and version of this program in files.
+const GENERATOR: &str = concat!("Relief ", env!("CARGO_PKG_VERSION"));
+
+/// Which files of triangles and of points are written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeshOptions {
+    /// Formats of the model's triangles.
+    pub meshes: BTreeSet<MeshFormat>,
+    /// Farthest that a triangle may lie off the model, millimetres.
+    pub tolerance_mm: f64,
+    /// Formats of the measured points.
+    pub points: BTreeSet<PointFormat>,
+}
+
+impl Default for MeshOptions {
+    /// None.
+    fn default() -> Self {
+        Self {
+            meshes: BTreeSet::new(),
+            tolerance_mm: TessellateSettings::default().tolerance_mm,
+            points: BTreeSet::new(),
+        }
+    }
+}
+
+impl MeshOptions {
+    /// Checks the tolerance.
+    ///
+    /// # Errors
+    /// One that cannot be kept.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        self.settings().validate()
+    }
+
+    fn settings(&self) -> TessellateSettings {
+        TessellateSettings {
+            tolerance_mm: self.tolerance_mm,
+            ..TessellateSettings::default()
+        }
+    }
+}
+
+/// The columns of a scan as points.
+#[derive(Clone, Copy)]
+pub struct MeasuredPoints<'a>(pub &'a dyn Columns);
+
+impl core::fmt::Debug for MeasuredPoints<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("MeasuredPoints")
+    }
+}
+
+impl Points for MeasuredPoints<'_> {
+    fn visit(&self, take: &mut dyn FnMut(Point) -> io::Result<()>) -> io::Result<()> {
+        let mut taken = Ok(());
+        let read: Result<(), ReadAgainError> = self.0.visit(&mut |column| {
+            taken = column.samples().iter().try_for_each(|sample| {
+                take(Point {
+                    place_mm: [column.x_mm(), sample.y_mm, sample.z_mm],
+                    intensity: sample.intensity,
+                })
+            });
+            taken.is_ok()
+        });
+        taken?;
+        read.map_err(io::Error::other)
+    }
+}
+
+/// The triangles of a model.
+///
+/// # Errors
+/// As [`tessellate`].
+pub fn triangles(
+    model: &Model,
+    tolerance_mm: f64,
+    monitor: &dyn Monitor,
+) -> Result<Mesh, TessellateError> {
+    let options = MeshOptions {
+        tolerance_mm,
+        ..MeshOptions::default()
+    };
+    tessellate(model, &options.settings(), monitor)
+}
+
+/// What the report says of triangles.
+#[must_use]
+pub fn mesh_report(mesh: &Mesh) -> MeshReport {
+    MeshReport {
+        triangles: mesh.triangle_count(),
+        free_edges: mesh.free_edges(),
+        area_mm2: mesh.area_mm2(),
+        surface_mm: mesh.accuracy.surface_mm,
+        seam_mm: mesh.accuracy.seam_mm,
+    }
+}
+
+/// Writes triangles in a format, with the names and colours that the CAD files have.
+///
+/// # Errors
+/// As [`write_mesh`].
+pub fn write_triangles(
+    mesh: &Mesh,
+    format: MeshFormat,
+    name: &str,
+    sink: &mut dyn Write,
+) -> Result<(), WriteError> {
+    let details = MeshDetails {
+        name: &file_stem(name),
+        generator: GENERATOR,
+        palette: &DEFAULT_PALETTE,
+    };
+    Ok(write_mesh(mesh, format, &details, sink)?)
+}
+
+/// Writes measured points in a format.
+///
+/// # Errors
+/// As [`write_points`].
+pub fn write_measured(
+    points: MeasuredPoints<'_>,
+    format: PointFormat,
+    (name, timestamp): (&str, Timestamp),
+    scan: &ScanReport,
+    sink: &mut dyn Write,
+) -> Result<(), WriteError> {
+    let serial = scan.source.rsplit_once("serial number ");
+    // The same scan has the same identifiers, whoever writes it, and no other has them.
+    let guid = |what: &str| -> io::Result<String> {
+        let told = format!(
+            "{what}\n{name}\n{timestamp}\n{:?}\n{}\n{}",
+            scan.id, scan.source, scan.samples
+        );
+        Ok(guid(&sha256_of(told.as_bytes())?))
+    };
+    let (of_file, of_scan) = (guid("file")?, guid("scan")?);
+    let details = ScanDetails {
+        name: &file_stem(name),
+        generator: GENERATOR,
+        source: &scan.source,
+        serial: serial.map(|(_, serial)| serial),
+        taken_s: timestamp.as_second() as f64,
+        guids: [&of_file, &of_scan],
+    };
+    Ok(write_points(&points, format, &details, sink)?)
+}
+
+/// Hexadecimal digits in groups of 8, 4, 4, 4 and 12, marked as of version 8: by another rule than
+/// those that the standard for such identifiers has.
+fn guid(digits: &str) -> String {
+    let part = |range: core::ops::Range<usize>| digits.get(range).unwrap_or_default();
+    format!(
+        "{{{}-{}-8{}-8{}-{}}}",
+        part(0..8),
+        part(8..12),
+        part(12..15),
+        part(15..18),
+        part(18..30)
+    )
+}
+
+/// What was written, and what is to be said about it.
+#[derive(Debug, Default)]
+pub(crate) struct Written {
+    pub(crate) files: Vec<ManifestFile>,
+    pub(crate) mesh: Option<MeshReport>,
+    pub(crate) warnings: Vec<String>,
+}
+
+/// Writes what is asked for. What there is no room for is left out, and so are triangles of a model
+/// that none can be made of: all that they hold is in the IGES file, and the points in the journal.
+pub(crate) fn write_extras(
+    disk: &dyn Disk,
+    directory: &Path,
+    inputs: &Inputs<'_>,
+    is_short_of_room: bool,
+    monitor: &dyn Monitor,
+) -> Result<Written, DeliverError> {
+    let mut written = Written::default();
+    let wanted = &inputs.cad.meshes;
+    let stem = file_stem(inputs.name);
+    let left_out = |name: &str| {
+        format!(
+            "{name} was left out, since the disk is nearly full: make room and run the scan again \
+             to have it"
+        )
+    };
+    let put = |written: &mut Written,
+               name: String,
+               content: &dyn Fn(&mut dyn Write) -> Result<(), WriteError>|
+     -> Result<(), DeliverError> {
+        monitor.check()?;
+        if is_short_of_room {
+            written.warnings.push(left_out(&name));
+            return Ok(());
+        }
+        let put = write_synced::<DeliverError>(disk, directory, &name, |sink| Ok(content(sink)?));
+        match put {
+            Ok(file) => written.files.push(file),
+            Err(error) if error.is_for_want_of_room() => {
+                remove_file_if_there(disk, &directory.join(&name))?;
+                written.warnings.push(left_out(&name));
+            }
+            Err(DeliverError::Export(WriteError::Mesh(error))) if error.io().is_none() => {
+                remove_file_if_there(disk, &directory.join(&name))?;
+                written
+                    .warnings
+                    .push(format!("{name} was left out: {error}"));
+            }
+            Err(error) => return Err(error),
+        }
+        Ok(())
+    };
+    if !wanted.meshes.is_empty() {
+        let model = &inputs.outcome.reconstruction.model;
+        match tessellate(model, &wanted.settings(), monitor) {
+            Ok(mesh) => {
+                written.mesh = Some(mesh_report(&mesh));
+                for &format in &wanted.meshes {
+                    let name = format!("{stem}.{}", format.ending());
+                    put(&mut written, name, &|sink| {
+                        write_triangles(&mesh, format, inputs.name, sink)
+                    })?;
+                }
+            }
+            Err(TessellateError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Err(error) => written
+                .warnings
+                .push(format!("the files of triangles were left out: {error}")),
+        }
+    }
+    if let Some(points) = inputs.points {
+        for &format in &wanted.points {
+            let name = format!("{stem}-points.{}", format.ending());
+            put(&mut written, name, &|sink| {
+                let named = (inputs.name, inputs.timestamp);
+                write_measured(points, format, named, &inputs.scan, sink)
+            })?;
+        }
+    }
+    Ok(written)
+}
+
+impl DeliverError {
+    /// Nothing is wrong but that the disk is full.
+    pub(crate) fn is_for_want_of_room(&self) -> bool {
+        match self {
+            Self::Io(error) => is_full(error),
+            Self::Export(error) => error.io().is_some_and(is_full),
+            _ => false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn identifiers_have_the_usual_form() {
+        let digits = crate::file::hexadecimal(&[0xab; 32]);
+        let id = guid(&digits);
+        assert_eq!(id, "{abababab-abab-8aba-8bab-abababababab}");
+        let groups: Vec<usize> = id
+            .trim_matches(['{', '}'])
+            .split('-')
+            .map(str::len)
+            .collect();
+        assert_eq!(groups, [8, 4, 4, 4, 12]);
+    }
+
+    #[test]
+    fn tolerances_are_bounded() {
+        let with = |tolerance_mm| MeshOptions {
+            tolerance_mm,
+            ..MeshOptions::default()
+        };
+        assert!(MeshOptions::default().check().is_ok() && with(0.5).check().is_ok());
+        for wrong in [0.0, -1.0, f64::NAN, 100.0] {
+            assert!(with(wrong).check().is_err(), "{wrong}");
+        }
+    }
+}
