@@ -37,6 +37,9 @@ pub(crate) fn loops(face: &Face) -> impl Iterator<Item = &Loop> {
     core::iter::once(&face.outer).chain(&face.inner)
 }
 
+/// A point of a closed border, and the side that begins there: edge and part.
+type Link = ((Spot, Point2), (usize, usize));
+
 impl Outline {
     /// `divisions` are those of the model's edges; `Err` with what the model lacks.
     pub(crate) fn of(
@@ -86,11 +89,7 @@ impl Outline {
         Ok(outline)
     }
 
-    fn close(
-        &mut self,
-        chain: &[((Spot, Point2), (usize, usize))],
-        numbers: &mut BTreeMap<Spot, usize>,
-    ) {
+    fn close(&mut self, chain: &[Link], numbers: &mut BTreeMap<Spot, usize>) {
         let mut number = |(spot, place): (Spot, Point2)| {
             *numbers.entry(spot).or_insert_with(|| {
                 self.spots.push(spot);

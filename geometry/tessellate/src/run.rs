@@ -140,6 +140,9 @@ struct Filled {
     triangles: Vec<[u32; 3]>,
 }
 
+/// Index of a face, its border, and the triangles that fill it, if they do.
+type Attempt = (usize, Outline, Result<Vec<[u32; 3]>, Trouble>);
+
 /// Fills all borders. Sides that are in each other's way, as those of a strip thinner than the
 /// tolerance, are halved in all faces that have them until they are not.
 fn fill_all(
@@ -151,7 +154,7 @@ fn fill_all(
     for round in 0..=ROUNDS {
         monitor.check()?;
         let open: Vec<usize> = (0..filled.len()).filter(|&k| filled[k].is_none()).collect();
-        let tried: Vec<(usize, Outline, Result<Vec<[u32; 3]>, Trouble>)> = open
+        let tried: Vec<Attempt> = open
             .into_par_iter()
             .map(|k| {
                 let outline = Outline::of(model, &model.faces[k], divisions);
