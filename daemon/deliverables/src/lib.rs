@@ -7,8 +7,10 @@
 //! the scan is given by the caller.
 
 pub mod comparison;
+mod deviations;
 mod export;
 mod file;
+mod filed;
 mod manifest;
 pub mod picture;
 pub mod report;
@@ -22,6 +24,7 @@ pub use export::{
     CadOptions, Entities, LengthUnit, Schema, WriteError, file_stem, write_iges, write_step,
 };
 pub use file::{hexadecimal, sha256_of, write_atomically};
+pub use filed::{PageFormat, PageFormats, comparison_page, scan_page};
 pub use manifest::{MANIFEST_NAME, Manifest, ManifestFile};
 pub use report::{Report, ScanReport};
 pub use stopwatch::Stopwatch;

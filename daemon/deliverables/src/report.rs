@@ -30,6 +30,9 @@ pub struct Report {
     pub crumbs: CrumbsReport,
     /// The trimmed faces made of them.
     pub model: ModelReport,
+    /// How far the nodes lie off the faces; absent in reports of earlier versions.
+    #[serde(default)]
+    pub deviations: Option<DeviationsReport>,
     /// Signal-to-noise ratio of the whole restored image against the range image, its nodes next
     /// to outlines decided anew ([`RangeImageReport::dropped_nodes`]), decibels, as in Shim & Lee 1995: R in 0.1 mm, 7000 to 8000; a node that one has
     /// and the other lacks counts with its full value. Larger is nearer; `null` where
@@ -193,6 +196,21 @@ pub struct RegionReport {
     pub max_mm: Option<f64>,
     /// Peak signal-to-noise ratio of the surface at the region's nodes.
     pub psnr_db: Option<f64>,
+    /// How many numbers its surfaces were given by what was measured; absent where none was made,
+    /// and in reports of earlier versions.
+    #[serde(default)]
+    pub freedom: Option<FreedomReport>,
+}
+
+/// How far a surface is free to follow the noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FreedomReport {
+    /// Numbers of the shape (3 for a plane to 7 for a torus), or coefficients of splines that were
+    /// free to follow the nodes.
+    pub parameters: usize,
+    /// Independent values that determined them: samples for a shape that was fitted to these, else
+    /// nodes, or the samples under these where they are fewer.
+    pub independent: usize,
 }
 
 /// The shape of a region.
@@ -297,7 +315,7 @@ pub struct CrumbReport {
 }
 
 /// The trimmed faces.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ModelReport {
     /// Trimmed faces.
     pub faces: usize,
@@ -311,7 +329,7 @@ pub struct ModelReport {
 }
 
 /// Lengths of edges as the camera sees them, by how it is known where they run.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct EdgeLengthsReport {
     /// The samples beside them tell.
     pub measured_mm: f64,
@@ -321,4 +339,54 @@ pub struct EdgeLengthsReport {
     pub assumed_mm: f64,
     /// Part of the last in all three, 0 to 1.
     pub assumed_share: f64,
+    /// The same for each kind of edge; empty in reports of earlier versions.
+    #[serde(default)]
+    pub kinds: BTreeMap<String, OriginLengthsReport>,
+}
+
+/// Lengths of the edges of one kind: `silhouette`, `step` or `crease`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct OriginLengthsReport {
+    /// As [`EdgeLengthsReport::measured_mm`].
+    pub measured_mm: f64,
+    /// As [`EdgeLengthsReport::intersected_mm`].
+    pub intersected_mm: f64,
+    /// As [`EdgeLengthsReport::assumed_mm`].
+    pub assumed_mm: f64,
+}
+
+/// Distances of the nodes from the trimmed faces along the normal of these, positive towards the
+/// camera.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DeviationsReport {
+    /// Nodes under a face.
+    pub nodes: usize,
+    /// Mean.
+    pub mean_mm: Option<f64>,
+    /// Root mean square.
+    pub rms_mm: Option<f64>,
+    /// The size that 95 % do not exceed.
+    pub percentile_95_mm: Option<f64>,
+    /// The largest size.
+    pub max_mm: Option<f64>,
+    /// How often which occur.
+    pub histogram: crate::comparison::HistogramReport,
+    /// The largest, each the largest around it, at most [`DeviationsReport::WORST`].
+    pub worst: Vec<WorstReport>,
+}
+
+impl DeviationsReport {
+    /// Most places that are listed one by one.
+    pub const WORST: usize = 10;
+}
+
+/// A node that lies far off its face.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct WorstReport {
+    /// Where it is.
+    pub place_mm: [f64; 3],
+    /// Label of the region of its face.
+    pub region: u16,
+    /// How far it lies off.
+    pub deviation_mm: f64,
 }

@@ -54,9 +54,7 @@ fn composed(text: &str) -> String {
         let last = whole.chars().next_back().map_or(0, u32::from);
         let part = u32::from(letter);
         let joined = match (last.checked_sub(LEAD), part.checked_sub(VOWEL)) {
-            (Some(lead @ 0..19), Some(vowel @ 0..21)) => {
-                Some(SYLLABLES + (lead * 21 + vowel) * 28)
-            }
+            (Some(lead @ 0..19), Some(vowel @ 0..21)) => Some(SYLLABLES + (lead * 21 + vowel) * 28),
             _ => match (last.checked_sub(SYLLABLES), part.checked_sub(TAIL)) {
                 (Some(open @ 0..11172), Some(tail @ 1..28)) if open % 28 == 0 => Some(last + tail),
                 _ => None,
@@ -87,7 +85,10 @@ mod tests {
     #[test]
     fn parts_of_syllables_are_joined() {
         // "Part", once whole and once in parts.
-        assert_eq!(visible("\u{1107}\u{116e}\u{1111}\u{116e}\u{11b7}"), "\u{bd80}\u{d488}");
+        assert_eq!(
+            visible("\u{1107}\u{116e}\u{1111}\u{116e}\u{11b7}"),
+            "\u{bd80}\u{d488}"
+        );
         assert_eq!(visible("\u{bd80}\u{d488}"), "\u{bd80}\u{d488}");
         assert_eq!(visible("\u{116e}\u{1107}"), "\u{116e}\u{1107}");
     }

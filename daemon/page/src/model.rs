@@ -152,13 +152,7 @@ impl Line {
         self
     }
 
-    fn run(
-        mut self,
-        text: String,
-        value: Option<f64>,
-        is_foreign: bool,
-        is_code: bool,
-    ) -> Self {
+    fn run(mut self, text: String, value: Option<f64>, is_foreign: bool, is_code: bool) -> Self {
         self.runs.push(Run {
             text,
             value,

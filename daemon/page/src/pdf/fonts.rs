@@ -123,7 +123,9 @@ impl Fonts {
                 continue;
             };
             let number = font.used.remap(glyph.0);
-            font.glyphs.entry(number).or_insert((letter, 1000.0 * width));
+            font.glyphs
+                .entry(number)
+                .or_insert((letter, 1000.0 * width));
             match pieces.last_mut() {
                 Some(piece) if piece.font == index => {
                     piece.glyphs.push(number);

@@ -278,7 +278,9 @@ impl Layout {
         let scale = (MEASURE / wide).min(PICTURE_HEIGHT / high);
         let (width, height) = (wide * scale, high * scale);
         let caption = self.settable(&picture.caption);
-        let lines = self.wrapped(&caption, (SMALL, Weight::Regular), MEASURE).len();
+        let lines = self
+            .wrapped(&caption, (SMALL, Weight::Regular), MEASURE)
+            .len();
         self.need(height + lines as f32 * LEADING * SMALL + 12.0);
         let number = self.out.pictures.len();
         self.out.pictures.push(rows);

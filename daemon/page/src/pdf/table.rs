@@ -26,7 +26,11 @@ impl Layout {
         let cells: Vec<Vec<String>> = table
             .rows
             .iter()
-            .map(|row| row.iter().map(|cell| self.settable(&cell.plain())).collect())
+            .map(|row| {
+                row.iter()
+                    .map(|cell| self.settable(&cell.plain()))
+                    .collect()
+            })
             .collect();
         let widths = self.widths(&heads, &cells);
         let aligns: Vec<Align> = table.columns.iter().map(|column| column.align).collect();
@@ -35,7 +39,9 @@ impl Layout {
             let lines = row.iter().map(Vec::len).max().unwrap_or(1).max(1);
             lines as f32 * LEADING * SIZE + 4.0
         };
-        let first = cells.first().map(|row| self.broken(row, &widths, Weight::Regular));
+        let first = cells
+            .first()
+            .map(|row| self.broken(row, &widths, Weight::Regular));
         self.need(22.0 + height(&head) + first.as_ref().map_or(0.0, height));
         self.caption(&table.caption);
         self.y += 2.0;
@@ -112,7 +118,9 @@ impl Layout {
         let sum = |widths: &[f32]| widths.iter().sum::<f32>();
         let capped = |cap: f32| -> Vec<f32> {
             let pairs = wanted.iter().zip(&least);
-            pairs.map(|(wanted, least)| wanted.min(cap.max(*least))).collect()
+            pairs
+                .map(|(wanted, least)| wanted.min(cap.max(*least)))
+                .collect()
         };
         let mut widths = wanted.clone();
         if sum(&widths) > MEASURE {

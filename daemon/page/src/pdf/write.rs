@@ -4,7 +4,9 @@ use std::io::Write as _;
 
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
-use pdf_writer::types::{CidFontType, FontFlags, OutlineItemFlags, PageMode, Predictor, SystemInfo, UnicodeCmap};
+use pdf_writer::types::{
+    CidFontType, FontFlags, OutlineItemFlags, PageMode, Predictor, SystemInfo, UnicodeCmap,
+};
 use pdf_writer::{Content, Date, Filter, Finish, Name, Pdf, Rect, Ref, Str, TextStr};
 use subsetter::subset;
 use ttf_parser::{RawFace, Tag};
@@ -159,8 +161,11 @@ fn operators(sheet: &[Mark], sheets: &Sheets) -> Vec<u8> {
                     let Some(font) = sheets.fonts.all.get(piece.font) else {
                         continue;
                     };
-                    let codes: Vec<u8> =
-                        piece.glyphs.iter().flat_map(|glyph| glyph.to_be_bytes()).collect();
+                    let codes: Vec<u8> = piece
+                        .glyphs
+                        .iter()
+                        .flat_map(|glyph| glyph.to_be_bytes())
+                        .collect();
                     content
                         .set_font(Name(font.name.as_bytes()), *size)
                         .show(Str(&codes));
@@ -284,13 +289,7 @@ fn embed(pdf: &mut Pdf, number: Ref, font: &Font, numbers: &mut Numbers) -> Resu
     Ok(())
 }
 
-fn outlines(
-    pdf: &mut Pdf,
-    outline: Ref,
-    sheets: &Sheets,
-    pages: &[Ref],
-    numbers: &mut Numbers,
-) {
+fn outlines(pdf: &mut Pdf, outline: Ref, sheets: &Sheets, pages: &[Ref], numbers: &mut Numbers) {
     let items: Vec<Ref> = sheets.headings.iter().map(|_| numbers.next()).collect();
     let (Some(&first), Some(&last)) = (items.first(), items.last()) else {
         return;
