@@ -45,6 +45,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "scan-record",
         &["range-image", "scanner-protocol", "storage"],
     ),
+    ("page", &[]),
     ("deliverables", &DELIVERABLES),
     ("relief-api", &[]),
     ("reliefd", &DAEMON),
@@ -83,10 +84,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-const DELIVERABLES: [&str; 10] = [
+const DELIVERABLES: [&str; 11] = [
     "cad-exchange",
     "compare",
     "nurbs",
+    "page",
     "pipeline",
     "range-image",
     "reconstruct",

@@ -26,9 +26,11 @@ pub use export::{
 pub use file::{hexadecimal, sha256_of, write_atomically};
 pub use filed::{PageFormat, PageFormats, comparison_page, scan_page};
 pub use manifest::{MANIFEST_NAME, Manifest, ManifestFile};
+pub use page::Page;
 pub use report::{Report, ScanReport};
 pub use stopwatch::Stopwatch;
 pub use write::{
-    DeliverError, Delivered, INLIERS_PICTURE_NAME, Inputs, Pictures, RANGE_PICTURE_NAME,
-    REGIONS_PICTURE_NAME, REPORT_NAME, RESIDUALS_PICTURE_NAME, write, write_pictures,
+    DeliverError, Delivered, Drawings, INLIERS_PICTURE_NAME, Inputs, PAGE_STEM, Pictures,
+    RANGE_PICTURE_NAME, REGIONS_PICTURE_NAME, REPORT_NAME, RESIDUALS_PICTURE_NAME, draw_pictures,
+    write, write_pictures,
 };

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use deliverables::{Inputs, ManifestFile, Report, Stopwatch, write_atomically};
+use deliverables::{Inputs, ManifestFile, PageFormats, Report, Stopwatch, write_atomically};
 use pipeline::{Extent, InMemory, Observer, PipelineError, Settings, Stage};
 use range_image::Monitor;
 use serde::Serialize;
 
 use super::Args;
 use super::args::CadFormat;
-use crate::command::places;
+use crate::command::{pages, places};
 use crate::failure::Failure;
 use crate::input::{self, Input};
 use crate::output;
@@ -100,6 +100,7 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
     args.check_name()?;
     places::check_file(&output)?;
     args.report.as_deref().map_or(Ok(()), places::check_file)?;
+    pages::check(&args.page)?;
     args.pictures
         .as_deref()
         .map_or(Ok(()), places::check_directory)?;
@@ -144,6 +145,7 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
         outcome: &outcome,
         settings: &settings,
         cad: &cad,
+        page: PageFormats::NONE,
         scan: input.scan,
         warnings: notes.clone(),
         versions: std::collections::BTreeMap::default(),
@@ -159,16 +161,25 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
     })
     .map_err(|error| Failure::at(format!("cannot write {}", output.display()), &error))?;
     watch.progress(1.0);
-    if let Some(directory) = &args.pictures {
+    let mut drawings = deliverables::Drawings::new();
+    if args.pictures.is_some() || !args.page.is_empty() {
         watch.stage(Stage::Pictures);
+        drawings = deliverables::draw_pictures(&inputs)
+            .map_err(|error| Failure::at("cannot draw the pictures", &error))?;
+        watch.progress(1.0);
+    }
+    if let Some(directory) = &args.pictures {
         fs::create_dir_all(directory)
-            .and_then(|()| deliverables::write_pictures(directory, &inputs))
+            .and_then(|()| deliverables::write_pictures(directory, &drawings))
             .map_err(|error| {
                 Failure::at(format!("cannot draw into {}", directory.display()), &error)
             })?;
-        watch.progress(1.0);
     }
     let report = Report::new(&inputs, watch.read());
+    if !args.page.is_empty() {
+        let page = deliverables::scan_page(&report, &drawings, std::slice::from_ref(&written));
+        pages::write(&args.page, &page)?;
+    }
     shown.end("done");
     if let Some(path) = &args.report {
         write_report(path, &report)?;
