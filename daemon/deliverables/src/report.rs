@@ -326,10 +326,14 @@ pub struct ModelReport {
     /// How it is known where they run.
     #[serde(default)]
     pub edge_lengths: EdgeLengthsReport,
+    /// The same for each kind of edge, `silhouette`, `step` and `crease`; empty in reports of
+    /// earlier versions.
+    #[serde(default)]
+    pub edge_lengths_by_kind: BTreeMap<String, OriginLengthsReport>,
 }
 
 /// Lengths of edges as the camera sees them, by how it is known where they run.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct EdgeLengthsReport {
     /// The samples beside them tell.
     pub measured_mm: f64,
@@ -339,12 +343,9 @@ pub struct EdgeLengthsReport {
     pub assumed_mm: f64,
     /// Part of the last in all three, 0 to 1.
     pub assumed_share: f64,
-    /// The same for each kind of edge; empty in reports of earlier versions.
-    #[serde(default)]
-    pub kinds: BTreeMap<String, OriginLengthsReport>,
 }
 
-/// Lengths of the edges of one kind: `silhouette`, `step` or `crease`.
+/// Lengths of the edges of one kind.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct OriginLengthsReport {
     /// As [`EdgeLengthsReport::measured_mm`].

@@ -202,43 +202,48 @@ fn model(model: &Model) -> ModelReport {
         edges_shared: uses.iter().filter(|&&count| count > 1).count(),
         free_edges: uses.iter().filter(|&&count| count == 1).count(),
         edge_lengths: edge_lengths(model),
+        edge_lengths_by_kind: [
+            ("silhouette", EdgeKind::Silhouette),
+            ("step", EdgeKind::Step),
+            ("crease", EdgeKind::Crease),
+        ]
+        .into_iter()
+        .map(|(name, kind)| (name.to_owned(), lengths(model, Some(kind))))
+        .collect(),
+    }
+}
+
+/// Lengths of the edges of one kind, or of all.
+fn lengths(model: &Model, kind: Option<EdgeKind>) -> OriginLengthsReport {
+    let of = |origin: EdgeOrigin| -> f64 {
+        let is_asked =
+            |edge: &&Edge| edge.origin == origin && kind.is_none_or(|kind| edge.kind == kind);
+        let edges = model.edges.iter().filter(is_asked);
+        // Not a sum, which would be -0 of none and be printed so.
+        edges.fold(0.0, |sum, edge| sum + edge.path.arc_length())
+    };
+    OriginLengthsReport {
+        measured_mm: of(EdgeOrigin::Measured),
+        intersected_mm: of(EdgeOrigin::Intersected),
+        assumed_mm: of(EdgeOrigin::Assumed),
     }
 }
 
 fn edge_lengths(model: &Model) -> EdgeLengthsReport {
-    let lengths = |kind: Option<EdgeKind>| {
-        let of = |origin: EdgeOrigin| -> f64 {
-            let is_asked =
-                |edge: &&Edge| edge.origin == origin && kind.is_none_or(|kind| edge.kind == kind);
-            let edges = model.edges.iter().filter(is_asked);
-            // Not a sum, which would be -0 of none and be printed so.
-            edges.fold(0.0, |sum, edge| sum + edge.path.arc_length())
-        };
-        OriginLengthsReport {
-            measured_mm: of(EdgeOrigin::Measured),
-            intersected_mm: of(EdgeOrigin::Intersected),
-            assumed_mm: of(EdgeOrigin::Assumed),
-        }
-    };
-    let all = lengths(None);
-    let all_mm = all.measured_mm + all.intersected_mm + all.assumed_mm;
-    let kinds = [
-        ("silhouette", EdgeKind::Silhouette),
-        ("step", EdgeKind::Step),
-        ("crease", EdgeKind::Crease),
-    ];
+    let OriginLengthsReport {
+        measured_mm,
+        intersected_mm,
+        assumed_mm,
+    } = lengths(model, None);
+    let all_mm = measured_mm + intersected_mm + assumed_mm;
     EdgeLengthsReport {
-        measured_mm: all.measured_mm,
-        intersected_mm: all.intersected_mm,
-        assumed_mm: all.assumed_mm,
+        measured_mm,
+        intersected_mm,
+        assumed_mm,
         assumed_share: if all_mm > 0.0 {
-            all.assumed_mm / all_mm
+            assumed_mm / all_mm
         } else {
             0.0
         },
-        kinds: kinds
-            .into_iter()
-            .map(|(name, kind)| (name.to_owned(), lengths(Some(kind))))
-            .collect(),
     }
 }

@@ -107,7 +107,7 @@ fn flaws(report: &ComparisonReport) -> Section {
                       greatest local mean, with its standard error."
                 .into(),
             columns: vec![
-                Column::numbers("Area"),
+                Column::words("Area"),
                 Column::numbers("x, mm"),
                 Column::numbers("y, mm"),
                 Column::numbers("z, mm"),
@@ -189,7 +189,7 @@ fn alignment(alignment: &AlignmentReport) -> Section {
             Fact::new("Shifted", triple(alignment.translation_mm, 4).text(" mm")),
             Fact::new(
                 "Turned",
-                triple(alignment.rotation_vector_deg, 4).text(" \u{b0}"),
+                triple(alignment.rotation_vector_deg, 4).text("\u{b0}"),
             ),
             Fact::new("rms", figure(Some(rms_mm), 4).text(" mm")),
             Fact::new("Found in", steps),
@@ -202,7 +202,7 @@ fn alignment(alignment: &AlignmentReport) -> Section {
         ));
     }
     if let Some(uncertainty) = alignment.rotation_uncertainty_deg {
-        let line = triple(uncertainty, 4).text(" \u{b0}, of the turning, k = 1");
+        let line = triple(uncertainty, 4).text("\u{b0}, of the turning, k = 1");
         facts.push(Fact::new("And", line));
     }
     for free in &alignment.free {

@@ -47,7 +47,7 @@ pub(super) fn parameters(report: &Report) -> Option<Section> {
                           directions, that in the way in which they are known least."
                     .into(),
                 columns: vec![
-                    Column::numbers("Region"),
+                    Column::words("Region"),
                     Column::words("Shape"),
                     Column::words("Parameter"),
                     Column::numbers("Value"),
@@ -64,8 +64,8 @@ pub(super) fn parameters(report: &Report) -> Option<Section> {
 fn of_shape(family: &str, numbers: &ShapeNumbers) -> Vec<[Line; 4]> {
     let mut rows: Vec<[Line; 4]> = Vec::new();
     for (name, quantity, unit) in [
-        ("radius", numbers.radius_mm, "mm"),
-        ("tube radius", numbers.tube_radius_mm, "mm"),
+        ("radius", numbers.radius_mm, " mm"),
+        ("tube radius", numbers.tube_radius_mm, " mm"),
         ("half angle", numbers.half_angle_deg, "\u{b0}"),
     ] {
         if let Some(quantity) = quantity {
@@ -81,7 +81,7 @@ fn of_shape(family: &str, numbers: &ShapeNumbers) -> Vec<[Line; 4]> {
     let within = |uncertainty: f64, unit: &str| {
         let decimals = number::decimals_of(uncertainty);
         let shown = number::fixed(COVERING * uncertainty, decimals);
-        Line::new().text(format!("\u{b1} {shown} {unit}"))
+        Line::new().text(format!("\u{b1} {shown}{unit}"))
     };
     if let (Some(towards), Some(uncertainty)) =
         (numbers.direction, numbers.direction_uncertainty_deg)
@@ -98,8 +98,8 @@ fn of_shape(family: &str, numbers: &ShapeNumbers) -> Vec<[Line; 4]> {
     rows.push([
         point.into(),
         triple(numbers.point_mm, number::decimals_of(uncertainty)).text(" mm"),
-        uncertain(uncertainty, "mm"),
-        within(uncertainty, "mm"),
+        uncertain(uncertainty, " mm"),
+        within(uncertainty, " mm"),
     ]);
     rows
 }
@@ -109,13 +109,13 @@ fn row(name: &str, quantity: Quantity, unit: &str) -> [Line; 4] {
     let decimals = number::decimals_of(uncertainty);
     let at = |value: f64| number::fixed(value, decimals);
     let interval = format!(
-        "{} to {} {unit}",
+        "{} to {}{unit}",
         at(value - COVERING * uncertainty),
         at(value + COVERING * uncertainty)
     );
     [
         name.into(),
-        figure(Some(value), decimals).text(format!(" {unit}")),
+        figure(Some(value), decimals).text(unit),
         uncertain(uncertainty, unit),
         interval.into(),
     ]
@@ -126,5 +126,5 @@ fn uncertain(uncertainty: f64, unit: &str) -> Line {
     let line = Line::new()
         .text("\u{b1} ")
         .line(figure(Some(uncertainty), decimals));
-    line.text(format!(" {unit}"))
+    line.text(unit)
 }

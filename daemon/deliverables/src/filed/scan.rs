@@ -184,7 +184,7 @@ fn surfaces(report: &Report, png: Option<Vec<u8>>) -> Section {
         blocks.push(Block::Table(Table {
             caption: "Surfaces. Distances of the nodes along z.".into(),
             columns: vec![
-                Column::numbers("Region"),
+                Column::words("Region"),
                 Column::words("Surface"),
                 Column::words("Name in CAD"),
                 Column::numbers("Nodes"),
@@ -272,7 +272,7 @@ fn freedom(report: &Report) -> Section {
         blocks.push(Block::Table(Table {
             caption: format!("Free forms that follow the noise most, {FREEST} at most."),
             columns: vec![
-                Column::numbers("Region"),
+                Column::words("Region"),
                 Column::words("Freedom"),
                 Column::numbers("Noise of a sample in the surface, about"),
             ],
@@ -353,7 +353,7 @@ fn deviations(told: &DeviationsReport, png: Option<Vec<u8>>) -> Section {
         blocks.push(Block::Table(Table {
             caption: "The worst places, the largest first.".into(),
             columns: vec![
-                Column::numbers("Place"),
+                Column::words("Place"),
                 Column::numbers("x, mm"),
                 Column::numbers("y, mm"),
                 Column::numbers("z, mm"),
@@ -387,7 +387,7 @@ fn edges(report: &Report) -> Section {
     let kinds = ["silhouette", "step", "crease"]
         .into_iter()
         .filter_map(|kind| {
-            let of = lengths.kinds.get(kind)?;
+            let of = model.edge_lengths_by_kind.get(kind)?;
             let name = match kind {
                 "silhouette" => "Outline, nothing beyond",
                 "step" => "Step to another face",

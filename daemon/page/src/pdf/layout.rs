@@ -161,7 +161,7 @@ impl Layout {
         for section in &page.sections {
             let first = section.blocks.first();
             let follows = match first {
-                Some(Block::Picture(_)) => PICTURE_HEIGHT / 2.0,
+                Some(Block::Picture(_)) => PICTURE_HEIGHT + 30.0,
                 Some(Block::Chart(_)) => CHART + 60.0,
                 _ => 46.0,
             };
