@@ -1,5 +1,6 @@
 //! How far the measured nodes lie off the trimmed faces, along the normals of these.
 
+use pipeline::Outcome;
 use range_image::RangeImage;
 use reconstruct::{Face, Reconstruction, Surface};
 
@@ -17,14 +18,22 @@ const APART: usize = 8;
 pub(crate) struct Deviations<'a> {
     image: &'a RangeImage,
     reconstruction: &'a Reconstruction,
-    /// Of each node, column by column; not a number where it has no value, or lies under no face.
+    /// Of each node, column by column; not a number where it has no value, or lies under no face of
+    /// its region.
     off_mm: Vec<f64>,
+    /// Nodes under faces of regions that they do not belong to.
+    elsewhere: usize,
     /// Sizes, the least first.
     sizes: Vec<f64>,
 }
 
 impl<'a> Deviations<'a> {
-    pub(crate) fn of(image: &'a RangeImage, reconstruction: &'a Reconstruction) -> Self {
+    /// Those of the nodes as outlines have settled them, where there were samples to do so.
+    pub(crate) fn of(image: &'a RangeImage, outcome: &'a Outcome) -> Self {
+        let settled = outcome.settled.as_ref();
+        let image = settled.map_or(image, |settled| &settled.image);
+        let (reconstruction, labels) = (&outcome.reconstruction, outcome.regions.raw_labels());
+        let mut elsewhere = 0;
         let faces = &reconstruction.model.faces;
         let rows = image.rows();
         let places =
@@ -33,7 +42,13 @@ impl<'a> Deviations<'a> {
             .map(|(column, row)| {
                 let number = reconstruction.face_at.get(column * rows + row).copied();
                 let face = number.and_then(|number| faces.get((number as usize).checked_sub(1)?));
+                let label = labels.get(column * rows + row).copied();
                 match (face, image.z_mm(column, row)) {
+                    // What lies beyond a step is no deviation of the face before it.
+                    (Some(face), Some(_)) if label != Some(face.region) => {
+                        elsewhere += 1;
+                        f64::NAN
+                    }
                     (Some(face), Some(z_mm)) => {
                         off(face, [image.x_mm(column), image.y_mm(row), z_mm])
                     }
@@ -48,17 +63,18 @@ impl<'a> Deviations<'a> {
             image,
             reconstruction,
             off_mm,
+            elsewhere,
             sizes,
         }
     }
 
-    /// That of a node; `None` where it has no value, or lies under no face.
+    /// That of a node; `None` where it has none.
     pub(crate) fn at(&self, column: usize, row: usize) -> Option<f64> {
         let off = self.off_mm.get(column * self.image.rows() + row).copied();
         off.filter(|off| off.is_finite())
     }
 
-    /// Nodes under a face.
+    /// Nodes that have one.
     pub(crate) fn nodes(&self) -> usize {
         self.sizes.len()
     }
@@ -85,6 +101,7 @@ impl<'a> Deviations<'a> {
         let mean = told().sum::<f64>() / self.sizes.len() as f64;
         DeviationsReport {
             nodes: self.nodes(),
+            elsewhere: self.elsewhere,
             mean_mm: mean.is_finite().then_some(mean),
             rms_mm: self.rms_mm(),
             percentile_95_mm: self.quantile_mm(0.95),

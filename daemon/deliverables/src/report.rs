@@ -360,8 +360,10 @@ pub struct OriginLengthsReport {
 /// camera.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DeviationsReport {
-    /// Nodes under a face.
+    /// Nodes under a face of their region; those beside outlines as these have settled them.
     pub nodes: usize,
+    /// Nodes under a face of a region that they do not belong to, which have no deviation.
+    pub elsewhere: usize,
     /// Mean.
     pub mean_mm: Option<f64>,
     /// Root mean square.

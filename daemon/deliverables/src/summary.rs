@@ -35,7 +35,7 @@ impl Report {
             background: background(inputs.outcome),
             crumbs: crumbs(inputs.outcome),
             model: model(&reconstruction.model),
-            deviations: Some(Deviations::of(inputs.image, reconstruction).report()),
+            deviations: Some(Deviations::of(inputs.image, inputs.outcome).report()),
             snr_db: finite(reconstruction.metrics.snr_db),
             lost_nodes: reconstruction.metrics.lost_nodes,
             invented_nodes: reconstruction.metrics.invented_nodes,

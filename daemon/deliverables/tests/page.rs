@@ -45,7 +45,7 @@ fn columns() -> Vec<Column> {
         } else if x < 20.0 {
             30.0 + (144.0 - (x - 10.0) * (x - 10.0)).sqrt()
         } else {
-            60.0 + 2.0 * libm::sin(x / 3.0) * libm::cos(y / 4.0)
+            60.0 + libm::sin(x / 6.0) * libm::cos(y / 7.0)
         }
     };
     (-40..=80)

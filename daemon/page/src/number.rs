@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_within() {
-        let marks = ticks(-0.05, 0.05, 4);
+        let marks = ticks(-0.05, 0.05, 6);
         let texts: Vec<&str> = marks.iter().map(|(_, text)| text.as_str()).collect();
         assert_eq!(texts, ["-0.04", "-0.02", "0.00", "0.02", "0.04"]);
         assert_eq!(ticks(0.0, 30.0, 3).len(), 4);

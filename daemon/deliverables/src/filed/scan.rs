@@ -292,6 +292,12 @@ const FREEST: usize = 10;
 fn deviations(told: &DeviationsReport, png: Option<Vec<u8>>) -> Section {
     let facts = vec![
         Fact::new("Nodes", Line::new().count(told.nodes).text(" under a face")),
+        Fact::new(
+            "Elsewhere",
+            Line::new()
+                .count(told.elsewhere)
+                .text(" nodes under a face of a region that they do not belong to"),
+        ),
         Fact::new("Mean", figure(told.mean_mm, 4).text(" mm")),
         Fact::new("rms", figure(told.rms_mm, 4).text(" mm")),
         Fact::new("95 % within", figure(told.percentile_95_mm, 4).text(" mm")),

@@ -55,9 +55,9 @@ pub fn write_residuals(
     name: &str,
     sink: impl Write,
 ) -> std::io::Result<()> {
-    let reconstruction = &outcome.reconstruction;
-    let deviations = Deviations::of(image, reconstruction);
-    let drawn = residuals::draw(image, &deviations, &reconstruction.model, name);
+    let deviations = Deviations::of(image, outcome);
+    let model = &outcome.reconstruction.model;
+    let drawn = residuals::draw(image, &deviations, model, name);
     encode(&drawn, sink)
 }
 
