@@ -50,6 +50,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &["range-image", "scanner-protocol", "storage"],
     ),
     ("mesh-files", &["shapes", "tessellate"]),
+    ("page", &[]),
     ("deliverables", &DELIVERABLES),
     ("relief-api", &[]),
     ("reliefd", &DAEMON),
@@ -88,11 +89,12 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-const DELIVERABLES: [&str; 12] = [
+const DELIVERABLES: [&str; 13] = [
     "cad-exchange",
     "compare",
     "mesh-files",
     "nurbs",
+    "page",
     "pipeline",
     "range-image",
     "reconstruct",

@@ -8,8 +8,10 @@
 //! the scan is given by the caller.
 
 pub mod comparison;
+mod deviations;
 mod export;
 mod file;
+mod filed;
 mod manifest;
 mod meshes;
 pub mod picture;
@@ -24,14 +26,17 @@ pub use export::{
     CadOptions, Entities, LengthUnit, Schema, WriteError, file_stem, write_iges, write_step,
 };
 pub use file::{hexadecimal, sha256_of, write_atomically};
+pub use filed::{PageFormat, PageFormats, comparison_page, scan_page};
 pub use manifest::{MANIFEST_NAME, Manifest, ManifestFile};
 pub use meshes::{
     MeasuredPoints, MeshFormat, MeshOptions, PointFormat, mesh_report, triangles, write_measured,
     write_triangles,
 };
+pub use page::Page;
 pub use report::{MeshReport, Report, ScanReport};
 pub use stopwatch::Stopwatch;
 pub use write::{
-    DeliverError, Delivered, INLIERS_PICTURE_NAME, Inputs, Pictures, RANGE_PICTURE_NAME,
-    REGIONS_PICTURE_NAME, REPORT_NAME, RESIDUALS_PICTURE_NAME, write, write_pictures,
+    DeliverError, Delivered, Drawings, INLIERS_PICTURE_NAME, Inputs, PAGE_STEM, Pictures,
+    RANGE_PICTURE_NAME, REGIONS_PICTURE_NAME, REPORT_NAME, RESIDUALS_PICTURE_NAME, draw_pictures,
+    write, write_pictures,
 };

@@ -33,6 +33,9 @@ pub struct Report {
     /// The triangles of the model; absent where no file of them is asked for.
     #[serde(default)]
     pub mesh: Option<MeshReport>,
+    /// How far the nodes lie off the faces; absent in reports of earlier versions.
+    #[serde(default)]
+    pub deviations: Option<DeviationsReport>,
     /// Signal-to-noise ratio of the whole restored image against the range image, its nodes next
     /// to outlines decided anew ([`RangeImageReport::dropped_nodes`]), decibels, as in Shim & Lee 1995: R in 0.1 mm, 7000 to 8000; a node that one has
     /// and the other lacks counts with its full value. Larger is nearer; `null` where
@@ -206,6 +209,21 @@ pub struct RegionReport {
     pub max_mm: Option<f64>,
     /// Peak signal-to-noise ratio of the surface at the region's nodes.
     pub psnr_db: Option<f64>,
+    /// How many numbers its surfaces were given by what was measured; absent where none was made,
+    /// and in reports of earlier versions.
+    #[serde(default)]
+    pub freedom: Option<FreedomReport>,
+}
+
+/// How far a surface is free to follow the noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FreedomReport {
+    /// Numbers of the shape (3 for a plane to 7 for a torus), or coefficients of splines that were
+    /// free to follow the nodes.
+    pub parameters: usize,
+    /// Independent values that determined them: samples for a shape that was fitted to these, else
+    /// nodes, or the samples under these where they are fewer.
+    pub independent: usize,
 }
 
 /// The shape of a region.
@@ -310,7 +328,7 @@ pub struct CrumbReport {
 }
 
 /// The trimmed faces.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ModelReport {
     /// Trimmed faces.
     pub faces: usize,
@@ -321,6 +339,10 @@ pub struct ModelReport {
     /// How it is known where they run.
     #[serde(default)]
     pub edge_lengths: EdgeLengthsReport,
+    /// The same for each kind of edge, `silhouette`, `step` and `crease`; empty in reports of
+    /// earlier versions.
+    #[serde(default)]
+    pub edge_lengths_by_kind: BTreeMap<String, OriginLengthsReport>,
 }
 
 /// The triangles of the model.
@@ -349,4 +371,53 @@ pub struct EdgeLengthsReport {
     pub assumed_mm: f64,
     /// Part of the last in all three, 0 to 1.
     pub assumed_share: f64,
+}
+
+/// Lengths of the edges of one kind.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct OriginLengthsReport {
+    /// As [`EdgeLengthsReport::measured_mm`].
+    pub measured_mm: f64,
+    /// As [`EdgeLengthsReport::intersected_mm`].
+    pub intersected_mm: f64,
+    /// As [`EdgeLengthsReport::assumed_mm`].
+    pub assumed_mm: f64,
+}
+
+/// Distances of the nodes from the trimmed faces along the normal of these, positive towards the
+/// camera.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DeviationsReport {
+    /// Nodes under a face of their region; those beside outlines as these have settled them.
+    pub nodes: usize,
+    /// Nodes under a face of a region that they do not belong to, which have no deviation.
+    pub elsewhere: usize,
+    /// Mean.
+    pub mean_mm: Option<f64>,
+    /// Root mean square.
+    pub rms_mm: Option<f64>,
+    /// The size that 95 % do not exceed.
+    pub percentile_95_mm: Option<f64>,
+    /// The largest size.
+    pub max_mm: Option<f64>,
+    /// How often which occur.
+    pub histogram: crate::comparison::HistogramReport,
+    /// The largest, each the largest around it, at most [`DeviationsReport::WORST`].
+    pub worst: Vec<WorstReport>,
+}
+
+impl DeviationsReport {
+    /// Most places that are listed one by one.
+    pub const WORST: usize = 10;
+}
+
+/// A node that lies far off its face.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct WorstReport {
+    /// Where it is.
+    pub place_mm: [f64; 3],
+    /// Label of the region of its face.
+    pub region: u16,
+    /// How far it lies off.
+    pub deviation_mm: f64,
 }

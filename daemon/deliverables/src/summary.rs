@@ -3,12 +3,14 @@
 use std::collections::BTreeMap;
 
 use pipeline::{NodeRole, Outcome, Settings};
-use reconstruct::{EdgeOrigin, Face, Model, Surface};
+use reconstruct::{Edge, EdgeKind, EdgeOrigin, Face, Model, Surface};
 
+use crate::deviations::Deviations;
 use crate::export::CadOptions;
 use crate::report::{
     BackgroundRegionReport, BackgroundReport, CrumbReport, CrumbsReport, EdgeLengthsReport,
-    ModelReport, RangeImageReport, RegionReport, RegionsReport, Report, SettingsReport,
+    FreedomReport, ModelReport, OriginLengthsReport, RangeImageReport, RegionReport, RegionsReport,
+    Report, SettingsReport,
 };
 use crate::shape::shape;
 use crate::write::Inputs;
@@ -34,6 +36,7 @@ impl Report {
             crumbs: crumbs(inputs.outcome),
             model: model(&reconstruction.model),
             mesh: None,
+            deviations: Some(Deviations::of(inputs.image, inputs.outcome).report()),
             snr_db: finite(reconstruction.metrics.snr_db),
             lost_nodes: reconstruction.metrics.lost_nodes,
             invented_nodes: reconstruction.metrics.invented_nodes,
@@ -49,7 +52,7 @@ fn finite(number: f64) -> Option<f64> {
     number.is_finite().then_some(number)
 }
 
-fn settings(settings: &Settings, cad: &CadOptions) -> SettingsReport {
+pub(crate) fn settings(settings: &Settings, cad: &CadOptions) -> SettingsReport {
     SettingsReport {
         method: settings.method().as_str().to_owned(),
         seed: settings.regrid.seed,
@@ -119,10 +122,15 @@ fn regions(outcome: &Outcome) -> RegionsReport {
         .map(|fit| {
             let own = || faces.iter().filter(|face| face.region == fit.label);
             let mut kinds = outcome.kinds.iter();
+            let shape = kinds.find(|k| k.label.get() == fit.label).and_then(shape);
+            // A face that is its shape follows the samples that this was fitted to.
+            let numbers = shape.as_ref().and_then(|shape| shape.numbers.as_ref());
+            let is_shape = own().next().is_some_and(|face| face.shape.is_some());
+            let samples = numbers.filter(|_| is_shape).map(|numbers| numbers.samples);
             RegionReport {
                 label: fit.label,
                 kind: own().next().map_or("none", kind).to_owned(),
-                shape: kinds.find(|k| k.label.get() == fit.label).and_then(shape),
+                shape,
                 faces: own().map(|face| face.name.clone()).collect(),
                 patches: fit.patches,
                 nodes: fit.nodes,
@@ -130,6 +138,10 @@ fn regions(outcome: &Outcome) -> RegionsReport {
                 rms_mm: finite(fit.rms_mm),
                 max_mm: finite(fit.max_mm),
                 psnr_db: finite(fit.psnr_db),
+                freedom: (fit.faces > 0).then(|| FreedomReport {
+                    parameters: fit.parameters,
+                    independent: samples.unwrap_or(fit.independent),
+                }),
             }
         })
         .collect();
@@ -198,18 +210,39 @@ fn model(model: &Model) -> ModelReport {
         edges_shared: uses.iter().filter(|&&count| count > 1).count(),
         free_edges: uses.iter().filter(|&&count| count == 1).count(),
         edge_lengths: edge_lengths(model),
+        edge_lengths_by_kind: [
+            ("silhouette", EdgeKind::Silhouette),
+            ("step", EdgeKind::Step),
+            ("crease", EdgeKind::Crease),
+        ]
+        .into_iter()
+        .map(|(name, kind)| (name.to_owned(), lengths(model, Some(kind))))
+        .collect(),
+    }
+}
+
+/// Lengths of the edges of one kind, or of all.
+fn lengths(model: &Model, kind: Option<EdgeKind>) -> OriginLengthsReport {
+    let of = |origin: EdgeOrigin| -> f64 {
+        let is_asked =
+            |edge: &&Edge| edge.origin == origin && kind.is_none_or(|kind| edge.kind == kind);
+        let edges = model.edges.iter().filter(is_asked);
+        // Not a sum, which would be -0 of none and be printed so.
+        edges.fold(0.0, |sum, edge| sum + edge.path.arc_length())
+    };
+    OriginLengthsReport {
+        measured_mm: of(EdgeOrigin::Measured),
+        intersected_mm: of(EdgeOrigin::Intersected),
+        assumed_mm: of(EdgeOrigin::Assumed),
     }
 }
 
 fn edge_lengths(model: &Model) -> EdgeLengthsReport {
-    let of = |origin: EdgeOrigin| -> f64 {
-        let edges = model.edges.iter().filter(|edge| edge.origin == origin);
-        // Not a sum, which would be -0 of none and be printed so.
-        edges.fold(0.0, |sum, edge| sum + edge.path.arc_length())
-    };
-    let measured_mm = of(EdgeOrigin::Measured);
-    let intersected_mm = of(EdgeOrigin::Intersected);
-    let assumed_mm = of(EdgeOrigin::Assumed);
+    let OriginLengthsReport {
+        measured_mm,
+        intersected_mm,
+        assumed_mm,
+    } = lengths(model, None);
     let all_mm = measured_mm + intersected_mm + assumed_mm;
     EdgeLengthsReport {
         measured_mm,

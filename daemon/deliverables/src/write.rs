@@ -5,6 +5,7 @@ use std::io;
 use std::path::Path;
 
 use jiff::Timestamp;
+use page::Page;
 use pipeline::{Observer, Outcome, Settings, Stage};
 use range_image::{Cancelled, Monitor, RangeImage};
 use storage::{Disk, LocalDisk, remove_file_if_there};
@@ -13,6 +14,7 @@ use reconstruct::RegionFit;
 
 use crate::export::{CadOptions, WriteError, file_stem, write_iges, write_step};
 use crate::file::write_synced;
+use crate::filed::{PageFormat, PageFormats, scan_page};
 use crate::manifest::{MANIFEST_NAME, Manifest, ManifestFile};
 use crate::meshes::{MeasuredPoints, write_extras};
 use crate::picture;
@@ -36,6 +38,8 @@ pub struct Inputs<'a> {
     pub cad: &'a CadOptions,
     /// The samples, for files of them.
     pub points: Option<MeasuredPoints<'a>>,
+    /// In which forms the page is left.
+    pub page: PageFormats,
     /// Where the samples came from.
     pub scan: ScanReport,
     /// What the user should know about the source, before the pipeline's own warnings.
@@ -72,6 +76,8 @@ pub struct Delivered {
     pub files: Vec<ManifestFile>,
 }
 
+/// Names of the page are this with the ending of its form.
+pub const PAGE_STEM: &str = "report";
 /// Name of the report in a directory of deliverables.
 pub const REPORT_NAME: &str = "report.json";
 /// Name of the range image's picture.
@@ -95,17 +101,20 @@ pub enum Pictures {
 /// What stands in the report where the STEP file is missing for want of room.
 const NO_STEP: &str = "the STEP file was left out, since the disk is nearly full: make room and \
      run the scan again to have it";
+/// The same of the page.
+const NO_PAGE: &str = "the page was left out, since the disk is nearly full: make room and run the \
+     scan again to have it";
 /// The same of pictures.
 const NO_PICTURES: &str = "the pictures were left out, since the disk is nearly full: make room \
      and run the scan again to have them";
 
 /// Writes `<name>.igs`, `<name>.step` and files of triangles and points if they are asked for, the
-/// pictures, `report.json` and `manifest.json` into an existing directory of this disk that nobody
-/// else looks at, and syncs them and it. The caller then puts the directory in its place by one
-/// rename.
+/// pictures, `report.json`, the page and `manifest.json` into an existing directory of this disk
+/// that nobody else looks at, and syncs them and it. The caller then puts the directory in its
+/// place by one rename.
 ///
 /// The stopwatch that has timed the pipeline goes on with the stages here, so that the
-/// report holds them all; only the time of writing the report itself is missing from it.
+/// report holds them all; only the time of writing report and page is missing from it.
 ///
 /// # Errors
 /// [`DeliverError`]. What was already written stays for the caller to remove.
@@ -159,19 +168,38 @@ pub fn write(
     files.extend(extras.files);
     report.mesh = extras.mesh;
     report.warnings.extend(extras.warnings);
-    match drawn {
-        Some(drawn) => files.extend(drawn),
-        None => {
-            // Those that were drawn before the disk was full take the room of the report.
-            for name in PICTURE_NAMES {
-                remove_file_if_there(disk, &directory.join(name))?;
-            }
-            report.warnings.push(NO_PICTURES.to_owned());
+    let drawings = drawn.map(|(drawings, written)| {
+        files.extend(written);
+        drawings
+    });
+    if drawings.is_none() {
+        // Those that were drawn before the disk was full take the room of the report.
+        for name in PICTURE_NAMES {
+            remove_file_if_there(disk, &directory.join(name))?;
         }
+        report.warnings.push(NO_PICTURES.to_owned());
     }
     watch.progress(1.0);
 
+    // The page tells the report's checksum, so this is written first; once more, where there turns
+    // out to be no room for the page, to say so.
     files.push(write_json(disk, directory, REPORT_NAME, &report)?);
+    let page = match &drawings {
+        _ if inputs.page == PageFormats::NONE => Some(Vec::new()),
+        Some(drawings) => {
+            let page = scan_page(&report, drawings, &files);
+            page_on(disk, directory, &page, inputs.page)?
+        }
+        None => None,
+    };
+    match page {
+        Some(page) => files.extend(page),
+        None => {
+            files.pop();
+            report.warnings.push(NO_PAGE.to_owned());
+            files.push(write_json(disk, directory, REPORT_NAME, &report)?);
+        }
+    }
     let manifest = Manifest {
         name: report.name.clone(),
         timestamp: report.timestamp.clone(),
@@ -238,24 +266,44 @@ fn unless_full<T>(written: io::Result<T>) -> io::Result<Option<T>> {
     }
 }
 
+/// The page; `None` where there was no room for it. What it tells is in other files.
+fn page_on(
+    disk: &dyn Disk,
+    directory: &Path,
+    page: &Page,
+    formats: PageFormats,
+) -> io::Result<Option<Vec<ManifestFile>>> {
+    let name = |format: PageFormat| format!("{PAGE_STEM}.{}", format.as_str());
+    let write = || -> io::Result<Vec<ManifestFile>> {
+        let written = formats.wanted().map(|format| {
+            let bytes = format.bytes(page)?;
+            write_synced(disk, directory, &name(format), |sink| {
+                sink.write_all(&bytes)
+            })
+        });
+        written.collect()
+    };
+    let written = unless_full(write())?;
+    if written.is_none() {
+        for format in formats.wanted() {
+            remove_file_if_there(disk, &directory.join(name(format)))?;
+        }
+    }
+    Ok(written)
+}
+
 /// Regions up to this number stand in the legend by their labels, more by their sizes,
 /// since not all of them will find room.
 const LISTED_BY_LABEL: usize = 12;
 
-/// Writes the pictures only: range image, regions, residuals, and the share of inliers
-/// where that is known.
+/// Pictures with the names of their files, as PNG.
+pub type Drawings = Vec<(&'static str, Vec<u8>)>;
+
+/// Draws range image, regions, deviations, and the share of inliers where that is known.
 ///
 /// # Errors
-/// What the file system reports.
-pub fn write_pictures(directory: &Path, inputs: &Inputs<'_>) -> io::Result<Vec<ManifestFile>> {
-    pictures_on(&LocalDisk, directory, inputs)
-}
-
-fn pictures_on(
-    disk: &dyn Disk,
-    directory: &Path,
-    inputs: &Inputs<'_>,
-) -> io::Result<Vec<ManifestFile>> {
+/// A picture that is too large for its format.
+pub fn draw_pictures(inputs: &Inputs<'_>) -> io::Result<Drawings> {
     let (image, outcome, name) = (inputs.image, inputs.outcome, inputs.name);
     let mut largest: Vec<&RegionFit> = outcome.reconstruction.regions.iter().collect();
     if largest.len() > LISTED_BY_LABEL {
@@ -271,26 +319,57 @@ fn pictures_on(
             ),
         })
         .collect();
-    let mut written = vec![
-        write_synced(disk, directory, RANGE_PICTURE_NAME, |sink| {
-            picture::write_range(image, name, sink)
-        })?,
-        write_synced(disk, directory, REGIONS_PICTURE_NAME, |sink| {
-            picture::write_regions(image, outcome, &notes, name, sink)
-        })?,
-        write_synced(disk, directory, RESIDUALS_PICTURE_NAME, |sink| {
-            picture::write_residuals(image, outcome, name, sink)
-        })?,
+    let drawn = |draw: &dyn Fn(&mut Vec<u8>) -> io::Result<()>| {
+        let mut png = Vec::new();
+        draw(&mut png).map(|()| png)
+    };
+    let mut drawings = vec![
+        (
+            RANGE_PICTURE_NAME,
+            drawn(&|sink| picture::write_range(image, name, sink))?,
+        ),
+        (
+            REGIONS_PICTURE_NAME,
+            drawn(&|sink| picture::write_regions(image, outcome, &notes, name, sink))?,
+        ),
+        (
+            RESIDUALS_PICTURE_NAME,
+            drawn(&|sink| picture::write_residuals(image, outcome, name, sink))?,
+        ),
     ];
     if let Some(inliers) = picture::inliers(image, name) {
-        written.push(write_synced(
-            disk,
-            directory,
-            INLIERS_PICTURE_NAME,
-            |sink| inliers.write(sink),
-        )?);
+        drawings.push((INLIERS_PICTURE_NAME, drawn(&|sink| inliers.write(sink))?));
     }
-    Ok(written)
+    Ok(drawings)
+}
+
+/// Writes pictures into a directory.
+///
+/// # Errors
+/// What the file system reports.
+pub fn write_pictures(directory: &Path, drawings: &Drawings) -> io::Result<Vec<ManifestFile>> {
+    keep_pictures(&LocalDisk, directory, drawings)
+}
+
+fn keep_pictures(
+    disk: &dyn Disk,
+    directory: &Path,
+    drawings: &Drawings,
+) -> io::Result<Vec<ManifestFile>> {
+    let written = drawings
+        .iter()
+        .map(|(name, png)| write_synced(disk, directory, name, |sink| sink.write_all(png)));
+    written.collect()
+}
+
+fn pictures_on(
+    disk: &dyn Disk,
+    directory: &Path,
+    inputs: &Inputs<'_>,
+) -> io::Result<(Drawings, Vec<ManifestFile>)> {
+    let drawings = draw_pictures(inputs)?;
+    let written = keep_pictures(disk, directory, &drawings)?;
+    Ok((drawings, written))
 }
 
 fn write_json(

@@ -25,8 +25,8 @@ use serde::{Deserialize, Serialize};
 pub use http::HttpConfig;
 pub use load::ConfigError;
 pub use processing::{
-    DeliverablesConfig, Estimator, Method, OverrideError, Processing, ReconstructConfig,
-    RegridConfig, SegmentConfig, StepChoice, StepUnits,
+    DeliverablesConfig, Estimator, Method, OverrideError, PageChoice, Processing,
+    ReconstructConfig, RegridConfig, SegmentConfig, StepChoice, StepUnits,
 };
 pub use reload::Reloaded;
 pub use scanner::{ScannerConfig, Transport};

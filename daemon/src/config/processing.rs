@@ -206,6 +206,9 @@ pub struct DeliverablesConfig {
         skip_serializing_if = "BTreeSet::is_empty"
     )]
     pub points: BTreeSet<PointFormat>,
+    /// In which forms the page that can be filed is left; none if empty.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub page: Option<Vec<PageChoice>>,
     /// Author in the CAD file's header; the scan's operator if left out.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub author: String,
@@ -238,6 +241,16 @@ pub enum StepChoice {
     Ap214,
     /// There is no STEP file.
     Off,
+}
+
+/// A form of the page.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PageChoice {
+    /// One HTML file.
+    Html,
+    /// PDF on A4.
+    Pdf,
 }
 
 /// A unit of lengths.

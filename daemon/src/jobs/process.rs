@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use deliverables::{
-    CadOptions, DeliverError, Entities, Inputs, LengthUnit, MeasuredPoints, Pictures, ScanReport,
-    Schema, Stopwatch,
+    CadOptions, DeliverError, Entities, Inputs, LengthUnit, MeasuredPoints, PageFormats, Pictures,
+    ScanReport, Schema, Stopwatch,
 };
 use pipeline::{Columns, Observer, PipelineError, ReadAgainError, Stage, View};
 use range_image::calibration::Head;
@@ -18,7 +18,7 @@ use super::kept_processing;
 use super::progress::Progress;
 use super::worker::JobOutcome;
 use crate::acquisition::grid_file;
-use crate::config::{Processing, StepChoice, StepUnits};
+use crate::config::{PageChoice, Processing, StepChoice, StepUnits};
 use crate::fit::Fit;
 use crate::service::{KeptGrid, Service};
 use crate::spool::SpoolError;
@@ -148,6 +148,7 @@ fn attempt(
         settings: &settings,
         cad: &cad,
         points: Some(MeasuredPoints(&columns)),
+        page: page_formats(&processing),
         scan: scan_report(&scan, &header, &kept),
         warnings: kept.warnings,
         versions: versions(&header),
@@ -393,6 +394,16 @@ fn cad_options(processing: &Processing, scan: &Scan) -> CadOptions {
             wanted.author.clone()
         },
         organisation: wanted.organisation.clone(),
+    }
+}
+
+fn page_formats(processing: &Processing) -> PageFormats {
+    match &processing.deliverables.page {
+        None => PageFormats::BOTH,
+        Some(wanted) => PageFormats {
+            html: wanted.contains(&PageChoice::Html),
+            pdf: wanted.contains(&PageChoice::Pdf),
+        },
     }
 }
 

@@ -95,6 +95,10 @@ fn faults_are_told_with_their_line_and_a_way_out() {
             "relief.toml, line 2, column 14: unknown value `inches`; did you mean `inch`?",
         ),
         (
+            "[deliverables]\npage = [\"htm\"]\n",
+            "relief.toml, line 2, column 9: unknown value `htm`; did you mean `html`?",
+        ),
+        (
             "[segment]\nclusters = 0\n",
             "relief.toml, section [segment]: clusters is 0, but must be 1 to 1000",
         ),

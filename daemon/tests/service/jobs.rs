@@ -125,7 +125,11 @@ async fn a_rerun_has_other_settings_and_a_folder_of_its_own() {
     assert_eq!(before.unwrap(), after.unwrap());
     let without = Rerun {
         name: String::new(),
-        settings: [("deliverables.step".to_owned(), json!("off"))].into(),
+        settings: [
+            ("deliverables.step".to_owned(), json!("off")),
+            ("deliverables.page".to_owned(), json!(["pdf"])),
+        ]
+        .into(),
     };
     let last: Job = rig.client.post(&path::scan_rerun(&scan.id), &without).await;
     let last = job_over(&mut events, &rig, last.id).await;
@@ -133,6 +137,7 @@ async fn a_rerun_has_other_settings_and_a_folder_of_its_own() {
     assert!(folder.join("roof.igs").is_file() && !folder.join("roof.step").exists());
     let report = read_json(&folder.join("report.json"));
     assert_eq!(report["settings"]["step"], "off");
+    assert!(folder.join("report.pdf").is_file() && !folder.join("report.html").exists());
     assert!(!report["warnings"].to_string().contains("STEP"));
     let scan: Scan = rig.client.get(&path::scan(&scan.id)).await;
     assert_eq!(scan.jobs, [first.id, job.id, last.id]);

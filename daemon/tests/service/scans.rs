@@ -54,7 +54,9 @@ async fn a_scan_becomes_a_result_in_the_spool() {
             "manifest.json",
             "range.png",
             "regions.png",
+            "report.html",
             "report.json",
+            "report.pdf",
             "residuals.png"
         ]
     );

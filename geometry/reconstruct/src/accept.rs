@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 use nurbs::PatchSurface;
 use range_image::RangeImage;
 
-use crate::run::{Node, residuals};
+use crate::account::residuals;
+use crate::run::Node;
 
 /// A shape may leave its nodes so much more than a free-form surface, which follows the noise;
 /// and nodes are the middles of windows, which blunt what bends: the second figure in pitches.

@@ -102,7 +102,7 @@ pub fn rectangle_spline(
 
 /// Patches through the nodes of the extended range image (section V): `third` pitches
 /// between the points that cut a patch in thirds, breaks uniform, the rectangle the
-/// smallest that covers `domain`.
+/// smallest that covers `domain`. With them the number of members that they pass through.
 ///
 /// # Errors
 /// [`FitError::Empty`] when no member has a value.
@@ -111,7 +111,7 @@ pub fn patches_through_nodes(
     member: impl Fn(usize, usize) -> bool,
     domain: &Domain,
     third: usize,
-) -> Result<PatchSurface, FitError> {
+) -> Result<(PatchSurface, usize), FitError> {
     let pitch = image.pitch_mm();
     let cover = |(low, high): (f64, f64), origin: f64| {
         let first = ((low - origin) / pitch).floor() as i64;
@@ -133,15 +133,27 @@ pub fn patches_through_nodes(
         columns,
         rows,
     };
-    let extended = extend(image, member, rectangle).ok_or(FitError::Empty)?;
-    Ok(PatchSurface::through_thirds(u_breaks, v_breaks, |i, j| {
-        extended.z(i * third, j * third)
-    })?)
+    let is_met = |i: usize, j: usize| {
+        let column = usize::try_from(column_first + (i * third) as i64);
+        let row = usize::try_from(row_first + (j * third) as i64);
+        let on_image = column.ok().zip(row.ok());
+        on_image.is_some_and(|(column, row)| {
+            column < image.columns() && row < image.rows() && member(column, row)
+        })
+    };
+    let lines =
+        (0..columns.div_ceil(third)).flat_map(|i| (0..rows.div_ceil(third)).map(move |j| (i, j)));
+    let met = lines.filter(|(i, j)| is_met(*i, *j)).count();
+    let extended = extend(image, &member, rectangle).ok_or(FitError::Empty)?;
+    let surface =
+        PatchSurface::through_thirds(u_breaks, v_breaks, |i, j| extended.z(i * third, j * third))?;
+    Ok((surface, met))
 }
 
 /// Patches of a bicubic spline with continuous curvature, fitted to the observations
 /// alone and refined where they ask for it. Few grossly wrong values do not count.
-/// Observations should come line by line of equal u.
+/// Observations should come line by line of equal u. With them the number of coefficients that
+/// the observations were asked for.
 ///
 /// # Errors
 /// [`FitError`] when the observations lie on a line or are fewer than three.
@@ -149,13 +161,13 @@ pub fn patches_from_spline(
     observations: &mut [Observation],
     domain: &Domain,
     demand: &Demand,
-) -> Result<PatchSurface, FitError> {
-    let mut spline = refine::fit(observations, domain, demand)?;
+) -> Result<(PatchSurface, usize), FitError> {
+    let (mut spline, mut parameters) = refine::fit(observations, domain, demand)?;
     let residuals = spline.residuals(&Lines::new(observations));
     if reweigh(&residuals, observations) {
-        spline = refine::fit(observations, domain, demand)?;
+        (spline, parameters) = refine::fit(observations, domain, demand)?;
     }
-    Ok(spline.to_patches()?)
+    Ok((spline.to_patches()?, parameters))
 }
 
 /// Gives each observation the weight that its residual leaves it; false when every one
@@ -247,8 +259,9 @@ mod tests {
         let plane = |x: f64, y: f64| 3.0 + 0.4 * x - 0.7 * y;
         let image = image(plane);
         let mut seen = observations(&image, disc(&image));
-        let surface = patches_from_spline(&mut seen, &domain(&image), &demand(0.01)).unwrap();
-        assert_eq!(surface.patches.len(), 1);
+        let fitted = patches_from_spline(&mut seen, &domain(&image), &demand(0.01)).unwrap();
+        let (surface, parameters) = fitted;
+        assert_eq!((surface.patches.len(), parameters), (1, 3));
         for o in &seen {
             assert!((surface.z(o.u, o.v) - o.value).abs() < 1e-9);
         }
@@ -262,7 +275,7 @@ mod tests {
         for k in (0..seen.len()).step_by(97) {
             seen[k].value += 5.0;
         }
-        let surface = patches_from_spline(&mut seen, &domain(&image), &demand(1e-3)).unwrap();
+        let (surface, _) = patches_from_spline(&mut seen, &domain(&image), &demand(1e-3)).unwrap();
         let worst = seen
             .iter()
             .map(|o| (surface.z(o.u, o.v) - wave(o.u, o.v)).abs())
@@ -274,7 +287,16 @@ mod tests {
     fn patches_pass_through_the_nodes() {
         let image = image(|x, y| x * x - y + x * y);
         let member = disc(&image);
-        let surface = patches_through_nodes(&image, &member, &domain(&image), 1).unwrap();
+        let (surface, met) = patches_through_nodes(&image, &member, &domain(&image), 1).unwrap();
+        let places = (0..60).flat_map(|column| (0..50).map(move |row| (column, row)));
+        let members = places.filter(|(column, row)| member(*column, *row)).count();
+        assert_eq!(met, members);
+        // One node in four, or where the disc's rim falls otherwise, about that.
+        let (_, met) = patches_through_nodes(&image, &member, &domain(&image), 2).unwrap();
+        assert!(
+            (4 * met).abs_diff(members) < members / 10,
+            "{met} of {members}"
+        );
         for column in 12..48 {
             for row in 8..42 {
                 if member(column, row) {

@@ -57,7 +57,7 @@ pub(crate) fn patches(
         least_span_mm: LEAST_SPAN * image.pitch_mm(),
         most_spans,
     };
-    let spline = refine::fit(&observations, domain, &demand).ok()?;
+    let (spline, _) = refine::fit(&observations, domain, &demand).ok()?;
     let surface = spline.to_patches().ok()?;
     is_that(shape, &surface, image, nodes).then_some(surface)
 }

@@ -17,6 +17,7 @@ pub mod polygon;
 pub mod settings;
 
 mod accept;
+mod account;
 mod assemble;
 mod border;
 mod evidence;

@@ -34,6 +34,14 @@ impl ImageNoise {
         }
     }
 
+    /// How many independent values so many nodes are worth: as many as they are, or as the samples
+    /// that they rest on, where those are fewer. More samples than nodes make nodes better and not
+    /// more.
+    pub(crate) fn independent(&self, nodes: usize) -> usize {
+        let share = self.samples_per_node.unwrap_or(1.0);
+        ((nodes as f64 * share).round() as usize).clamp(nodes.min(1), nodes)
+    }
+
     /// Variance of the mean over many nodes times their number, square millimetres, where
     /// the nodes have these qualities. Neighbouring nodes rest on common samples, so that
     /// the mean over many is no better than that of the samples themselves.
@@ -120,5 +128,8 @@ mod tests {
         let density = ImageNoise::of(&unknown).density_mm2(unknown.qualities());
         let own = 1.4826 * 0.04 / 20.0_f64.sqrt();
         assert!((density - own * own).abs() < 1e-9, "{density}");
+        // Of 1000 nodes a quarter.
+        assert_eq!(ImageNoise::of(&known).independent(1000), 250);
+        assert_eq!(ImageNoise::of(&unknown).independent(1000), 1000);
     }
 }

@@ -50,7 +50,8 @@ pub struct Demand {
     pub most_spans: usize,
 }
 
-/// Fits a spline over the domain.
+/// Fits a spline over the domain; with it the number of coefficients that the data were asked for:
+/// the terms of the polynomial, and the functions set free since, as far as data lie under them.
 ///
 /// # Errors
 /// [`Singular`] when the observations lie on a line or are fewer than three.
@@ -58,12 +59,12 @@ pub(crate) fn fit(
     observations: &[Observation],
     domain: &Domain,
     demand: &Demand,
-) -> Result<UniformSpline, Singular> {
+) -> Result<(UniformSpline, usize), Singular> {
     let lines = Lines::new(observations);
-    let (mut spline, mut residuals) = polynomial(&lines, domain, demand)?;
+    let (mut spline, mut residuals, mut parameters) = polynomial(&lines, domain, demand)?;
     loop {
         if is_near(&lines, &residuals, demand) {
-            return Ok(spline);
+            return Ok((spline, parameters));
         }
         let candidates = [Parameter::U, Parameter::V].map(|along| {
             let (columns, rows) = spline.functions();
@@ -86,12 +87,16 @@ pub(crate) fn fit(
                 }
             }
             (Some(one), None) | (None, Some(one)) => one,
-            (None, None) => return Ok(spline),
+            (None, None) => return Ok((spline, parameters)),
         };
         spline = chosen.spline;
         if chosen.excess > 0.0 {
             let (columns, rows) = spline.functions();
             let free = with_neighbours(&chosen.free, columns, rows);
+            let asked = free.iter().zip(&chosen.mass);
+            parameters += asked.filter(|(free, mass)| **free && **mass > 0.0).count();
+            // Not all of what was set free on wide spans is still there on narrow ones.
+            parameters = parameters.min(columns * rows);
             spline.improve(&lines, &mut residuals, &free, BENDING);
         }
     }
@@ -116,8 +121,8 @@ fn polynomial(
     lines: &Lines<'_>,
     domain: &Domain,
     demand: &Demand,
-) -> Result<(UniformSpline, Vec<f64>), Singular> {
-    let mut best: Option<(f64, UniformSpline, Vec<f64>)> = None;
+) -> Result<(UniformSpline, Vec<f64>, usize), Singular> {
+    let mut best: Option<(f64, UniformSpline, Vec<f64>, usize)> = None;
     for total in [1, 2, 3, 6] {
         let degrees = (0..4).flat_map(|p| (0..4).map(move |q| (p, q)));
         let terms: Vec<_> = degrees.filter(|(p, q)| p + q <= total).collect();
@@ -138,20 +143,22 @@ fn polynomial(
         let score = squares(lines, &residuals).0 + price;
         let near = is_near(lines, &residuals, demand);
         if best.as_ref().is_none_or(|(least, ..)| score < *least) {
-            best = Some((score, spline, residuals));
+            best = Some((score, spline, residuals, terms.len()));
         }
         if near {
             break;
         }
     }
-    let (_, spline, residuals) = best.ok_or(Singular { row: 0 })?;
-    Ok((spline, residuals))
+    let (_, spline, residuals, terms) = best.ok_or(Singular { row: 0 })?;
+    Ok((spline, residuals, terms))
 }
 
 /// A spline with halved spans, and which of its functions are worth a coefficient.
 struct Candidate {
     spline: UniformSpline,
     free: Vec<bool>,
+    /// Of each of its functions, as [`Scores::mass`].
+    mass: Vec<f64>,
     excess: f64,
 }
 
@@ -171,6 +178,7 @@ impl Candidate {
         Self {
             spline,
             free,
+            mass: scores.mass,
             excess,
         }
     }
@@ -258,7 +266,7 @@ mod tests {
     /// Root mean square distance from the truth, and numbers of patches both ways.
     fn fitted(z: impl Fn(f64, f64) -> f64) -> (f64, usize, usize) {
         let nodes = nodes(&z);
-        let spline = fit(&nodes, &DOMAIN, &demand()).unwrap();
+        let (spline, _) = fit(&nodes, &DOMAIN, &demand()).unwrap();
         let off = |o: &Observation| (spline.value(o.u, o.v) - z(o.u, o.v)).powi(2);
         let rms = (nodes.iter().map(off).sum::<f64>() / nodes.len() as f64).sqrt();
         let patches = spline.to_patches().unwrap();
@@ -292,16 +300,43 @@ mod tests {
     }
 
     #[test]
+    fn parameters_are_as_many_as_the_data_were_asked_for() {
+        // A plane has three numbers.
+        let (_, parameters) = fit(&nodes(|x, y| 0.3 * x - 0.1 * y), &DOMAIN, &demand()).unwrap();
+        assert_eq!(parameters, 3);
+        // Noise takes from the sum of squares what each number is worth, no more: the rest says
+        // how many there were.
+        let wave = |x: f64, y: f64| 2.0 * libm::sin(x / 8.0) * libm::cos(y / 9.0);
+        let nodes = nodes(wave);
+        let finest = Demand {
+            tolerance_mm: 1e-4,
+            ..demand()
+        };
+        let (spline, parameters) = fit(&nodes, &DOMAIN, &finest).unwrap();
+        let left: f64 = nodes
+            .iter()
+            .map(|o| (spline.value(o.u, o.v) - wave(o.u, o.v)).powi(2))
+            .sum();
+        let followed = left / (NOISE_MM * NOISE_MM);
+        let told = parameters as f64;
+        assert!((40..=600).contains(&parameters), "{parameters}");
+        assert!(
+            (0.4 * told..=1.4 * told).contains(&followed),
+            "{followed} of {told}"
+        );
+    }
+
+    #[test]
     fn limits_of_spans_hold() {
         let nodes = nodes(|x, y| libm::sin(x) * libm::sin(y));
         let few = Demand {
             most_spans: 8,
             ..demand()
         };
-        let spline = fit(&nodes, &DOMAIN, &few).unwrap();
+        let (spline, _) = fit(&nodes, &DOMAIN, &few).unwrap();
         let (columns, rows) = spline.functions();
         assert!(columns <= 11 && rows <= 11);
-        let spline = fit(&nodes, &DOMAIN, &demand()).unwrap();
+        let (spline, _) = fit(&nodes, &DOMAIN, &demand()).unwrap();
         assert!(spline.span(Parameter::U) >= 2.0 && spline.span(Parameter::V) >= 2.0);
     }
 }

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use shapes::Shape;
 
 use crate::accept::is_as_good;
+use crate::account::{Freedom, tally};
 use crate::assemble::{Carrier, Placement, domains, kinds, model};
 use crate::border::cracks::trace;
 use crate::border::intersection::intersections;
@@ -55,6 +56,11 @@ pub struct RegionFit {
     pub faces: usize,
     /// Patches of its surfaces, in all.
     pub patches: usize,
+    /// Numbers that its surfaces were given by what was measured: those of the shape, or the
+    /// coefficients of the splines that were free to follow the nodes.
+    pub parameters: usize,
+    /// Independent values among the nodes, about.
+    pub independent: usize,
     /// Area of its trimmed faces on the surface, square millimetres.
     pub area_mm2: f64,
     /// Root mean square residual in z, millimetres.
@@ -106,6 +112,8 @@ pub struct Fitted<'a> {
     /// Of each piece; by the letter of the paper none yet, since there the border comes first,
     /// and the surface covers it.
     surfaces: Vec<PatchSurface>,
+    /// Of each of these, as [`RegionFit::parameters`].
+    parameters: Vec<usize>,
 }
 
 impl<'a> Fitted<'a> {
@@ -138,6 +146,7 @@ impl<'a> Fitted<'a> {
             nodes: nodes_of(image, map, &pieces),
             noise: ImageNoise::of(image),
             surfaces: Vec::new(),
+            parameters: Vec::new(),
             image,
             map,
             settings,
@@ -151,7 +160,8 @@ impl<'a> Fitted<'a> {
             });
             // Of several errors the first, as without threads.
             let fitted: Vec<Result<_, ReconstructError>> = fitted.collect();
-            all.surfaces = fitted.into_iter().collect::<Result<_, _>>()?;
+            let fitted: Vec<_> = fitted.into_iter().collect::<Result<_, _>>()?;
+            (all.surfaces, all.parameters) = fitted.into_iter().unzip();
         }
         monitor.progress(0.3);
         Ok(all)
@@ -199,9 +209,21 @@ impl<'a> Fitted<'a> {
         let mut fits: Vec<RegionFit> = Vec::new();
         for (k, domain) in domains(&planar, placement).into_iter().enumerate() {
             monitor.check()?;
-            let (surface, shape) = self.surface(k, domain, shapes[k])?;
+            let (surface, shape, parameters) = self.surface(k, domain, shapes[k])?;
             let region = self.pieces.regions[k];
-            let rms_mm = tally(&mut fits, region, image, &self.nodes[k], &surface);
+            let freedom = Freedom {
+                parameters,
+                // Pieces of one shape have its numbers in common.
+                is_shared: shape.is_some(),
+                independent: self.noise.independent(self.nodes[k].len()),
+            };
+            let rms_mm = tally(
+                &mut fits,
+                region,
+                image,
+                &self.nodes[k],
+                (&surface, freedom),
+            );
             carriers.push(Carrier {
                 region,
                 name: names[k].clone(),
@@ -269,28 +291,31 @@ impl<'a> Fitted<'a> {
             if let Some((shape, surface)) = found.filter(|_| whole[piece]) {
                 taken[piece] = Some(shape);
                 self.surfaces[piece] = surface;
+                self.parameters[piece] = shape.family().freedom();
             }
         }
         Ok(taken)
     }
 
-    /// The surface of a piece over the domain that its border asks for, and the shape that it is.
+    /// The surface of a piece over the domain that its border asks for, the shape that it is, and
+    /// the numbers that it was given.
     fn surface(
         &self,
         piece: usize,
         domain: Option<Domain>,
         shape: Option<Shape>,
-    ) -> Result<(PatchSurface, Option<Shape>), ReconstructError> {
+    ) -> Result<(PatchSurface, Option<Shape>, usize), ReconstructError> {
         let fits = |surface: &&PatchSurface| domain.is_some_and(|domain| domain.is_within(surface));
         if let Some(surface) = self.surfaces.get(piece).filter(fits) {
-            return Ok((surface.clone(), shape));
+            return Ok((surface.clone(), shape, self.parameters[piece]));
         }
         if let Some(shape) = shape
             && let Some(surface) = self.known(piece, &shape, domain)
         {
-            return Ok((surface, Some(shape)));
+            return Ok((surface, Some(shape), shape.family().freedom()));
         }
-        Ok((self.free_form(piece, domain)?, None))
+        let (surface, parameters) = self.free_form(piece, domain)?;
+        Ok((surface, None, parameters))
     }
 
     /// Patches of a shape over the nodes of a piece, and over a domain besides.
@@ -302,12 +327,12 @@ impl<'a> Fitted<'a> {
         known::patches(shape, image, nodes, &domain, most_spans)
     }
 
-    /// A free-form surface of a piece over a domain.
+    /// A free-form surface of a piece over a domain, and the numbers that it was given.
     fn free_form(
         &self,
         piece: usize,
         domain: Option<Domain>,
-    ) -> Result<PatchSurface, ReconstructError> {
+    ) -> Result<(PatchSurface, usize), ReconstructError> {
         let fitted = domain.ok_or(FitError::Empty).and_then(|domain| {
             let nodes = &self.nodes[piece];
             surface(self.image, nodes, &domain, &self.noise, self.settings)
@@ -405,7 +430,7 @@ fn surface(
     domain: &Domain,
     noise: &ImageNoise,
     settings: &ReconstructSettings,
-) -> Result<PatchSurface, FitError> {
+) -> Result<(PatchSurface, usize), FitError> {
     match settings.method {
         Method::Relief => {
             let mut observations: Vec<Observation> = nodes
@@ -437,51 +462,6 @@ fn surface(
             patches_through_nodes(image, member, domain, settings.patch_third_nodes)
         }
     }
-}
-
-/// Adds a face to the account of its region; gives its own root mean square residual.
-fn tally(
-    fits: &mut Vec<RegionFit>,
-    label: u16,
-    image: &RangeImage,
-    nodes: &[Node],
-    surface: &PatchSurface,
-) -> f64 {
-    let (rms_mm, max_mm) = residuals(image, nodes, surface);
-    let count = nodes.len() as f64;
-    let sum = rms_mm * rms_mm * count;
-    match fits.last_mut() {
-        Some(fit) if fit.label == label => {
-            let before = fit.rms_mm * fit.rms_mm * fit.nodes as f64;
-            fit.nodes += nodes.len();
-            fit.rms_mm = ((before + sum) / fit.nodes as f64).sqrt();
-            fit.max_mm = fit.max_mm.max(max_mm);
-            fit.faces += 1;
-            fit.patches += surface.patches.len();
-        }
-        _ => fits.push(RegionFit {
-            label,
-            nodes: nodes.len(),
-            faces: 1,
-            patches: surface.patches.len(),
-            area_mm2: 0.0,
-            rms_mm,
-            max_mm,
-            psnr_db: 0.0,
-        }),
-    }
-    rms_mm
-}
-
-/// Root mean square and greatest residual of nodes, millimetres.
-pub(crate) fn residuals(image: &RangeImage, nodes: &[Node], surface: &PatchSurface) -> (f64, f64) {
-    let (mut sum, mut max_mm) = (0.0, 0.0_f64);
-    for n in nodes {
-        let off = surface.z(image.x_mm(n.column), image.y_mm(n.row)) - n.z_mm;
-        sum += off * off;
-        max_mm = max_mm.max(off.abs());
-    }
-    ((sum / nodes.len() as f64).sqrt(), max_mm)
 }
 
 fn names(regions: &[u16]) -> Vec<String> {

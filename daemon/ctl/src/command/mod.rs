@@ -11,6 +11,7 @@ pub(crate) mod jobs;
 pub(crate) mod laser;
 pub(crate) mod manual;
 mod named;
+mod pages;
 mod part;
 mod places;
 pub(crate) mod rerun;

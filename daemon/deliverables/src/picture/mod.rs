@@ -16,6 +16,7 @@ use compare::{Comparison, Tolerance};
 use pipeline::Outcome;
 use range_image::RangeImage;
 
+use crate::deviations::Deviations;
 use canvas::Canvas;
 
 pub use regions::RegionNote;
@@ -43,7 +44,8 @@ pub fn write_regions(
     encode(&regions::draw(image, outcome, notes, name), sink)
 }
 
-/// Draws how far the nodes lie off the trimmed faces, along z, and writes it as PNG.
+/// Draws how far the nodes lie off the trimmed faces, along the normals of these, and writes it as
+/// PNG: red where they lie towards the camera, blue behind, grey where there is no face.
 ///
 /// # Errors
 /// What the sink reports.
@@ -53,9 +55,10 @@ pub fn write_residuals(
     name: &str,
     sink: impl Write,
 ) -> std::io::Result<()> {
-    let reconstruction = &outcome.reconstruction;
-    let (restored, model) = (&reconstruction.restored, &reconstruction.model);
-    encode(&residuals::draw(image, restored, model, name), sink)
+    let deviations = Deviations::of(image, outcome);
+    let model = &outcome.reconstruction.model;
+    let drawn = residuals::draw(image, &deviations, model, name);
+    encode(&drawn, sink)
 }
 
 /// Draws how far a scan lies off its nominal, with a histogram, and writes it as PNG. What is

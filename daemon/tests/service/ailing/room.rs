@@ -72,17 +72,31 @@ async fn pictures_are_the_first_to_go_when_the_disk_is_full() {
         assert!(warnings.contains("pictures were left out"), "{warnings}");
         disk.heal();
     }
+    // Then the page, which tells what other files hold.
+    for page in ["report.html", "report.pdf"] {
+        disk.refuse_writes(page, Errno::NOSPC);
+        let (scan, _) = rig.scan_to_result("a").await;
+        let (names, warnings) = result(&rig, &scan.id).await;
+        assert_eq!(names.len(), WITH_STEP.len() + 4, "{names:?}");
+        assert!(
+            !names
+                .iter()
+                .any(|name| name.ends_with("html") || name.ends_with("pdf"))
+        );
+        assert!(warnings.contains("the page was left out"), "{warnings}");
+        disk.heal();
+    }
     // Then the second CAD file, whose model is in the first.
     disk.refuse_writes("a.step", Errno::NOSPC);
     let (scan, _) = rig.scan_to_result("a").await;
     let (names, warnings) = result(&rig, &scan.id).await;
-    assert_eq!(names.len(), BARE.len() + 4);
+    assert_eq!(names.len(), BARE.len() + 4 + 2);
     assert!(!names.contains(&"a.step".to_owned()), "{names:?}");
     assert!(warnings.contains("STEP file was left out"), "{warnings}");
     disk.heal();
     let (scan, _) = rig.scan_to_result("a").await;
     let (names, warnings) = result(&rig, &scan.id).await;
-    assert_eq!(names.len(), WITH_STEP.len() + 4);
+    assert_eq!(names.len(), WITH_STEP.len() + 4 + 2);
     assert!(!warnings.contains("left out"), "{warnings}");
     rig.daemon.shutdown().await;
 }
@@ -104,6 +118,7 @@ async fn the_reserve_is_for_scans_and_not_for_pictures() {
     let (names, warnings) = result(&rig, &scan.id).await;
     assert_eq!(names, BARE);
     assert!(warnings.contains("pictures were left out"), "{warnings}");
+    assert!(warnings.contains("the page was left out"), "{warnings}");
     assert!(warnings.contains("STEP file was left out"), "{warnings}");
     rig.daemon.shutdown().await;
 }

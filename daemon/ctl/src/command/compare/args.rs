@@ -61,6 +61,10 @@ pub(crate) struct Args {
     /// Write a report as JSON, too
     #[arg(long, value_name = "FILE.json")]
     pub(super) report: Option<PathBuf>,
+    /// Write a page to be filed, too; its ending picks the form, HTML (.html) or PDF (.pdf). May
+    /// be given for each
+    #[arg(long, value_name = "OUT.html|OUT.pdf")]
+    pub(super) page: Vec<PathBuf>,
     /// Draw a map of the deviations with a histogram, too
     #[arg(long, value_name = "FILE.png")]
     pub(super) map: Option<PathBuf>,

@@ -4,15 +4,16 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
-use compare::{CompareError, Comparison, Nominal};
+use compare::{CompareError, Nominal};
 use deliverables::{ComparisonReport, write_atomically};
+use jiff::Timestamp;
 use pipeline::Extent;
-use range_image::{Column, Monitor, RangeImage};
+use range_image::{Column, Monitor};
 use regrid::{RegridError, Roi};
 use serde::Serialize;
 
 use super::{Args, nominal, summary};
-use crate::command::places;
+use crate::command::{pages, places};
 use crate::failure::Failure;
 use crate::input;
 use crate::output;
@@ -100,6 +101,7 @@ fn compare_files(args: &Args, shown: &Shown) -> Result<Compared, Failure> {
     let settings = args.settings()?;
     args.report.as_deref().map_or(Ok(()), places::check_file)?;
     args.map.as_deref().map_or(Ok(()), places::check_file)?;
+    pages::check(&args.page)?;
     // The nominal first: it is the quicker one to be refused.
     let nominal = nominal::read(&args.nominal, args.nominal_unit_mm())?;
     let input = input::read(&args.scan, args.units())?;
@@ -133,9 +135,23 @@ fn compare_files(args: &Args, shown: &Shown) -> Result<Compared, Failure> {
     })
     .map_err(|error| Failure::at("cannot compare", &error))?;
     let comparison = compared.map_err(|error| refused(args, &error))?;
-    if let Some(path) = &args.map {
-        draw(path, args, &image, &comparison, settings.tolerance)?;
+    let mut map = Vec::new();
+    if args.map.is_some() || !args.page.is_empty() {
+        let title = title(args);
+        deliverables::picture::write_deviations(
+            &image,
+            &comparison,
+            settings.tolerance,
+            &title,
+            &mut map,
+        )
+        .map_err(|error| Failure::at("cannot draw the map", &error))?;
     }
+    if let Some(path) = &args.map {
+        write_atomically::<std::io::Error>(path, |sink| sink.write_all(&map))
+            .map_err(|error| Failure::at(format!("cannot draw {}", path.display()), &error))?;
+    }
+    let time = scanned(args, input.timestamp);
     let warnings = remarks(args, input.notes, &nominal);
     let source = file_name(&args.nominal);
     let nominal = (source, &nominal);
@@ -153,6 +169,10 @@ fn compare_files(args: &Args, shown: &Shown) -> Result<Compared, Failure> {
             Ok(sink.write_all(b"\n")?)
         })
         .map_err(|error| Failure::at(format!("cannot write {}", path.display()), &error))?;
+    }
+    if !args.page.is_empty() {
+        let page = deliverables::comparison_page(&report, &title(args), time, map);
+        pages::write(&args.page, &page)?;
     }
     Ok(Compared {
         passed: report.passed,
@@ -173,23 +193,21 @@ fn remarks(args: &Args, of_scan: Vec<String>, nominal: &Nominal) -> Vec<String> 
     of_scan.chain(of_nominal).collect()
 }
 
-fn draw(
-    path: &Path,
-    args: &Args,
-    image: &RangeImage,
-    comparison: &Comparison,
-    tolerance: Option<compare::Tolerance>,
-) -> Result<(), Failure> {
-    let title = format!(
+fn title(args: &Args) -> String {
+    format!(
         "{} against {}",
         file_name(&args.scan),
         file_name(&args.nominal)
-    );
-    write_atomically::<std::io::Error>(path, |sink| {
-        deliverables::picture::write_deviations(image, comparison, tolerance, &title, sink)
-    })
-    .map(|_| ())
-    .map_err(|error| Failure::at(format!("cannot draw {}", path.display()), &error))
+    )
+}
+
+/// When the scan was taken, or when its file was last changed.
+fn scanned(args: &Args, kept: Option<Timestamp>) -> Timestamp {
+    let changed = || {
+        let changed = std::fs::metadata(&args.scan).and_then(|file| file.modified());
+        Timestamp::try_from(changed.ok()?).ok()
+    };
+    kept.or_else(changed).unwrap_or(Timestamp::UNIX_EPOCH)
 }
 
 fn file_name(path: &Path) -> String {

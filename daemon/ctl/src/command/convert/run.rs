@@ -6,8 +6,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use deliverables::{
-    DeliverError, Inputs, ManifestFile, MeasuredPoints, Report, Stopwatch, WriteError, mesh_report,
-    write_atomically,
+    DeliverError, Inputs, ManifestFile, MeasuredPoints, PageFormats, Report, Stopwatch, WriteError,
+    mesh_report, write_atomically,
 };
 use pipeline::{Extent, InMemory, Observer, PipelineError, Settings, Stage};
 use range_image::Monitor;
@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use super::Args;
 use super::args::OutputFormat;
-use crate::command::places;
+use crate::command::{pages, places};
 use crate::failure::Failure;
 use crate::input::{self, Input};
 use crate::output;
@@ -110,6 +110,7 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
     places::check_file(&output)?;
     points.map_or(Ok(()), |(path, _)| places::check_file(path))?;
     args.report.as_deref().map_or(Ok(()), places::check_file)?;
+    pages::check(&args.page)?;
     args.pictures
         .as_deref()
         .map_or(Ok(()), places::check_directory)?;
@@ -154,6 +155,7 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
         settings: &settings,
         cad: &cad,
         points: Some(MeasuredPoints(&scan)),
+        page: PageFormats::NONE,
         scan: input.scan,
         warnings: notes.clone(),
         versions: std::collections::BTreeMap::default(),
@@ -199,17 +201,26 @@ fn convert(args: &Args, shown: &Shown) -> Result<Converted, Failure> {
         .map_err(|error| cannot(path, error))?;
     }
     watch.progress(1.0);
-    if let Some(directory) = &args.pictures {
+    let mut drawings = deliverables::Drawings::new();
+    if args.pictures.is_some() || !args.page.is_empty() {
         watch.stage(Stage::Pictures);
+        drawings = deliverables::draw_pictures(&inputs)
+            .map_err(|error| Failure::at("cannot draw the pictures", &error))?;
+        watch.progress(1.0);
+    }
+    if let Some(directory) = &args.pictures {
         fs::create_dir_all(directory)
-            .and_then(|()| deliverables::write_pictures(directory, &inputs))
+            .and_then(|()| deliverables::write_pictures(directory, &drawings))
             .map_err(|error| {
                 Failure::at(format!("cannot draw into {}", directory.display()), &error)
             })?;
-        watch.progress(1.0);
     }
     let mut report = Report::new(&inputs, watch.read());
     report.mesh = mesh.as_ref().map(mesh_report);
+    if !args.page.is_empty() {
+        let page = deliverables::scan_page(&report, &drawings, std::slice::from_ref(&written));
+        pages::write(&args.page, &page)?;
+    }
     shown.end("done");
     if let Some(path) = &args.report {
         write_report(path, &report)?;
