@@ -13,8 +13,9 @@ use crate::chart::{Chart, MOST, Told};
 use crate::rule::{ROWS, Rule, Unit};
 
 /// Share of its variance below which what an equation is off does not vary any more: other rules
-/// have settled it.
-const SETTLED: f64 = 1e-6;
+/// have settled it. Those that were accepted since all were last solved for together hold to first
+/// order only, which leaves up to some millionths.
+const SETTLED: f64 = 1e-4;
 /// Standard deviations that what is settled may be off and still be what others rules make it.
 const LEFT: f64 = 0.05;
 /// Rounds of making rules linear, and the change in standard deviations at which they end.
@@ -346,8 +347,14 @@ impl State {
                         variance += slope * with[*index];
                     }
                     // Sums are of a variance near 1 as the fits have them.
-                    if !off.is_finite() || variance.is_nan() || variance <= 0.01 * SETTLED {
+                    if !off.is_finite() || variance.is_nan() {
                         return false;
+                    }
+                    if variance <= 0.01 * SETTLED {
+                        if off.abs() > LEFT {
+                            return false;
+                        }
+                        continue;
                     }
                     for (moved, with) in self.moved.iter_mut().zip(&with) {
                         *moved -= with * off / variance;
