@@ -11,6 +11,7 @@ mod export;
 mod file;
 mod manifest;
 pub mod picture;
+mod regular;
 pub mod report;
 mod shape;
 mod stopwatch;

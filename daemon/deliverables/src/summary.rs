@@ -6,6 +6,7 @@ use pipeline::{NodeRole, Outcome, Settings};
 use reconstruct::{EdgeOrigin, Face, Model, Surface};
 
 use crate::export::CadOptions;
+use crate::regular::{regularities, round_name};
 use crate::report::{
     BackgroundRegionReport, BackgroundReport, CrumbReport, CrumbsReport, EdgeLengthsReport,
     ModelReport, RangeImageReport, RegionReport, RegionsReport, Report, SettingsReport,
@@ -30,6 +31,7 @@ impl Report {
             settings: settings(inputs.settings, inputs.cad),
             range_image: range_image(inputs),
             regions: regions(inputs.outcome),
+            regularities: inputs.outcome.regularities.as_ref().map(regularities),
             background: background(inputs.outcome),
             crumbs: crumbs(inputs.outcome),
             model: model(&reconstruction.model),
@@ -67,6 +69,8 @@ fn settings(settings: &Settings, cad: &CadOptions) -> SettingsReport {
         roi_y_mm: limits(settings.regrid.roi.y_mm),
         roi_z_mm: limits(settings.regrid.roi.z_mm),
         kinds: settings.kinds.as_str().to_owned(),
+        regularize: settings.regularize.bound(),
+        regularize_units: round_name(&settings.regularize),
         tolerance_mm: settings.reconstruct.tolerance_mm,
         iges_entities: cad.entity_number(),
         step: cad.step_name().to_owned(),

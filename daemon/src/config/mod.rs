@@ -6,6 +6,7 @@
 mod http;
 mod load;
 mod processing;
+mod regularities;
 mod reload;
 mod scanner;
 mod scanners;
@@ -27,6 +28,7 @@ pub use processing::{
     DeliverablesConfig, Estimator, Method, OverrideError, Processing, ReconstructConfig,
     RegridConfig, SegmentConfig, StepChoice, StepUnits,
 };
+pub use regularities::{Regularize, RegularizeUnits};
 pub use reload::Reloaded;
 pub use scanner::{ScannerConfig, Transport};
 pub use storage::{Limits, StorageConfig};

@@ -13,6 +13,7 @@ pub(crate) mod manual;
 mod named;
 mod part;
 mod places;
+mod regularize;
 pub(crate) mod rerun;
 pub(crate) mod resume;
 pub(crate) mod scan;
