@@ -26,6 +26,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("segment", &["range-image"]),
     ("shapes", &[]),
     ("faces", &["range-image", "shapes"]),
+    ("regularize", &["shapes"]),
     ("reconstruct", &["nurbs", "range-image", "shapes"]),
     ("cad-exchange", &["nurbs", "reconstruct", "shapes"]),
     (
@@ -40,6 +41,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "range-image",
             "reconstruct",
             "regrid",
+            "regularize",
             "segment",
             "shapes",
         ],

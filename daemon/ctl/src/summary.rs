@@ -1,5 +1,7 @@
 //! A report told to people.
 
+use std::collections::BTreeSet;
+
 use deliverables::Report;
 use deliverables::report::{Quantity, RegionReport};
 
@@ -51,6 +53,7 @@ pub(crate) fn lines(report: &Report) -> Vec<String> {
         report.settings.minimum_nodes,
         crumbs(report)
     ));
+    lines.extend(regularities(report));
     lines.extend(report.background.list.iter().map(|region| {
         format!(
             "left out     {} of {} nodes: {}",
@@ -147,6 +150,32 @@ fn quantity(quantity: Quantity) -> String {
     let decimals = (1.0 - leading).clamp(0.0, 6.0) as usize;
     let Quantity { value, uncertainty } = quantity;
     format!("{value:.decimals$} +- {uncertainty:.decimals$}")
+}
+
+/// How many regularities there are, where they were looked for.
+fn regularities(report: &Report) -> Option<String> {
+    let found = report.regularities.as_ref()?;
+    let tied: BTreeSet<u16> = found
+        .accepted
+        .iter()
+        .flat_map(|own| own.regions.iter().copied())
+        .collect();
+    Some(match found.accepted.len() {
+        0 => format!(
+            "regular      no regularities, {} nearly",
+            found.refused.len()
+        ),
+        1 => format!(
+            "regular      1 regularity of {} regions, {} more refused",
+            tied.len(),
+            found.refused.len()
+        ),
+        count => format!(
+            "regular      {count} regularities of {} regions, {} more refused",
+            tied.len(),
+            found.refused.len()
+        ),
+    })
 }
 
 /// What belongs to no region.

@@ -15,6 +15,7 @@ mod filed;
 mod manifest;
 mod meshes;
 pub mod picture;
+mod regular;
 pub mod report;
 mod shape;
 mod stopwatch;

@@ -28,6 +28,9 @@ pub struct Report {
     /// Nodes that belong to no region.
     #[serde(default)]
     pub crumbs: CrumbsReport,
+    /// The regularities that their shapes were given; `null` where none were looked for.
+    #[serde(default)]
+    pub regularities: Option<RegularitiesReport>,
     /// The trimmed faces made of them.
     pub model: ModelReport,
     /// The triangles of the model; absent where no file of them is asked for.
@@ -122,6 +125,13 @@ pub struct SettingsReport {
     /// Which kinds of surface faces may be of: `auto` or `freeform`.
     #[serde(default)]
     pub kinds: String,
+    /// How many standard uncertainties a regularity may be off; `null` where none were looked
+    /// for.
+    #[serde(default)]
+    pub regularize: Option<f64>,
+    /// The unit that numbers are round in: `mm` or `inch`; `null` where none were looked for.
+    #[serde(default)]
+    pub regularize_units: Option<String>,
     /// Root mean square distance from the nodes at which a fitted surface is not made
     /// nearer still; no bound on how far it may lie off.
     pub tolerance_mm: f64,
@@ -272,6 +282,67 @@ pub struct Quantity {
     pub value: f64,
     /// Its standard uncertainty: the truth lies within twice as much in 95 of 100 cases.
     pub uncertainty: f64,
+}
+
+/// The regularities among the shapes of regions.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct RegularitiesReport {
+    /// Those that the shapes were given, in the order in which they were.
+    pub accepted: Vec<RegularityReport>,
+    /// What is nearly one, and why it is none.
+    pub refused: Vec<RefusedReport>,
+}
+
+/// A regularity. What others imply is not listed: of three parallel planes, two pairs are.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RegularityReport {
+    /// What it is, such as `parallel` or `equal radii`.
+    pub kind: String,
+    /// The regions that it ties.
+    pub regions: Vec<u16>,
+    /// What a round length is.
+    pub value_mm: Option<f64>,
+    /// What a round angle is.
+    pub value_deg: Option<f64>,
+    /// By how much places or sizes were off it, each shape by its own samples.
+    pub off_mm: Option<f64>,
+    /// By how much directions or half angles were.
+    pub off_deg: Option<f64>,
+    /// How far off it was when its turn came, in standard uncertainties: the root of chi-square.
+    pub deviations: f64,
+    /// Degrees of freedom of that.
+    pub freedom: usize,
+    /// Probability that what has it is measured to be so far off.
+    pub p: f64,
+    /// Probability that things without any tie are so near it.
+    pub chance: f64,
+    /// Most that a place or a size was moved by it.
+    pub moved_mm: f64,
+    /// Most that a direction or a half angle was turned by it.
+    pub turned_deg: f64,
+}
+
+/// What is nearly a regularity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RefusedReport {
+    /// What it would be.
+    pub kind: String,
+    /// The regions that it would tie.
+    pub regions: Vec<u16>,
+    /// What a round length would be.
+    pub value_mm: Option<f64>,
+    /// What a round angle would be.
+    pub value_deg: Option<f64>,
+    /// By how much places or sizes are off it, each shape by its own samples.
+    pub off_mm: Option<f64>,
+    /// By how much directions or half angles are.
+    pub off_deg: Option<f64>,
+    /// How far off it was when its turn came, in standard uncertainties.
+    pub deviations: f64,
+    /// Probability that what has it is measured to be so far off.
+    pub p: f64,
+    /// Why it is none, in words.
+    pub reason: String,
 }
 
 /// What was removed as background.

@@ -1,7 +1,7 @@
 //! The shape of a region, for the report.
 
 use pipeline::{Basis, RegionKind};
-use shapes::{Fit, Measured, Shape, Verdict};
+use shapes::{Fit, Measured, Numbers, Shape, Verdict};
 
 use crate::report::{Quantity, ShapeNumbers, ShapeReport};
 
@@ -14,9 +14,9 @@ pub(crate) fn shape(kind: &RegionKind) -> Option<ShapeReport> {
             hollow: None,
             numbers: None,
         }),
-        Verdict::Shape(fit) => Some(ShapeReport {
-            family: fit.shape.family().as_str().into(),
-            hollow: match &fit.shape {
+        Verdict::Shape(fit) => kind.told().map(|(shape, told)| ShapeReport {
+            family: shape.family().as_str().into(),
+            hollow: match &shape {
                 Shape::Plane(_) => None,
                 Shape::Sphere(sphere) => Some(sphere.is_hollow),
                 Shape::Cylinder(cylinder) => Some(cylinder.is_hollow),
@@ -24,15 +24,15 @@ pub(crate) fn shape(kind: &RegionKind) -> Option<ShapeReport> {
                 Shape::Torus(torus) => Some(torus.is_hollow),
             },
             numbers: match kind.basis {
-                Basis::Samples => Some(numbers(fit)),
+                Basis::Samples => Some(numbers(fit, &shape, &told)),
                 Basis::Nodes => None,
             },
         }),
     }
 }
 
-fn numbers(fit: &Fit) -> ShapeNumbers {
-    let (point, direction) = match &fit.shape {
+fn numbers(fit: &Fit, shape: &Shape, told: &Numbers) -> ShapeNumbers {
+    let (point, direction) = match shape {
         Shape::Plane(plane) => (plane.point_mm, Some(plane.normal)),
         Shape::Sphere(sphere) => (sphere.centre_mm, None),
         Shape::Cylinder(cylinder) => (cylinder.point_mm, Some(cylinder.axis)),
@@ -45,7 +45,6 @@ fn numbers(fit: &Fit) -> ShapeNumbers {
     };
     let mm = |measured| quantity(measured, 1.0);
     let deg = |measured| quantity(measured, 1.0_f64.to_degrees());
-    let told = &fit.numbers;
     ShapeNumbers {
         samples: fit.held,
         rms_mm: fit.rms_mm,

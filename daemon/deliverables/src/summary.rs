@@ -7,6 +7,7 @@ use reconstruct::{Edge, EdgeKind, EdgeOrigin, Face, Model, Surface};
 
 use crate::deviations::Deviations;
 use crate::export::CadOptions;
+use crate::regular::{regularities, round_name};
 use crate::report::{
     BackgroundRegionReport, BackgroundReport, CrumbReport, CrumbsReport, EdgeLengthsReport,
     FreedomReport, ModelReport, OriginLengthsReport, RangeImageReport, RegionReport, RegionsReport,
@@ -32,6 +33,7 @@ impl Report {
             settings: settings(inputs.settings, inputs.cad),
             range_image: range_image(inputs),
             regions: regions(inputs.outcome),
+            regularities: inputs.outcome.regularities.as_ref().map(regularities),
             background: background(inputs.outcome),
             crumbs: crumbs(inputs.outcome),
             model: model(&reconstruction.model),
@@ -71,6 +73,8 @@ pub(crate) fn settings(settings: &Settings, cad: &CadOptions) -> SettingsReport 
         roi_y_mm: limits(settings.regrid.roi.y_mm),
         roi_z_mm: limits(settings.regrid.roi.z_mm),
         kinds: settings.kinds.as_str().to_owned(),
+        regularize: settings.regularize.bound(),
+        regularize_units: round_name(&settings.regularize),
         tolerance_mm: settings.reconstruct.tolerance_mm,
         iges_entities: cad.entity_number(),
         step: cad.step_name().to_owned(),

@@ -88,7 +88,7 @@ pub(crate) fn preview(
 fn shaping(settings: &pipeline::Settings) -> SettingOverrides {
     let (regrid, segment, reconstruct) =
         (&settings.regrid, &settings.segment, &settings.reconstruct);
-    let all: [(&str, serde_json::Value); 9] = [
+    let all: [(&str, serde_json::Value); 10] = [
         ("regrid.pitch_mm", regrid.pitch_mm.into()),
         ("regrid.neighbours", regrid.neighbours.into()),
         ("regrid.draws", regrid.draws.into()),
@@ -96,6 +96,10 @@ fn shaping(settings: &pipeline::Settings) -> SettingOverrides {
         ("regrid.estimator", regrid.estimator.as_str().into()),
         ("segment.minimum_nodes", segment.minimum_nodes.into()),
         ("reconstruct.kinds", settings.kinds.as_str().into()),
+        (
+            "reconstruct.regularize",
+            settings.regularize.bound().map_or("off".into(), Into::into),
+        ),
         ("reconstruct.tolerance_mm", reconstruct.tolerance_mm.into()),
         (
             "reconstruct.knots_per_side",

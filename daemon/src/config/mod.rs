@@ -7,6 +7,7 @@ mod formats;
 mod http;
 mod load;
 mod processing;
+mod regularities;
 mod reload;
 mod scanner;
 mod scanners;
@@ -28,6 +29,7 @@ pub use processing::{
     DeliverablesConfig, Estimator, Method, OverrideError, PageChoice, Processing,
     ReconstructConfig, RegridConfig, SegmentConfig, StepChoice, StepUnits,
 };
+pub use regularities::{Regularize, RegularizeUnits};
 pub use reload::Reloaded;
 pub use scanner::{ScannerConfig, Transport};
 pub use storage::{Limits, StorageConfig};

@@ -9,6 +9,7 @@ use scan_files::recommended_pitch_mm;
 use serde::{Deserialize, Serialize};
 
 use super::load::with_nearest_name;
+use super::regularities::{Regularize, RegularizeUnits};
 use super::{formats, value};
 
 /// Settings that decide what a job makes of a scan. Whatever is left out follows the
@@ -150,6 +151,13 @@ pub struct ReconstructConfig {
     /// Which kinds of surface faces may be of; method `relief` only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kinds: Option<Kinds>,
+    /// Whether shapes are given the regularities that they are likely to have, and within how
+    /// many standard uncertainties; method `relief` with kinds `auto` only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub regularize: Option<Regularize>,
+    /// The unit that numbers are round in.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub regularize_units: Option<RegularizeUnits>,
     /// Root mean square distance from the range image at which a surface is near enough and
     /// gets no further knots; no bound on how far it may lie off.
     #[serde(
@@ -362,6 +370,13 @@ impl Processing {
                 Kinds::Auto => pipeline::Kinds::Auto,
                 Kinds::FreeForm => pipeline::Kinds::FreeForm,
             }),
+        );
+        let units = self.reconstruct.regularize_units;
+        set(
+            &mut settings.regularize,
+            self.reconstruct
+                .regularize
+                .map(|regularize| regularize.settings(units)),
         );
         self.reconstruct.apply(&mut settings.reconstruct);
         settings

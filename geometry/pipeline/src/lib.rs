@@ -20,6 +20,7 @@ mod observer;
 mod outlines;
 mod part;
 mod process;
+mod regular;
 mod settings;
 
 pub use background::{BackgroundPolicy, Crumb, NodeRole, UnknownPolicy};
@@ -33,5 +34,10 @@ pub use part::{Part, divide};
 pub use process::{
     Outcome, PipelineError, process, process_columns, process_in_view, process_scan,
 };
+pub use regular::Regularities;
+pub use regularize::{
+    Adjusted, Kind as RegularityKind, Reason, Refused, Regularity, Round,
+    Settings as RegularizeSettings, Target,
+};
 pub use segment::{Background, BackgroundKind, BackgroundRegion, Plane, View};
-pub use settings::{Settings, SettingsError, SmoothJoins};
+pub use settings::{Regularize, Settings, SettingsError, SmoothJoins};

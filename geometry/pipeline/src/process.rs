@@ -13,6 +13,7 @@ use crate::kinds::samples::{OnRegion, of_regions};
 use crate::kinds::{RegionKind, kinds};
 use crate::outlines::{self, Removed, SettledNodes, settle_nodes};
 use crate::part::divide;
+use crate::regular::{self, Regularities};
 use crate::{Background, Crumb, Kinds, NodeRole, View};
 use crate::{Observer, Settings, SettingsError, SmoothJoins, Stage};
 
@@ -30,6 +31,8 @@ pub struct Outcome {
     pub crumbs: Vec<Crumb>,
     /// What kind of surface each region of the part is, in the order of their labels.
     pub kinds: Vec<RegionKind>,
+    /// The regularities that their shapes were given; `None` where none were looked for.
+    pub regularities: Option<Regularities>,
     /// The model made of them, and how well it fits.
     pub reconstruction: Reconstruction,
     /// The part's range image with the nodes beside its outlines decided anew by these. The
@@ -266,13 +269,14 @@ fn in_view(
 
     observer.stage(Stage::Reconstruct);
     let of_samples = || {
-        let kinds = kinds(
+        let decided = kinds(
             part_image,
             &part.regions,
             samples.as_deref(),
             settings.smooth_joins,
             observer,
         )?;
+        let (kinds, regularities) = regular::regularize(decided, has_kinds, settings)?;
         let removed = part.image.is_some().then_some(Removed {
             image,
             roles: &part.roles,
@@ -283,11 +287,11 @@ fn in_view(
             }
             _ => Some(Vec::new()),
         };
-        Ok::<_, PipelineError>((kinds, beside))
+        Ok::<_, PipelineError>((kinds, regularities, beside))
     };
     let fit = || Fitted::of(part_image, &part.regions, &settings.reconstruct, observer);
     let (fitted, of_samples) = rayon::join(fit, of_samples);
-    let (fitted, (kinds, beside)) = (fitted?, of_samples?);
+    let (fitted, (kinds, regularities, beside)) = (fitted?, of_samples?);
     let are_too_many = beside.is_none();
     let beside = beside.unwrap_or_default();
     let mut shapes: Vec<Option<Shape>> = Vec::new();
@@ -304,6 +308,8 @@ fn in_view(
                     by the nodes, half a pitch less sharp";
         reconstruction.warnings.push(told.to_owned());
     }
+    let notes = regularities.iter().flat_map(|own| &own.notes);
+    reconstruction.warnings.extend(notes.cloned());
     let mut settled = None;
     if let Some(columns) = columns.filter(|_| !beside.is_empty()) {
         let nodes = settle_nodes(
@@ -322,6 +328,7 @@ fn in_view(
         roles: part.roles,
         crumbs: part.crumbs,
         kinds,
+        regularities,
         reconstruction,
         settled,
         stages: vec![Stage::Segment, Stage::Reconstruct],

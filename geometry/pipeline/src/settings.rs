@@ -20,8 +20,33 @@ pub struct Settings {
     /// Whether regions whose surfaces join smoothly are taken apart; kinds `auto` of method
     /// `relief` only.
     pub smooth_joins: SmoothJoins,
+    /// Whether shapes are given the regularities that they are likely to have; kinds `auto` of
+    /// method `relief` only, and only where the samples are at hand.
+    pub regularize: Regularize,
     /// From regions to the model.
     pub reconstruct: ReconstructSettings,
+}
+
+/// Whether regularities among the shapes of regions are looked for, and imposed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Regularize {
+    /// Each shape is what its own samples say.
+    #[default]
+    Off,
+    /// Shapes are parallel, coaxial, of equal radii and so on where their uncertainties allow of
+    /// it ([`regularize::regularize`]).
+    On(regularize::Settings),
+}
+
+impl Regularize {
+    /// The bound, in standard uncertainties; `None` where it is off.
+    #[must_use]
+    pub fn bound(&self) -> Option<f64> {
+        match self {
+            Self::Off => None,
+            Self::On(settings) => Some(settings.bound),
+        }
+    }
 }
 
 /// What becomes of a region of several surfaces that join smoothly.
@@ -59,6 +84,7 @@ impl Settings {
             background: BackgroundPolicy::default(),
             kinds: Kinds::default(),
             smooth_joins: SmoothJoins::default(),
+            regularize: Regularize::default(),
             reconstruct: ReconstructSettings::default(),
         }
         .with_seed(1)
@@ -106,6 +132,11 @@ impl Settings {
         self.segment
             .validate()
             .map_err(|error| wrong("segment", &error))?;
+        if let Regularize::On(settings) = &self.regularize {
+            settings
+                .validate()
+                .map_err(|error| wrong("reconstruct", &error))?;
+        }
         self.reconstruct
             .validate()
             .map_err(|error| wrong("reconstruct", &error))

@@ -10,7 +10,7 @@ use crate::robust;
 use crate::shape::{Family, Shape};
 use crate::spread::spread;
 use crate::start::starts;
-use crate::uncertainty::{Numbers, numbers};
+use crate::uncertainty::{Joint, Numbers, joint, numbers};
 
 /// A point of a surface, as measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +23,17 @@ pub struct Sample {
     pub ray: Vector3<f64>,
     /// Standard deviation along the ray, millimetres.
     pub sigma_mm: f64,
+}
+
+impl Sample {
+    /// How far it lies off a shape along its ray, in its standard deviations, positive on the
+    /// side that was seen: what fits make least.
+    #[must_use]
+    pub fn off(&self, shape: &Shape) -> f64 {
+        let covered = shape.normal(&self.point_mm).dot(&self.ray);
+        let deviation_mm = (covered * covered + ACROSS * ACROSS).sqrt() * self.sigma_mm;
+        shape.distance_mm(&self.point_mm) / deviation_mm
+    }
 }
 
 /// Deviation of samples across their rays, of that along them: what keeps rays that graze a
@@ -41,6 +52,7 @@ pub struct Fit {
     /// Its numbers and how well they are known.
     pub numbers: Numbers,
     deviation: f64,
+    joint: Joint,
     local: Local,
 }
 
@@ -59,6 +71,12 @@ impl Fit {
     #[must_use]
     pub fn deviation(&self) -> f64 {
         self.deviation
+    }
+
+    /// Covariance of all the numbers, which [`Fit::numbers`] tells one by one.
+    #[must_use]
+    pub fn joint(&self) -> &Joint {
+        &self.joint
     }
 
     /// How far samples lie off the shape along their rays, in their standard deviations.
@@ -229,6 +247,7 @@ fn told(local: Local, samples: &[Sample], area: f64) -> Option<Fit> {
         held: count,
         numbers: numbers(&local, &covariance)?,
         deviation: (squares / left).sqrt(),
+        joint: joint(&local, &covariance)?,
         local,
     })
 }

@@ -28,4 +28,4 @@ pub use fit::{Fit, Sample, fit};
 pub use several::is_smooth;
 pub use shape::{Cone, Cylinder, Family, Plane, Shape, Sphere, Torus};
 pub use spread::{is_in_share, spread};
-pub use uncertainty::{Measured, Numbers, Spread};
+pub use uncertainty::{Joint, Measured, Numbers, Spread};

@@ -1,6 +1,6 @@
 //! How well the numbers of a fitted shape are known.
 
-use nalgebra::{Matrix3, SMatrix, SymmetricEigen, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen, Vector3};
 
 use crate::jet::MOST_FREE;
 use crate::local::Local;
@@ -62,6 +62,13 @@ impl Spread {
     }
 }
 
+/// Covariance of all that a shape's numbers are, to first order: of its direction (a plane's
+/// normal, an axis) and its place (as [`Numbers::place_mm`] has them), each by its three
+/// coordinates, and then of the radius, the tube's radius and the half angle. What a shape does
+/// not have varies in nothing; where an axis' point slides along it, that counts as variation,
+/// though it means none. Millimetres and radians.
+pub type Joint = SMatrix<f64, 9, 9>;
+
 /// Step by which derivatives are taken, in standard deviations.
 const STEP: f64 = 1e-2;
 
@@ -94,14 +101,9 @@ impl Told {
     }
 }
 
-/// The numbers of a shape whose free numbers have this covariance. `None` where a small
-/// step makes it another shape.
-pub(crate) fn numbers(
-    local: &Local,
-    covariance: &SMatrix<f64, MOST_FREE, MOST_FREE>,
-) -> Option<Numbers> {
-    let shape = local.shape()?;
-    let here = Told::of(&shape);
+/// What a shape is told as, by each of its free numbers. `None` where a small step makes it
+/// another shape.
+fn slopes(local: &Local, covariance: &SMatrix<f64, MOST_FREE, MOST_FREE>) -> Option<Vec<Told>> {
     let free = local.free();
     let mut slopes = Vec::with_capacity(free.len());
     for &k in free {
@@ -121,6 +123,41 @@ pub(crate) fn numbers(
             place: (up.place - down.place) * per,
         });
     }
+    Some(slopes)
+}
+
+/// The joint covariance of a shape whose free numbers have this one. `None` as with [`numbers`].
+pub(crate) fn joint(
+    local: &Local,
+    covariance: &SMatrix<f64, MOST_FREE, MOST_FREE>,
+) -> Option<Joint> {
+    let slopes: Vec<SVector<f64, 9>> = slopes(local, covariance)?
+        .iter()
+        .map(|told| {
+            let (d, p) = (told.direction, told.place);
+            let sizes = [told.radius, told.tube, told.half_angle];
+            SVector::from([d.x, d.y, d.z, p.x, p.y, p.z, sizes[0], sizes[1], sizes[2]])
+        })
+        .collect();
+    let mut joint = Joint::zeros();
+    for (one, &row) in slopes.iter().zip(local.free()) {
+        for (other, &column) in slopes.iter().zip(local.free()) {
+            joint += one * other.transpose() * covariance[(row, column)];
+        }
+    }
+    Some(joint)
+}
+
+/// The numbers of a shape whose free numbers have this covariance. `None` where a small
+/// step makes it another shape.
+pub(crate) fn numbers(
+    local: &Local,
+    covariance: &SMatrix<f64, MOST_FREE, MOST_FREE>,
+) -> Option<Numbers> {
+    let shape = local.shape()?;
+    let here = Told::of(&shape);
+    let free = local.free();
+    let slopes = slopes(local, covariance)?;
     let common = |a: &dyn Fn(&Told) -> f64, b: &dyn Fn(&Told) -> f64| -> f64 {
         let mut sum = 0.0;
         for (i, &row) in free.iter().enumerate() {

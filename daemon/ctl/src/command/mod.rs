@@ -14,6 +14,7 @@ mod named;
 mod pages;
 mod part;
 mod places;
+mod regularize;
 pub(crate) mod rerun;
 pub(crate) mod resume;
 pub(crate) mod scan;

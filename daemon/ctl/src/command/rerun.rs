@@ -4,6 +4,7 @@ use relief_api::{Job, Rerun, path};
 
 use super::named;
 use super::part::PartArgs;
+use super::regularize::RegularizeArgs;
 use super::setting::{self, Setting};
 use crate::failure::Failure;
 use crate::follow;
@@ -32,6 +33,8 @@ pub(crate) struct Args {
     #[arg(long)]
     wait: bool,
     #[command(flatten)]
+    regularize: RegularizeArgs,
+    #[command(flatten)]
     processed: PartArgs,
     #[command(flatten)]
     endpoint: EndpointArgs,
@@ -45,6 +48,7 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
         None
     };
     let mut settings = setting::overrides(args.settings);
+    args.regularize.add_to(&mut settings);
     args.processed.add_to(&mut settings);
     let request = Rerun {
         name: args.name,

@@ -6,6 +6,7 @@ use relief_api::{Job, PlanRequest, Scan, StartScan, path};
 use serde::Serialize;
 
 use super::part::PartArgs;
+use super::regularize::RegularizeArgs;
 use super::setting::{self, Setting};
 use crate::failure::Failure;
 use crate::follow;
@@ -60,6 +61,8 @@ pub(crate) struct Args {
     /// regrid.neighbours=25; may be given several times
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = setting::parse)]
     settings: Vec<Setting>,
+    #[command(flatten)]
+    regularize: RegularizeArgs,
     #[command(flatten)]
     plan: PlanArgs,
     #[command(flatten)]
@@ -121,6 +124,7 @@ impl Args {
     fn request(self) -> StartScan {
         let plan = self.plan;
         let mut settings = setting::overrides(self.settings);
+        self.regularize.add_to(&mut settings);
         self.processed.add_to(&mut settings);
         StartScan {
             name: self.name,

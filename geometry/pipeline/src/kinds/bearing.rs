@@ -22,11 +22,11 @@ const AT_BORDER: f64 = 4.0;
 
 /// What a region's surface is decided by.
 #[derive(Debug, Default)]
-pub(super) struct Bearing {
+pub(crate) struct Bearing {
     /// Samples well within.
-    pub(super) samples: Vec<Sample>,
+    pub(crate) samples: Vec<Sample>,
     /// As [`shapes::fit`] has it.
-    pub(super) area: f64,
+    pub(crate) area: f64,
     /// Samples near the border, those together that lie beside the same neighbour, as deep, with
     /// its label. They may be the neighbour's.
     pub(super) beside: Vec<(u16, Vec<Sample>)>,

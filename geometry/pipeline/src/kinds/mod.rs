@@ -1,6 +1,6 @@
 //! What kind of surface each region is.
 
-mod bearing;
+pub(crate) mod bearing;
 mod nodes;
 mod policy;
 pub(crate) mod samples;
@@ -9,9 +9,11 @@ use core::num::NonZeroU16;
 
 use range_image::{Cancelled, Monitor, RangeImage, RegionMap};
 use rayon::prelude::*;
-use shapes::{Evidence, Shape, Verdict};
+use regularize::Adjusted;
+use shapes::{Evidence, Numbers, Shape, Verdict};
 
 use crate::SmoothJoins;
+use bearing::Bearing;
 pub use policy::{Kinds, UnknownKinds};
 use samples::OnRegion;
 
@@ -24,15 +26,25 @@ pub struct RegionKind {
     pub evidence: Evidence,
     /// What it rests on.
     pub basis: Basis,
+    /// The shape with its regularities, where it has any; the evidence is that of the samples
+    /// alone.
+    pub adjusted: Option<Box<Adjusted>>,
 }
 
 impl RegionKind {
-    /// The shape, where it is one.
+    /// The shape, where it is one: with its regularities, if any were looked for.
     #[must_use]
     pub fn shape(&self) -> Option<Shape> {
-        match &self.evidence.verdict {
-            Verdict::Shape(fit) => Some(fit.shape),
-            Verdict::FreeForm | Verdict::Unknown => None,
+        self.told().map(|(shape, _)| shape)
+    }
+
+    /// The shape, as [`RegionKind::shape`] has it, and its numbers.
+    #[must_use]
+    pub fn told(&self) -> Option<(Shape, Numbers)> {
+        match (&self.evidence.verdict, &self.adjusted) {
+            (Verdict::Shape(_), Some(adjusted)) => Some((adjusted.shape, adjusted.numbers)),
+            (Verdict::Shape(fit), None) => Some((fit.shape, fit.numbers)),
+            (Verdict::FreeForm | Verdict::Unknown, _) => None,
         }
     }
 }
@@ -47,8 +59,13 @@ pub enum Basis {
     Nodes,
 }
 
-/// Decides for each region, in the order of their labels: by the samples where they are given,
-/// else by the nodes.
+/// The kinds of all regions, and what they rest on, in the order of their labels.
+pub(crate) struct Decided {
+    pub(crate) kinds: Vec<RegionKind>,
+    pub(crate) bearings: Vec<Bearing>,
+}
+
+/// Decides for each region: by the samples where they are given, else by the nodes.
 ///
 /// # Errors
 /// Cancelled.
@@ -58,7 +75,7 @@ pub(crate) fn kinds(
     samples: Option<&[OnRegion]>,
     smooth_joins: SmoothJoins,
     monitor: &dyn Monitor,
-) -> Result<Vec<RegionKind>, Cancelled> {
+) -> Result<Decided, Cancelled> {
     let (bearings, basis) = match samples {
         Some(samples) => {
             let all = bearing::of_samples(image, regions, samples);
@@ -75,13 +92,17 @@ pub(crate) fn kinds(
             label,
             evidence: bearing.decide(),
             basis,
+            adjusted: None,
         })
     });
     let decided: Vec<Result<RegionKind, Cancelled>> = decided.collect();
     let mut decided = decided.into_iter().collect::<Result<Vec<_>, _>>()?;
     if smooth_joins == SmoothJoins::Keep {
         // What lies beside a border may be of a surface that joins this one.
-        return Ok(decided);
+        return Ok(Decided {
+            kinds: decided,
+            bearings,
+        });
     }
     let shapes: Vec<Option<Shape>> = decided.iter().map(RegionKind::shape).collect();
     decided
@@ -94,5 +115,8 @@ pub(crate) fn kinds(
                 **fit = refined;
             }
         });
-    Ok(decided)
+    Ok(Decided {
+        kinds: decided,
+        bearings,
+    })
 }

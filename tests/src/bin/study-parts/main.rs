@@ -18,6 +18,7 @@ mod numbers;
 mod page;
 mod part;
 mod quality;
+mod regular;
 mod scan;
 mod surface;
 mod tables;
@@ -36,7 +37,7 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Parser;
 use deliverables::{CadOptions, write_iges, write_step};
 use jiff::Timestamp;
-use pipeline::SmoothJoins;
+use pipeline::{Regularize, RegularizeSettings, Settings, SmoothJoins};
 
 use crate::judge::Python;
 use crate::measure::{Measured, measure};
@@ -69,6 +70,9 @@ struct Options {
     /// Take regions apart at smooth joins, which the service does not do yet
     #[arg(long, conflicts_with = "write")]
     split: bool,
+    /// Give the shapes the regularities that they are likely to have
+    #[arg(long, conflicts_with = "write")]
+    regularize: bool,
     /// The first six parts only
     #[arg(long)]
     short: bool,
@@ -78,11 +82,13 @@ struct Options {
 }
 
 impl Options {
-    fn smooth_joins(&self) -> SmoothJoins {
+    /// What is done otherwise than the service does it.
+    fn change(&self, settings: &mut Settings) {
         if self.split {
-            SmoothJoins::Split
-        } else {
-            SmoothJoins::Keep
+            settings.smooth_joins = SmoothJoins::Split;
+        }
+        if self.regularize {
+            settings.regularize = Regularize::On(RegularizeSettings::default());
         }
     }
 }
@@ -144,6 +150,9 @@ fn run(options: &Options) -> Result<()> {
         return fs::write(PAGE, text).context(PAGE);
     }
     print!("{text}");
+    if options.regularize {
+        print!("{}", regular::regularities(&parts));
+    }
     Ok(())
 }
 
@@ -193,7 +202,7 @@ fn all(options: &Options, seeds: &[u64]) -> Result<(Vec<Measured>, Vec<Failed>)>
 
 fn one(options: &Options, seed: u64) -> Result<Measured> {
     let part = Part::read(&options.parts, seed)?;
-    let measured = measure(&part, options.smooth_joins())?;
+    let measured = measure(&part, |settings| options.change(settings))?;
     write_models(&options.models, &measured)?;
     Ok(measured)
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use anyhow::Result;
-use pipeline::{Outcome, SmoothJoins};
+use pipeline::{Outcome, RegionKind, Settings};
 use relief_tests::score::{MachineClass, Overlaps, TruthClass, classify};
 use shapes::Verdict;
 
@@ -95,12 +95,12 @@ impl Face {
 }
 
 /// Scans a part and holds what comes out against it.
-pub(crate) fn measure(part: &Part, smooth_joins: SmoothJoins) -> Result<Measured> {
+pub(crate) fn measure(part: &Part, change: impl Fn(&mut Settings)) -> Result<Measured> {
     let begun = Instant::now();
     let scan = scan(part)?;
     let scan_s = begun.elapsed().as_secs_f64();
     let begun = Instant::now();
-    let (image, outcome) = scan.process(smooth_joins)?;
+    let (image, outcome) = scan.process(change)?;
     let process_s = begun.elapsed().as_secs_f64();
 
     let truth = &scan.truth;
@@ -175,19 +175,18 @@ fn found(
     let is_most = |whole: usize| common as f64 >= SAME * whole as f64;
     let is_same = is_most(overlaps.truth_nodes(label)) && is_most(overlaps.machine_nodes(region));
     let mut kinds = outcome.kinds.iter();
-    let verdict = kinds
-        .find(|kind| kind.label.get() == region)
-        .map(|kind| &kind.evidence.verdict);
+    let own = kinds.find(|kind| kind.label.get() == region);
+    let verdict = own.map(|kind| &kind.evidence.verdict);
     let kind = match verdict {
         Some(Verdict::Shape(fit)) => Some(Kind::Of(fit.shape.family())),
         Some(Verdict::FreeForm) => Some(Kind::FreeForm),
         Some(Verdict::Unknown) | None => None,
     };
     let real = part.faces.get(face).copied().flatten();
-    let told = match (verdict, real) {
-        (Some(Verdict::Shape(fit)), Some(real)) if is_same => {
+    let told = match (own.and_then(RegionKind::told), real) {
+        (Some((shape, told)), Some(real)) if is_same => {
             let (readings, inner) = scan.readings_of(label, face);
-            numbers(fit, &real, &readings, &inner)
+            numbers(&shape, &told, &real, &readings, &inner)
         }
         _ => None,
     };

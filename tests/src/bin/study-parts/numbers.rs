@@ -1,7 +1,7 @@
 //! The numbers of a face found, beside the true ones and the bound on their errors.
 
 use nalgebra::Vector3;
-use shapes::{Fit, Shape};
+use shapes::{Numbers, Shape};
 
 use crate::bound::{Bound, Reading, bounds};
 use crate::surface::{Parameter, TrueSurface};
@@ -51,18 +51,19 @@ impl Told {
     }
 }
 
-/// Every number of a fit of the right family; `None` where the readings set no bound. `inner` are
+/// Every number of a shape of the right family; `None` where the readings set no bound. `inner` are
 /// those of the readings that lie deep within the face.
 pub(crate) fn numbers(
-    fit: &Fit,
+    shape: &Shape,
+    stated: &Numbers,
     real: &TrueSurface,
     readings: &[Reading],
     inner: &[Reading],
 ) -> Option<Vec<Number>> {
-    if fit.shape.family() != real.family {
+    if shape.family() != real.family {
         return None;
     }
-    let told = Told::of(&fit.shape);
+    let told = Told::of(shape);
     // Where a plane or an axis is told is the fit's to choose.
     let real = real.told_beside(&told.place_mm);
     let all = bounds(&real, readings)?;
@@ -72,7 +73,7 @@ pub(crate) fn numbers(
     let numbers = each.filter_map(|(k, (parameter, bound))| {
         let inner = inner.as_ref().and_then(|inner| inner.get(k));
         let wider = inner.map_or(f64::INFINITY, |inner| inner.deviation / bound.deviation);
-        let number = number(fit, &told, &real, parameter, bound)?;
+        let number = number(stated, &told, &real, parameter, bound)?;
         Some(Number {
             inner_bound: wider * number.bound,
             ..number
@@ -82,13 +83,12 @@ pub(crate) fn numbers(
 }
 
 fn number(
-    fit: &Fit,
+    stated: &Numbers,
     told: &Told,
     real: &TrueSurface,
     parameter: &Parameter,
     bound: Bound,
 ) -> Option<Number> {
-    let stated = &fit.numbers;
     let (name, error, stated, unit) = match parameter {
         Parameter::Lean(way) => {
             let found = told.direction?;
@@ -181,7 +181,7 @@ mod tests {
         ball.place_mm = Vector3::new(0.4, -0.3, 1.0);
         let (readings, samples) = scanned(&ball, 0.01);
         let fit = fit(Family::Sphere, &samples, 1.0).unwrap();
-        let found = numbers(&fit, &ball, &readings, &readings[..600]).unwrap();
+        let found = numbers(&fit.shape, &fit.numbers, &ball, &readings, &readings[..600]).unwrap();
         assert_eq!(found.len(), 4);
         for number in &found {
             assert!(number.inner_bound > number.bound);
@@ -193,7 +193,7 @@ mod tests {
         }
         // The same numbers against a surface that is a little smaller.
         ball.radius_mm -= 1.0;
-        let off = numbers(&fit, &ball, &readings, &readings[..600]).unwrap();
+        let off = numbers(&fit.shape, &fit.numbers, &ball, &readings, &readings[..600]).unwrap();
         assert!((off[0].error - found[0].error - 1.0).abs() < 1e-9);
         assert!(!off[0].is_covered());
     }
@@ -203,15 +203,35 @@ mod tests {
         let mut plane = surface(Family::Plane);
         let (readings, samples) = scanned(&plane, 0.01);
         let fit = fit(Family::Plane, &samples, 1.0).unwrap();
-        let before = numbers(&fit, &plane, &readings, &readings[..600]).unwrap();
+        let before = numbers(
+            &fit.shape,
+            &fit.numbers,
+            &plane,
+            &readings,
+            &readings[..600],
+        )
+        .unwrap();
         let lean = plane.parameters()[0];
         plane = plane.moved(lean, 0.1_f64.to_radians());
-        let after = numbers(&fit, &plane, &readings, &readings[..600]).unwrap();
+        let after = numbers(
+            &fit.shape,
+            &fit.numbers,
+            &plane,
+            &readings,
+            &readings[..600],
+        )
+        .unwrap();
         let leant = |n: &[Number]| libm::hypot(n[0].error, n[1].error);
         assert!(leant(&before) < 0.01);
         assert!((leant(&after) - 0.1).abs() < 0.01, "{after:?}");
         assert_eq!(
-            numbers(&fit, &surface(Family::Cone), &readings, &readings[..600]),
+            numbers(
+                &fit.shape,
+                &fit.numbers,
+                &surface(Family::Cone),
+                &readings,
+                &readings[..600]
+            ),
             None
         );
     }

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 use nalgebra::Vector3;
-use pipeline::{InMemory, Outcome, Settings, SmoothJoins, process_scan};
+use pipeline::{InMemory, Outcome, Settings, process_scan};
 use range_image::{Column, Lattice, RangeImage, Unmonitored};
 use relief_tests::columns::received;
 use relief_tests::scenes::Truth;
@@ -91,7 +91,7 @@ fn deviation_mm(noise_mm: f64, incidence_cos: f64, count_mm: f64) -> f64 {
 
 impl Scan {
     /// What the service would make of the columns.
-    pub(crate) fn process(&self, smooth_joins: SmoothJoins) -> Result<(RangeImage, Outcome)> {
+    pub(crate) fn process(&self, change: impl Fn(&mut Settings)) -> Result<(RangeImage, Outcome)> {
         let optics = &self.scanner.optics;
         let scan = InMemory {
             columns: &self.columns,
@@ -100,7 +100,7 @@ impl Scan {
         let mut settings = Settings::new(self.lattice.pitch_mm);
         // Parts are worked on at once.
         settings.regrid.threads = 1;
-        settings.smooth_joins = smooth_joins;
+        change(&mut settings);
         process_scan(&scan, &settings, &Unmonitored).context("the pipeline")
     }
 

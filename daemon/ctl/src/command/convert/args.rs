@@ -11,6 +11,7 @@ use pipeline::{Kinds, Method, Settings};
 use scan_files::Units;
 
 use crate::command::part::PartArgs;
+use crate::command::regularize::RegularizeArgs;
 use crate::failure::Failure;
 
 /// Turn a scan file into a CAD file or triangles, without a service
@@ -106,6 +107,8 @@ pub(crate) struct Args {
         hide_default_value = true
     )]
     organisation: String,
+    #[command(flatten)]
+    regularize: RegularizeArgs,
     #[command(flatten)]
     part: PartArgs,
 }
@@ -353,6 +356,7 @@ impl Args {
         if let Some(draws) = self.draws {
             settings.regrid.draws = draws;
         }
+        self.regularize.apply(&mut settings);
         self.part.apply(&mut settings);
         settings.regrid.threads = self.threads;
         settings

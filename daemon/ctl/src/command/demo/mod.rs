@@ -7,6 +7,8 @@ use std::path::PathBuf;
 
 pub(crate) use run::run;
 
+use super::regularize::RegularizeArgs;
+
 /// Scan a simulated part and turn it into a CAD file, to see how it all works
 ///
 /// A private service and a simulated scanner on a pseudo-terminal do what a real scanner
@@ -38,4 +40,6 @@ pub(crate) struct Args {
     /// Share of rays that bring no sample [default: 0.001]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     dropouts: Option<f64>,
+    #[command(flatten)]
+    regularize: RegularizeArgs,
 }

@@ -4,7 +4,7 @@ use std::future::Future;
 use std::path::{Path, PathBuf};
 
 use deliverables::{REPORT_NAME, Report};
-use relief_api::{Job, Scan, StartScan, path};
+use relief_api::{Job, Scan, SettingOverrides, StartScan, path};
 use serde::Serialize;
 use tokio::signal::unix::{SignalKind, signal};
 
@@ -62,11 +62,13 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
 
 async fn scan(args: &Args, client: &Client) -> Result<Told, Failure> {
     let events = client.events().await?;
+    let mut settings = SettingOverrides::from([("regrid.seed".to_owned(), args.seed.into())]);
+    args.regularize.add_to(&mut settings);
     let request = StartScan {
         name: name_of(&args.object),
         operator: "relief demo".into(),
         note: "simulated scanner".into(),
-        settings: [("regrid.seed".to_owned(), args.seed.into())].into(),
+        settings,
         ..StartScan::default()
     };
     let scan: Scan = client.post(path::SCANS, &request).await?;
