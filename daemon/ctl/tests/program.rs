@@ -102,42 +102,6 @@ fn a_scan_file_becomes_a_cad_file_a_report_and_pictures() {
 }
 
 #[test]
-fn a_conversion_leaves_a_page_in_the_form_that_its_ending_means() {
-    let directory = tempfile::tempdir().unwrap();
-    fs::write(directory.path().join("roof.xyz"), roof()).unwrap();
-    let run = |page: &str, more: &[&str]| {
-        let arguments = [
-            "convert",
-            "roof.xyz",
-            "--name",
-            "A <b> roof",
-            "--page",
-            page,
-        ];
-        relief(directory.path(), &[&arguments[..], more].concat())
-    };
-    let output = run("roof.html", &["--page", "roof.PDF"]);
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    let html = fs::read_to_string(directory.path().join("roof.html")).unwrap();
-    assert!(html.contains("<h1><bdi>A &lt;b&gt; roof</bdi></h1>"));
-    assert_eq!(html.matches("data:image/png;base64,").count(), 4);
-    let pdf = fs::read(directory.path().join("roof.PDF")).unwrap();
-    assert!(pdf.starts_with(b"%PDF-1.7"));
-    let output = run("roof.doc", &[]);
-    assert_eq!(output.status.code(), Some(2));
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(
-        told.contains("roof.doc names no form of a page; known: .html, .pdf"),
-        "{told}"
-    );
-    assert!(!directory.path().join("roof.doc").exists());
-}
-
-#[test]
 fn the_same_samples_give_the_same_bytes_whatever_the_threads() {
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join("roof.xyz"), roof()).unwrap();
