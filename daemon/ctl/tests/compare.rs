@@ -116,6 +116,10 @@ fn a_good_part_passes_and_a_dented_one_does_not() {
         "r.json",
         "--map",
         "m.png",
+        "--page",
+        "p.html",
+        "--page",
+        "p.pdf",
         "--lower-mm",
         "-0.03",
         "--upper-mm",
@@ -133,6 +137,13 @@ fn a_good_part_passes_and_a_dented_one_does_not() {
     let report: Value = serde_json::from_slice(&fs::read(at.join("r.json")).unwrap()).unwrap();
     assert_eq!(report["passed"], false);
     let region = &report["regions"][0];
+    let page = fs::read_to_string(at.join("p.html")).unwrap();
+    assert!(page.contains("Out of tolerance: ") && page.contains("data:image/png;base64,"));
+    for key in ["deviation_mm", "standard_error_mm", "area_mm2"] {
+        let value = region[key].as_f64().unwrap();
+        assert!(page.contains(&format!("<data value=\"{value}\">")), "{key}");
+    }
+    assert!(fs::read(at.join("p.pdf")).unwrap().starts_with(b"%PDF"));
     for (axis, place) in [(0, 12.0), (1, -14.0)] {
         let found = region["nominal_centre_mm"][axis].as_f64().unwrap();
         assert!((found - place).abs() < 2.0, "{region}");

@@ -1,5 +1,10 @@
 //! The page of a scan says what its report says, number by number.
 
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on is a test that has failed"
+)]
+
 use std::collections::BTreeMap;
 
 use deliverables::{

@@ -1,6 +1,11 @@
 //! What a page says is read back from both of its forms, by readers that share no code with the
 //! writers.
 
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on is a test that has failed"
+)]
+
 use lopdf::Document;
 use page::{
     Block, Chart, Column, Fact, Level, Line, Mark, Page, Picture, Section, Table, Verdict, to_html,

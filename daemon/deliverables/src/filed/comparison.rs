@@ -197,13 +197,13 @@ fn alignment(alignment: &AlignmentReport) -> Section {
     }
     if let Some(uncertainty) = alignment.translation_uncertainty_mm {
         facts.push(Fact::new(
-            "Uncertainty",
-            triple(uncertainty, 4).text(" mm, of the shift, k = 1"),
+            "Of the shift",
+            triple(uncertainty, 4).text(" mm, k = 1"),
         ));
     }
     if let Some(uncertainty) = alignment.rotation_uncertainty_deg {
-        let line = triple(uncertainty, 4).text("\u{b0}, of the turning, k = 1");
-        facts.push(Fact::new("And", line));
+        let line = triple(uncertainty, 4).text("\u{b0}, k = 1");
+        facts.push(Fact::new("Of turning", line));
     }
     for free in &alignment.free {
         let line = Line::new()
