@@ -54,7 +54,9 @@ fn on() -> Regularize {
 }
 
 fn made(columns: &[Column], settings: &Settings) -> Outcome {
-    process_columns(columns, settings, &Unmonitored).unwrap().1
+    process_columns(columns, settings, &Unmonitored)
+        .expect("a roof has faces")
+        .1
 }
 
 fn normals(outcome: &Outcome) -> Vec<nalgebra::Vector3<f64>> {
