@@ -156,3 +156,59 @@ fn size_mm(bearings: &[Bearing]) -> f64 {
     }
     (high - low).norm()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::num::NonZeroU16;
+    use shapes::{Family, Sample, Shape, decide, fit};
+
+    #[test]
+    fn samples_refuse_a_shape_that_they_are_off() {
+        let chance = |k: f64| {
+            let chance = libm::sin(k * 12.9898) * 43758.5453;
+            (chance - chance.floor() - 0.5) * 12.0_f64.sqrt()
+        };
+        let samples: Vec<Sample> = (0..900)
+            .map(|k| Sample {
+                point_mm: Vector3::new(
+                    f64::from(k % 30),
+                    f64::from(k / 30),
+                    0.02 * chance(f64::from(k)),
+                ),
+                ray: Vector3::z(),
+                sigma_mm: 0.02,
+            })
+            .collect();
+        let found = fit(Family::Plane, &samples, 1.0).unwrap();
+        let kinds = [RegionKind {
+            label: NonZeroU16::MIN,
+            evidence: decide(&samples, 1.0),
+            basis: Basis::Samples,
+            adjusted: None,
+        }];
+        let bearings = [Bearing {
+            samples,
+            area: 1.0,
+            beside: Vec::new(),
+        }];
+        let is_borne = |deviations: f64| {
+            let Shape::Plane(mut plane) = found.shape else {
+                panic!("{:?}", found.shape);
+            };
+            plane.point_mm.z += deviations * found.numbers.place_mm.most();
+            let adjusted = Adjusted {
+                label: 1,
+                shape: Shape::Plane(plane),
+                numbers: found.numbers,
+                joint: *found.joint(),
+                turned_rad: 0.0,
+                moved_mm: 0.0,
+            };
+            is_borne(&kinds, &bearings, &adjusted, survival(9.0, 1))
+        };
+        assert!(is_borne(0.0) && is_borne(2.5));
+        assert!(!is_borne(4.5) && !is_borne(-4.5));
+        assert_eq!(size_mm(&bearings).round(), 41.0);
+    }
+}

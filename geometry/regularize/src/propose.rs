@@ -208,7 +208,7 @@ impl State {
         let [balls, rings, _] = self.sizes();
         let mut rules = Vec::new();
         for sizes in [balls, rings] {
-            for size in self.unlike(&sizes, |a, b| Rule::SameSize(a, b)) {
+            for size in self.unlike(&sizes, Rule::SameSize) {
                 let (shape, index) = size;
                 let own = self.told(shape).sizes[index];
                 rules.extend(grid_mm.nearest(own).map(|target| Rule::Round(size, target)));
@@ -218,9 +218,9 @@ impl State {
             (0..self.count()).filter(|shape| is(*shape)).collect()
         };
         let planes = of(&|shape| self.family(shape) == Family::Plane);
-        let planes = self.unlike(&planes, |a, b| Rule::Coplanar(a, b));
+        let planes = self.unlike(&planes, Rule::Coplanar);
         let axes = of(&|shape| self.has_axis(shape));
-        let axes = self.unlike(&axes, |a, b| Rule::Coaxial(a, b));
+        let axes = self.unlike(&axes, Rule::Coaxial);
         let is_parallel = |a: usize, b: usize| self.is(&Rule::Aligned(a, b));
         for (k, a) in planes.iter().enumerate() {
             for b in planes[k + 1..].iter().filter(|b| is_parallel(*a, **b)) {
@@ -255,7 +255,7 @@ impl State {
     pub(crate) fn round_angles(&self, grid_deg: Grid) -> Proposals {
         let [_, _, angles] = self.sizes();
         let mut rules = Vec::new();
-        for size in self.unlike(&angles, |a, b| Rule::SameSize(a, b)) {
+        for size in self.unlike(&angles, Rule::SameSize) {
             let own = self.told(size.0).sizes[size.1].to_degrees();
             let target = grid_deg.nearest(own).map(f64::to_radians);
             rules.extend(target.map(|target| Rule::Round(size, target)));

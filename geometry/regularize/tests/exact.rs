@@ -6,6 +6,7 @@ mod common;
 
 use common::{
     Chance, Known, SIZE_MM, WELL, after, cone, cylinder, direction, fitted, found, plane, sphere,
+    torus,
 };
 use nalgebra::{Matrix2, Vector2, Vector3};
 use regularize::{Fitted, Kind, Reason, Round, Settings, Target, regularize};
@@ -308,6 +309,7 @@ fn part(seed: u64) -> Vec<Fitted> {
         cylinder(z, at(-17.0, 10.0, 2.0), 5.5),
         sphere(at(10.0, 10.0, 25.0), 12.0),
         cone(z, at(-17.0, 10.0, 20.0), 45.0),
+        torus(z, at(-17.0, 10.0, 6.0), 14.357, 5.5),
     ];
     let each = shapes.iter().zip(1..);
     each.map(|(shape, label)| chance.measured(label, shape, WELL))
@@ -339,6 +341,20 @@ fn the_order_of_the_shapes_does_not_matter() {
 }
 
 #[test]
+fn a_ring_about_a_bore_is_coaxial_and_its_tube_as_wide() {
+    let mut found_all = 0;
+    for seed in 1..=20 {
+        let found = found(&part(seed));
+        let has = |kind: Kind, labels: &[u16]| {
+            let mut all = found.accepted.iter().filter(|own| own.kind == kind);
+            all.any(|own| labels.iter().any(|label| own.labels.contains(label)))
+        };
+        found_all += usize::from(has(Kind::Coaxial, &[10]) && has(Kind::EqualRadii, &[10]));
+    }
+    assert!(found_all >= 18, "{found_all}");
+}
+
+#[test]
 fn parts_of_all_sizes_are_treated_alike() {
     let shapes = part(3);
     let count = |factor: f64| {
@@ -357,7 +373,11 @@ fn parts_of_all_sizes_are_treated_alike() {
                         c.radius_mm *= factor;
                     }
                     Shape::Cone(c) => c.apex_mm *= factor,
-                    Shape::Torus(_) => {}
+                    Shape::Torus(t) => {
+                        t.centre_mm *= factor;
+                        t.radius_mm *= factor;
+                        t.tube_mm *= factor;
+                    }
                 }
                 for i in 3..8 {
                     for j in 3..8 {

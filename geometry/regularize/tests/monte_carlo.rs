@@ -83,7 +83,7 @@ fn the_regularities_of_a_block_are_found_and_make_it_truer() {
         let is_whole = directions.iter().enumerate().all(|(k, a)| {
             directions[k + 1..].iter().all(|b| {
                 let cos = a.dot(b).abs();
-                cos < 1e-8 || cos > 1.0 - 1e-12
+                !(1e-8..=1.0 - 1e-12).contains(&cos)
             })
         });
         whole += usize::from(is_whole);

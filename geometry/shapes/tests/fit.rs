@@ -163,3 +163,47 @@ fn what_is_too_flat_or_too_little_is_of_no_such_family() {
     assert!(fit(Family::Plane, &exact, 1.0).is_some());
     assert!(fit(Family::Cylinder, &exact, 1.0).is_none());
 }
+
+/// What is told of the numbers one by one is in their joint covariance, and what they have in
+/// common: a ball's top is known far better than its centre and its radius are.
+#[test]
+fn numbers_have_in_common_what_their_errors_have() {
+    const SEEDS: u64 = 120;
+    for case in cases() {
+        let mut pulls = Vec::new();
+        for seed in 0..SEEDS {
+            let found = fitted(&case, 400, seed + 700);
+            let (joint, n) = (found.joint(), &found.numbers);
+            assert!((joint - joint.transpose()).norm() <= 1e-12 * joint.norm());
+            if let Some(direction) = n.direction_rad {
+                let apart = joint.fixed_view::<3, 3>(0, 0) - direction.covariance;
+                assert!(apart.norm() <= 1e-9 * direction.covariance.norm());
+            }
+            let sizes = [n.radius_mm, n.tube_mm, n.half_angle_rad];
+            for (k, size) in sizes.into_iter().enumerate() {
+                let deviation = size.map_or(0.0, |size| size.deviation);
+                assert!(
+                    (joint[(6 + k, 6 + k)].sqrt() - deviation).abs() <= 1e-9 * (1.0 + deviation)
+                );
+            }
+            let (Shape::Sphere(real), Shape::Sphere(ball)) = (&case.0, &found.shape) else {
+                continue;
+            };
+            let sense = if ball.is_hollow { -1.0 } else { 1.0 };
+            let top = |centre: Vector3<f64>, radius: f64| centre.z + sense * radius;
+            let off = top(ball.centre_mm, ball.radius_mm) - top(real.centre_mm, real.radius_mm);
+            let variance = joint[(5, 5)] + joint[(6, 6)] + 2.0 * sense * joint[(5, 6)];
+            assert!(
+                variance < 0.2 * joint[(5, 5)],
+                "{variance} {}",
+                joint[(5, 5)]
+            );
+            pulls.push(off / variance.sqrt());
+        }
+        if !pulls.is_empty() {
+            let squares = pulls.iter().map(|pull| pull * pull).sum::<f64>();
+            let rms = (squares / pulls.len() as f64).sqrt();
+            assert!((0.8..1.2).contains(&rms), "{rms}");
+        }
+    }
+}

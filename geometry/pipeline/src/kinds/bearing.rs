@@ -29,7 +29,7 @@ pub(crate) struct Bearing {
     pub(crate) area: f64,
     /// Samples near the border, those together that lie beside the same neighbour, as deep, with
     /// its label. They may be the neighbour's.
-    pub(super) beside: Vec<(u16, Vec<Sample>)>,
+    pub(crate) beside: Vec<(u16, Vec<Sample>)>,
 }
 
 impl Bearing {

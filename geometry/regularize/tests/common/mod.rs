@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use regularize::{Fitted, Regularized, Settings, regularize};
-use shapes::{Cone, Cylinder, Joint, Plane, Shape, Sphere};
+use shapes::{Cone, Cylinder, Joint, Plane, Shape, Sphere, Torus};
 
 /// Size of all parts here.
 pub(crate) const SIZE_MM: f64 = 100.0;
@@ -88,7 +88,13 @@ impl Chance {
                 cone.axis.normalize_mut();
                 cone.half_angle_rad += self.normal() * known.turn_rad;
             }
-            Shape::Torus(_) => unimplemented!("no torus is measured here"),
+            Shape::Torus(torus) => {
+                torus.centre_mm += all(self);
+                torus.axis += self.across(&torus.axis, known.turn_rad);
+                torus.axis.normalize_mut();
+                torus.radius_mm += self.normal() * known.size;
+                torus.tube_mm += self.normal() * known.size;
+            }
         }
         fitted(label, shape, known)
     }
@@ -157,9 +163,24 @@ pub(crate) fn cone(axis: Vector3<f64>, apex_mm: Vector3<f64>, half_angle_deg: f6
     })
 }
 
+pub(crate) fn torus(
+    axis: Vector3<f64>,
+    centre_mm: Vector3<f64>,
+    radius_mm: f64,
+    tube_mm: f64,
+) -> Shape {
+    Shape::Torus(Torus {
+        centre_mm,
+        axis: axis.normalize(),
+        radius_mm,
+        tube_mm,
+        is_hollow: false,
+    })
+}
+
 /// As [`regularize`], with the settings by default.
 pub(crate) fn found(shapes: &[Fitted]) -> Regularized {
-    regularize(shapes, SIZE_MM, &Settings::default()).unwrap()
+    regularize(shapes, SIZE_MM, &Settings::default()).expect("they are within their limits")
 }
 
 /// Direction of a plane or an axis.

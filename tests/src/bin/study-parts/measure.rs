@@ -13,6 +13,7 @@ use crate::grid::{self, Deviation, Matched, OnGrid};
 use crate::numbers::{Number, numbers};
 use crate::part::{Kind, Part};
 use crate::scan::{Scan, scan};
+use crate::surface::TrueSurface;
 use crate::trims::Trims;
 use crate::truth_grid::{Mask, TruthGrid};
 
@@ -39,6 +40,8 @@ pub(crate) struct Measured {
     pub(crate) scan_s: f64,
     pub(crate) process_s: f64,
     pub(crate) outcome: Outcome,
+    /// Of each region, the true face that it stands for, where that is of one of the families.
+    pub(crate) true_of_region: BTreeMap<u16, TrueSurface>,
 }
 
 impl Measured {
@@ -146,6 +149,10 @@ pub(crate) fn measure(part: &Part, change: impl Fn(&mut Settings)) -> Result<Mea
     let noise = classes.machine.iter().filter(|(label, class)| {
         **class == MachineClass::Noise && overlaps.machine_nodes(**label) >= LEAST_NODES
     });
+    let faces_of = matched.face_of_region.iter();
+    let true_of_region = faces_of
+        .filter_map(|(region, face)| Some((*region, part.faces.get(*face).copied().flatten()?)))
+        .collect();
     Ok(Measured {
         seed: part.seed,
         name: part.name.clone(),
@@ -159,6 +166,7 @@ pub(crate) fn measure(part: &Part, change: impl Fn(&mut Settings)) -> Result<Mea
         scan_s,
         process_s,
         outcome,
+        true_of_region,
     })
 }
 
