@@ -108,14 +108,14 @@ mod tests {
 
     #[test]
     fn the_other_way_is_the_same_curve() {
-        let knots = KnotVector::new(2, vec![0.3, 0.3, 0.3, 0.4, 1.1, 1.1, 1.1]).unwrap();
+        let knots = KnotVector::new(2, vec![0.25, 0.25, 0.25, 0.5, 1.25, 1.25, 1.25]).unwrap();
         let points = vec![[0.0, 1.0], [1.0, 3.0], [2.0, -1.0], [5.0, 0.0]];
         let curve = BSplineCurve::new(knots, points).unwrap();
         let back = curve.reversed();
-        assert_eq!(back.knots().domain(), (0.3, 1.1));
+        assert_eq!(back.knots().domain(), (0.25, 1.25));
         for k in 0..=20 {
-            let t = 0.3 + 0.04 * f64::from(k);
-            let (p, q) = (curve.evaluate(t), back.evaluate(0.3 + (1.1 - t)));
+            let t = 0.25 + 0.05 * f64::from(k);
+            let (p, q) = (curve.evaluate(t), back.evaluate(1.5 - t));
             assert!((p[0] - q[0]).abs() < 1e-12 && (p[1] - q[1]).abs() < 1e-12);
         }
         assert_eq!(back.reversed(), curve);
