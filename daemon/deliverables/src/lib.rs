@@ -30,8 +30,8 @@ pub use file::{hexadecimal, sha256_of, write_atomically};
 pub use filed::{PageFormat, PageFormats, comparison_page, scan_page};
 pub use manifest::{MANIFEST_NAME, Manifest, ManifestFile};
 pub use meshes::{
-    MeasuredPoints, MeshFormat, MeshOptions, PointFormat, mesh_report, triangles, write_measured,
-    write_triangles,
+    MeasuredPoints, MeshFormat, MeshOptions, PointFormat, TrianglesError, mesh_report, triangles,
+    write_measured, write_triangles,
 };
 pub use page::Page;
 pub use report::{MeshReport, Report, ScanReport};

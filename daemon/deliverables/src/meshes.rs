@@ -11,7 +11,7 @@ use pipeline::{Columns, ReadAgainError};
 use range_image::Monitor;
 use reconstruct::Model;
 use storage::{Disk, remove_file_if_there};
-use tessellate::{Mesh, SettingsError, TessellateError, TessellateSettings, tessellate};
+use tessellate::{Accuracy, Mesh, SettingsError, TessellateError, TessellateSettings, tessellate};
 
 pub use mesh_files::{MeshFormat, PointFormat};
 
@@ -90,20 +90,56 @@ impl Points for MeasuredPoints<'_> {
     }
 }
 
+/// Tolerances, beyond what seams are apart, by which triangles may lie off: those that bridge the
+/// steep walls of a rough surface lie farther off, and cover too much.
+const FAR: f64 = 10.0;
+
+/// Why there are no triangles to be delivered.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TrianglesError {
+    /// None were made.
+    #[error(transparent)]
+    Tessellate(#[from] TessellateError),
+    /// They are not what the model is.
+    #[error(
+        "triangles would lie {off_mm:.3} mm off the model, where {tolerance_mm} mm are asked for: \
+         some of its faces are too steep and rough for them; the IGES and STEP files have all of it"
+    )]
+    TooFar {
+        /// How far the farthest would lie off.
+        off_mm: f64,
+        /// What was asked for.
+        tolerance_mm: f64,
+    },
+}
+
 /// The triangles of a model.
 ///
 /// # Errors
-/// As [`tessellate`].
+/// As [`tessellate`]; [`TrianglesError::TooFar`] where they lie farther off than ten tolerances.
 pub fn triangles(
     model: &Model,
     tolerance_mm: f64,
     monitor: &dyn Monitor,
-) -> Result<Mesh, TessellateError> {
+) -> Result<Mesh, TrianglesError> {
     let options = MeshOptions {
         tolerance_mm,
         ..MeshOptions::default()
     };
-    tessellate(model, &options.settings(), monitor)
+    let mesh = tessellate(model, &options.settings(), monitor)?;
+    near_enough(mesh.accuracy, tolerance_mm)?;
+    Ok(mesh)
+}
+
+fn near_enough(accuracy: Accuracy, tolerance_mm: f64) -> Result<(), TrianglesError> {
+    let off_mm = accuracy.surface_mm;
+    if off_mm > FAR * tolerance_mm + accuracy.seam_mm {
+        return Err(TrianglesError::TooFar {
+            off_mm,
+            tolerance_mm,
+        });
+    }
+    Ok(())
 }
 
 /// What the report says of triangles.
@@ -236,7 +272,7 @@ pub(crate) fn write_extras(
     };
     if !wanted.meshes.is_empty() {
         let model = &inputs.outcome.reconstruction.model;
-        match tessellate(model, &wanted.settings(), monitor) {
+        match triangles(model, wanted.tolerance_mm, monitor) {
             Ok(mesh) => {
                 written.mesh = Some(mesh_report(&mesh));
                 for &format in &wanted.meshes {
@@ -246,7 +282,9 @@ pub(crate) fn write_extras(
                     })?;
                 }
             }
-            Err(TessellateError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Err(TrianglesError::Tessellate(TessellateError::Cancelled(cancelled))) => {
+                return Err(cancelled.into());
+            }
             Err(error) => written
                 .warnings
                 .push(format!("the files of triangles were left out: {error}")),
@@ -278,6 +316,22 @@ impl DeliverError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn triangles_that_bridge_walls_are_refused() {
+        let accuracy = |surface_mm, seam_mm| Accuracy {
+            surface_mm,
+            seam_mm,
+        };
+        assert_eq!(near_enough(accuracy(0.012, 0.0), 0.01), Ok(()));
+        assert_eq!(near_enough(accuracy(0.12, 0.025), 0.01), Ok(()));
+        let refused = near_enough(accuracy(1.577, 0.025), 0.01);
+        let told = refused.map_err(|error| error.to_string()).unwrap_err();
+        assert!(
+            told.contains("1.577 mm off the model, where 0.01 mm"),
+            "{told}"
+        );
+    }
 
     #[test]
     fn identifiers_have_the_usual_form() {
