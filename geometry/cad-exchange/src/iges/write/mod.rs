@@ -90,15 +90,12 @@ pub fn write(
     let resolution_mm = (gap_mm + shared_mm).max(options.resolution_mm);
     let mut sheet = Sheet::default();
     let colours = Colours::define(&mut sheet, model, options)?;
+    let looks = (&colours, options);
     match &shared {
         Some(brep) if options.entities == Entities::Boundary => {
-            let looks = (&colours, options);
             shell::shells(&mut sheet, model, brep, looks, resolution_mm)?;
         }
-        _ => {
-            let looks = (&colours, options);
-            trimmed_surfaces(&mut sheet, model, shared.as_ref(), looks, resolution_mm)?;
-        }
+        shared => trimmed_surfaces(&mut sheet, model, shared.as_ref(), looks, resolution_mm)?,
     }
     let what = match options.entities {
         Entities::Boundary => "shells of faces",
