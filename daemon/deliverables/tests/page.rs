@@ -222,7 +222,7 @@ fn every_number_of_the_page_is_the_reports() {
         .collect();
     assert_eq!(headings[0], "Warnings");
     let chosen: String = all(&read, "#settings tbody tr")[0].text().collect();
-    assert_eq!(chosen, "segment.minimum_nodes4050");
+    assert_eq!(chosen, "segment.minimum_nodes4025");
     assert_eq!(all(&read, "img").len(), 4);
     assert!(
         all(&read, "img")

@@ -53,7 +53,7 @@ impl Default for SegmentSettings {
             clusters: 20,
             crease_angle_rad: 0.1,
             step_factor: 1.0,
-            minimum_nodes: 50,
+            minimum_nodes: 25,
             minimum_area_mm2: 0.0,
             seed: 0,
         }
