@@ -39,7 +39,7 @@ pub(crate) fn lines(report: &Report) -> Vec<String> {
     let lengths = &model.edge_lengths;
     if lengths.measured_mm + lengths.intersected_mm + lengths.assumed_mm > 0.0 {
         lines.push(format!(
-            "edges        {:.0} mm of outlines told by samples, {:.0} mm where faces intersect, {:.0} mm \
+            "edges        {:.0} mm told by samples, {:.0} mm where faces intersect, {:.0} mm \
              assumed ({:.0} %)",
             lengths.measured_mm,
             lengths.intersected_mm,

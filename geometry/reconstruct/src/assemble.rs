@@ -4,7 +4,9 @@ use nurbs::{PatchSurface, PiecewiseCubic};
 use range_image::RangeImage;
 use shapes::Shape;
 
+use crate::border::cracks::{Chain, CrackMap};
 use crate::border::map::{MapEdge, PlanarMap};
+use crate::border::path::polyline;
 use crate::fit::Domain;
 use crate::lift::lift;
 use crate::model::{
@@ -111,11 +113,32 @@ pub(crate) fn kinds(map: &PlanarMap, carriers: &[Carrier], placement: Placement)
     let kind = |edge: &MapEdge| match (side(edge.sides[0]), side(edge.sides[1])) {
         (Some(a), Some(b)) => {
             let path = placement.path_to_mm(&edge.path);
-            kind_between(a, b, &path, placement.pitch_mm)
+            let sides = [a, b].map(|carrier| (&carrier.surface, carrier.rms_mm));
+            kind_between(sides, &path, placement.pitch_mm)
         }
         _ => EdgeKind::Silhouette,
     };
     map.edges.iter().map(kind).collect()
+}
+
+/// Which of the traced borders are steps between two surfaces; `sides[k]` belongs to piece
+/// `k + 1`, as [`kind_between`] has them. Those in `placed` are creases.
+pub(crate) fn steps(
+    cracks: &CrackMap,
+    placed: &[Option<Vec<[f64; 2]>>],
+    sides: &[(&PatchSurface, f64)],
+    placement: Placement,
+) -> Vec<bool> {
+    let side = |piece: u32| sides.get((piece as usize).checked_sub(1)?).copied();
+    let is_step = |chain: &Chain| {
+        let sides = [side(chain.left)?, side(chain.right)?];
+        let path = placement.path_to_mm(&polyline(&chain.middles)?);
+        Some(kind_between(sides, &path, placement.pitch_mm) == EdgeKind::Step)
+    };
+    let chains = cracks.chains.iter().zip(placed);
+    chains
+        .map(|(chain, placed)| placed.is_none() && is_step(chain) == Some(true))
+        .collect()
 }
 
 /// Joins the map and the surfaces; `carriers[k]` belongs to piece `k + 1`, and `kinds` and
@@ -204,7 +227,14 @@ pub(crate) fn model(
 /// A step where the two surfaces part by more than their residuals explain, and more
 /// than a border off by a pitch would make of their different slopes. Each surface is
 /// judged a little inside its own face, where its data are, and carried on from there.
-fn kind_between(a: &Carrier, b: &Carrier, path: &PiecewiseCubic<2>, pitch_mm: f64) -> EdgeKind {
+///
+/// `sides` are the surfaces on the left and on the right, with the root mean squares of their
+/// residuals in millimetres.
+fn kind_between(
+    sides: [(&PatchSurface, f64); 2],
+    path: &PiecewiseCubic<2>,
+    pitch_mm: f64,
+) -> EdgeKind {
     let (first, last) = path.domain();
     let (mut gaps, mut bends) = (Vec::new(), Vec::new());
     for k in 0..PROBES {
@@ -218,11 +248,11 @@ fn kind_between(a: &Carrier, b: &Carrier, path: &PiecewiseCubic<2>, pitch_mm: f6
             let slope = [surface.z_partial(x, y, 1, 0), surface.z_partial(x, y, 0, 1)];
             (surface.z(x, y) - side * dot(slope, step), slope)
         };
-        let ((z_left, left), (z_right, right)) = (seen(&a.surface, 1.0), seen(&b.surface, -1.0));
+        let ((z_left, left), (z_right, right)) = (seen(sides[0].0, 1.0), seen(sides[1].0, -1.0));
         gaps.push(z_left - z_right);
         bends.push(norm(minus(left, right)));
     }
-    let noise = STEP_SIGMAS * (a.rms_mm * a.rms_mm + b.rms_mm * b.rms_mm).sqrt();
+    let noise = STEP_SIGMAS * norm(sides.map(|side| side.1));
     let explained = noise + pitch_mm * (median(&mut bends) + LEAST_BEND);
     if median(&mut gaps).abs() > explained {
         EdgeKind::Step
@@ -234,4 +264,40 @@ fn kind_between(a: &Carrier, b: &Carrier, path: &PiecewiseCubic<2>, pitch_mm: f6
 fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::meeting::testing::{PLACEMENT, plane};
+
+    #[test]
+    fn steps_are_borders_where_z_jumps() {
+        let chain = |left: u32, right: u32| Chain {
+            left,
+            right,
+            middles: (0..20).map(|k| [f64::from(k), 20.5]).collect(),
+            ends: Some((0, 1)),
+        };
+        let cracks = CrackMap {
+            chains: vec![chain(1, 2), chain(2, 1), chain(1, 3), chain(1, 0)],
+            ..CrackMap::default()
+        };
+        // The first is 5 mm above the second all along, and meets the third on the border.
+        let surfaces = [
+            plane(5.0, 0.0, 0.1),
+            plane(0.0, 0.0, 0.1),
+            plane(5.0, 0.0, 0.5),
+        ];
+        let placed = vec![None; 4];
+        let found = |rms_mm: f64| {
+            let sides: Vec<_> = surfaces.iter().map(|s| (s, rms_mm)).collect();
+            steps(&cracks, &placed, &sides, PLACEMENT)
+        };
+        assert_eq!(found(0.02), [true, true, false, false]);
+        // What the residuals explain is none.
+        assert_eq!(found(2.0), [false; 4]);
+        // By the letter of the paper there are no surfaces yet.
+        assert_eq!(steps(&cracks, &placed, &[], PLACEMENT), [false; 4]);
+    }
 }

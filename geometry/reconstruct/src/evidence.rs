@@ -7,7 +7,8 @@ use shapes::Shape;
 pub struct Evidence<'a> {
     /// The shape of a region, by label from 1 on, where one is known.
     pub shapes: &'a [Option<Shape>],
-    /// The samples beside the outlines, which tell better than nodes where those run.
+    /// The samples beside the outlines of regions, which tell better than nodes where those and
+    /// the steps between regions run.
     pub outline_samples: &'a [OutlineSample],
 }
 

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use shapes::Shape;
 
 use crate::accept::is_as_good;
-use crate::account::{Freedom, tally};
-use crate::assemble::{Carrier, Placement, domains, kinds, model};
+use crate::account::{Freedom, residuals, tally};
+use crate::assemble::{Carrier, Placement, domains, kinds, model, steps};
 use crate::border::cracks::trace;
 use crate::border::intersection::intersections;
 use crate::border::map::{BorderSettings, PlanarMap, build};
@@ -190,7 +190,12 @@ impl<'a> Fitted<'a> {
         let cracks = trace(&self.pieces);
         let placed = intersections(&cracks, &self.surfaces, placement);
         monitor.progress(0.4);
+        let fitted = self.surfaces.iter().zip(&self.nodes);
+        let sides: Vec<(&PatchSurface, f64)> = fitted
+            .map(|(surface, nodes)| (surface, residuals(image, nodes, surface).0))
+            .collect();
         let outlines = Outlines {
+            steps: steps(&cracks, &placed, &sides, placement),
             samples: evidence
                 .outline_samples
                 .iter()

@@ -1,4 +1,4 @@
-//! The paths of outlines, with the samples beside each.
+//! The paths of outlines and steps, with the samples beside each.
 
 use std::collections::BTreeMap;
 
@@ -10,6 +10,7 @@ use super::course::Course;
 use super::deflect::Drawn;
 use super::search::{Likely, NEAR, Search};
 use super::settle::{Outlines, Placed};
+use crate::evidence::Seen;
 use crate::polygon::{dot, minus, norm};
 
 /// Samples nearer than this to an end of their path are of no use: they may as well lie beside
@@ -38,6 +39,8 @@ pub(super) struct Beside {
     /// It stays where it was drawn. Its samples are its own all the same.
     as_drawn: bool,
     region: u16,
+    /// The region on the other side, where the path is a step down or up to one.
+    beyond: Option<u16>,
     /// 1 where the region lies to the left.
     pub(super) side: f64,
     samples: Vec<Placed>,
@@ -59,7 +62,7 @@ pub(super) struct Settled {
 #[derive(Debug, Default)]
 pub(crate) struct Memory(BTreeMap<Vec<u64>, Vec<Settled>>);
 
-/// The paths of all outlines in their order, with the samples that are nearest to each.
+/// The paths of all outlines and steps in their order, with the samples that are nearest to each.
 ///
 /// # Errors
 /// Cancelled.
@@ -70,18 +73,21 @@ pub(super) fn with_samples(
 ) -> Result<Vec<Beside>, Cancelled> {
     let mut all = Vec::new();
     for (border, drawn) in borders.iter().enumerate() {
-        let (piece, side) = match (drawn.chain.left, drawn.chain.right) {
-            (piece, 0) if piece != 0 => (piece, 1.0),
-            (0, piece) if piece != 0 => (piece, -1.0),
-            _ => continue,
+        let region = |piece: u32| {
+            let piece = (piece as usize).checked_sub(1)?;
+            outlines.regions.get(piece).copied()
         };
-        let Some(&region) = outlines.regions.get(piece as usize - 1) else {
-            continue;
+        let (region, beyond, side) = match (region(drawn.chain.left), region(drawn.chain.right)) {
+            (Some(region), None) => (region, None, 1.0),
+            (None, Some(region)) => (region, None, -1.0),
+            (Some(left), Some(right)) if drawn.is_step && left != right => (left, Some(right), 1.0),
+            _ => continue,
         };
         for curve in drawn.paths.as_deref().into_iter().flatten() {
             let is_closed = drawn.chain.ends.is_none();
             let mut beside = Beside::new(border, curve.clone(), is_closed, region, side);
             beside.as_drawn = drawn.as_drawn;
+            beside.beyond = beyond;
             all.push(beside);
         }
     }
@@ -170,6 +176,7 @@ impl Beside {
             curve,
             course,
             region,
+            beyond: None,
             side,
             samples: Vec::new(),
         }
@@ -182,6 +189,22 @@ impl Beside {
             side: self.side,
             found,
         }
+    }
+
+    /// A sample as it tells of the path. At a step those of the region beyond are where this one
+    /// has none. What is missing there tells nothing: the upper surface hides some of the lower.
+    fn seen(&self, sample: &Placed) -> Option<Placed> {
+        if self.beyond.is_none() {
+            return Some(*sample);
+        }
+        let is_own = sample.region == self.region;
+        let seen = match sample.seen {
+            Seen::Present if is_own => Seen::Present,
+            Seen::Present => Seen::Missing,
+            Seen::Lost if is_own => Seen::Lost,
+            Seen::Lost | Seen::Missing => return None,
+        };
+        Some(Placed { seen, ..*sample })
     }
 
     /// All that matters for where it is found to be.
@@ -249,6 +272,7 @@ impl Beside {
             first.side,
         );
         whole.as_drawn = first.as_drawn;
+        whole.beyond = first.beyond;
         whole.samples = run.iter().flat_map(|b| &b.samples).copied().collect();
         whole
     }
@@ -275,9 +299,11 @@ impl Cells {
                     Self::cell(low)..=Self::cell(high)
                 };
                 for (x, y) in range(0).flat_map(|x| range(1).map(move |y| (x, y))) {
-                    let paths = cells.entry((beside.region, [x, y])).or_default();
-                    if paths.last() != Some(&k) {
-                        paths.push(k);
+                    for region in core::iter::once(beside.region).chain(beside.beyond) {
+                        let paths = cells.entry((region, [x, y])).or_default();
+                        if paths.last() != Some(&k) {
+                            paths.push(k);
+                        }
                     }
                 }
             }
@@ -321,7 +347,7 @@ fn note(all: &mut [Beside], cells: &Cells, sample: &Placed) {
     let Some((_, k, at)) = best else { return };
     let (first, last) = all[k].curve.domain();
     if at - first > END && last - at > END {
-        all[k].samples.push(*sample);
+        all[k].samples.extend(all[k].seen(sample));
     }
 }
 
@@ -329,7 +355,6 @@ fn note(all: &mut [Beside], cells: &Cells, sample: &Placed) {
 mod tests {
     use super::super::deflect::Deflection;
     use super::*;
-    use crate::evidence::Seen;
     use range_image::Unmonitored;
 
     #[test]

@@ -26,6 +26,14 @@ pub(crate) struct Drawn<'a> {
     pub(crate) paths: Option<&'a mut Vec<PiecewiseCubic<2>>>,
     /// Samples are not asked where it runs.
     pub(crate) as_drawn: bool,
+    /// z jumps there from one surface to another.
+    pub(crate) is_step: bool,
+}
+
+impl Drawn<'_> {
+    fn is_outline(&self) -> bool {
+        self.chain.left == 0 || self.chain.right == 0
+    }
 }
 
 /// A place where paths end: a junction, or a corner of a border after this path.
@@ -57,7 +65,7 @@ pub(crate) struct Rule<F> {
     pub(crate) deflection: F,
 }
 
-/// An end of an outline at a vertex.
+/// An end of an outline or a step at a vertex.
 struct Arrival {
     vertex: Vertex,
     border: usize,
@@ -67,7 +75,7 @@ struct Arrival {
     normal: [f64; 2],
 }
 
-/// Deflects outlines, and moves `junctions` with them.
+/// Deflects outlines and steps, and moves `junctions` with them.
 pub(crate) fn deflect<D, F>(borders: &mut [Drawn<'_>], junctions: &mut [[f64; 2]], rule: &Rule<F>)
 where
     D: Deflection,
@@ -78,11 +86,18 @@ where
     let mut corners: Vec<(Vertex, [usize; 2])> = Vec::new();
     let mut first = 0;
     for group in arrivals.chunk_by(|a, b| a.vertex == b.vertex) {
-        if let [a, b] = group
-            && (rule.blunt || cross(a.normal, b.normal).abs() > CROSSED)
-            && !is_held(borders, a.vertex)
+        // Where a step ends at an outline it goes along with that.
+        let of_outlines = |k: &usize| borders[arrivals[*k].border].is_outline();
+        let range = first..first + group.len();
+        let mut ends: Vec<usize> = range.clone().filter(of_outlines).collect();
+        if ends.is_empty() {
+            ends = range.collect();
+        }
+        if let [a, b] = ends[..]
+            && (rule.blunt || cross(arrivals[a].normal, arrivals[b].normal).abs() > CROSSED)
+            && !is_held(borders, arrivals[a].vertex)
         {
-            corners.push((a.vertex, [first, first + 1]));
+            corners.push((arrivals[a].vertex, [a, b]));
         }
         first += group.len();
     }
@@ -169,15 +184,11 @@ fn is_held(borders: &[Drawn<'_>], vertex: Vertex) -> bool {
     })
 }
 
-fn is_outline(chain: &Chain) -> bool {
-    chain.left == 0 || chain.right == 0
-}
-
-/// All ends of outlines.
+/// All ends of outlines and steps.
 fn arrivals(borders: &[Drawn<'_>]) -> Vec<Arrival> {
     let mut arrivals = Vec::new();
     for (border, drawn) in borders.iter().enumerate() {
-        if !is_outline(drawn.chain) {
+        if !drawn.is_outline() && !drawn.is_step {
             continue;
         }
         let Some(paths) = drawn.paths.as_deref() else {
@@ -234,7 +245,7 @@ where
                 .zip(loose)
                 .enumerate()
                 .map(|(n, (path, &loose))| {
-                    if !is_outline(border.chain) {
+                    if !border.is_outline() && !border.is_step {
                         return None;
                     }
                     let ends = match border.chain.ends {
@@ -248,7 +259,7 @@ where
         .collect()
 }
 
-/// How far a corner moves with its two outlines.
+/// How far a corner moves with its two paths.
 fn shift<D: Deflection>(
     borders: &[Drawn<'_>],
     arrivals: &[Arrival],

@@ -150,10 +150,12 @@ pub(crate) fn build(
             let mut drawn: Vec<Drawn<'_>> = borders
                 .iter()
                 .zip(&mut drawn)
-                .map(|(border, paths)| Drawn {
+                .enumerate()
+                .map(|(k, (border, paths))| Drawn {
                     chain: border.chain,
                     paths: paths.as_mut().filter(|_| border.level < TRACED),
                     as_drawn: border.as_drawn,
+                    is_step: outlines.steps.get(k) == Some(&true),
                 })
                 .collect();
             settled = settle(&mut drawn, &mut junctions, outlines, &mut memory, monitor)?;

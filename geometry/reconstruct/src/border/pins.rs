@@ -48,7 +48,8 @@ pub(crate) fn part(borders: &mut [Drawn<'_>], junctions: &mut [[f64; 2]], settle
         farthest: CORNER_FARTHEST,
         blunt: false,
         deflection: |[border, path]: [usize; 2], curve: &_, chain: &Chain, ends| {
-            if settled[border][path] {
+            let is_outline = chain.left == 0 || chain.right == 0;
+            if settled[border][path] || !is_outline {
                 return None;
             }
             deflection(curve, &chain.middles, ends)

@@ -16,11 +16,13 @@ pub(crate) struct Placed {
     pub(crate) seen: Seen,
 }
 
-/// Samples beside outlines, and the region of each piece.
+/// Samples beside outlines and steps, and the region of each piece.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Outlines {
     pub(crate) samples: Vec<Placed>,
     pub(crate) regions: Vec<u16>,
+    /// Of each border, whether z jumps there from one surface to another.
+    pub(crate) steps: Vec<bool>,
 }
 
 /// Farthest that a corner is moved, pitches.
@@ -94,4 +96,76 @@ fn path_of<'a>(
     [border, path]: [usize; 2],
 ) -> Option<&'a mut PiecewiseCubic<2>> {
     borders[border].paths.as_deref_mut()?.get_mut(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cracks::Chain;
+    use super::*;
+    use range_image::Unmonitored;
+
+    /// Where the border between two pieces of these regions runs, drawn at 0, when samples are
+    /// parted at 0.3; `None` where it stays.
+    fn settled(regions: [u16; 2], is_step: bool) -> Option<f64> {
+        let chain = Chain {
+            left: 1,
+            right: 2,
+            middles: (0..=40).map(|k| [f64::from(k), 0.0]).collect(),
+            ends: Some((0, 1)),
+        };
+        let mut paths = vec![PiecewiseCubic::line([0.0, 0.0], [40.0, 0.0], 40.0).unwrap()];
+        let mut samples = Vec::new();
+        for k in 1..40 {
+            let mut add = |region: u16, y: f64, seen: Seen| {
+                let place = [f64::from(k), y];
+                samples.push(Placed {
+                    region,
+                    place,
+                    seen,
+                });
+            };
+            add(7, 0.8, Seen::Present);
+            add(9, -0.2, Seen::Present);
+            // The upper surface hides some of the lower.
+            add(9, 1.2, Seen::Missing);
+            add(7, -0.6, Seen::Missing);
+            add(9, -0.7, Seen::Lost);
+        }
+        let outlines = Outlines {
+            samples,
+            regions: regions.to_vec(),
+            steps: vec![is_step],
+        };
+        let mut junctions = [[0.0, 0.0], [40.0, 0.0]];
+        let mut borders = [Drawn {
+            chain: &chain,
+            paths: Some(&mut paths),
+            as_drawn: false,
+            is_step,
+        }];
+        let told = settle(
+            &mut borders,
+            &mut junctions,
+            &outlines,
+            &mut Memory::default(),
+            &Unmonitored,
+        );
+        let is_told = told.unwrap() == [[true]];
+        let (first, last) = paths[0].domain();
+        let middle = paths[0].evaluate(0.5 * (first + last))[1];
+        assert!(is_told || middle == 0.0, "{middle}");
+        is_told.then_some(middle)
+    }
+
+    #[test]
+    fn a_step_runs_between_the_samples_of_its_two_sides() {
+        let middle = settled([7, 9], true).expect("samples tell");
+        assert!((middle - 0.3).abs() < 0.05, "{middle}");
+    }
+
+    #[test]
+    fn samples_do_not_tell_where_a_crease_runs_or_one_region_is_cut() {
+        assert_eq!(settled([7, 9], false), None);
+        assert_eq!(settled([7, 7], true), None);
+    }
 }
