@@ -54,7 +54,7 @@ pub(crate) fn table(cases: &[Case]) -> String {
     text
 }
 
-/// One line for each face of a recording.
+/// One line for each face of a recording, and where the samples are that lie within none.
 pub(crate) fn of_regions(case: &Case) -> String {
     let mut text = format!(
         "{}\n\n| face | nodes | patches | rms of the nodes, mm | samples | within three sigma \
@@ -79,5 +79,11 @@ pub(crate) fn of_regions(case: &Case) -> String {
             residuals.rms_mm(),
         );
     }
+    let outside = case.all.outside;
+    text += &format!(
+        "\nOf the samples within no face {} lie at nodes without a value, {} at crumbs, {} at nodes of \
+         regions.\n",
+        outside.masked, outside.crumbs, outside.regions
+    );
     text
 }

@@ -15,6 +15,36 @@ pub(crate) struct Residuals {
     /// Squared distances along the normal, for samples within a trimmed face as the camera
     /// sees it, square millimetres.
     squares_mm2: Vec<f64>,
+    /// Samples within no face.
+    pub(crate) outside: Outside,
+}
+
+/// Samples within no face, by the nodes that they are nearest to.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Outside {
+    /// Without a value: the samples there agree too little, as on sides seen edge on.
+    pub(crate) masked: usize,
+    /// Of no region.
+    pub(crate) crumbs: usize,
+    /// Of regions: the outlines run too tight.
+    pub(crate) regions: usize,
+}
+
+impl Outside {
+    fn add(&mut self, image: &RangeImage, regions: &RegionMap, [x, y]: [f64; 2]) {
+        let pitch_mm = image.pitch_mm();
+        let nearest = |off_mm: f64, count: usize| {
+            let place = (off_mm / pitch_mm).round();
+            (place >= 0.0 && place < count as f64).then_some(place as usize)
+        };
+        let column = nearest(x - image.x_mm(0), image.columns());
+        let row = nearest(y - image.y_mm(0), image.rows());
+        match column.zip(row) {
+            Some((column, row)) if regions.label(column, row) != 0 => self.regions += 1,
+            Some((column, row)) if image.z_mm(column, row).is_some() => self.crumbs += 1,
+            _ => self.masked += 1,
+        }
+    }
 }
 
 impl Residuals {
@@ -122,6 +152,7 @@ pub(crate) fn residuals(
             let within = |c: &Vec<f64>| c.partition_point(|y| *y <= sample.y_mm) % 2 == 1;
             let Some(k) = crossings.iter().position(within) else {
                 uncovered.samples += 1;
+                uncovered.outside.add(image, regions, [x, sample.y_mm]);
                 continue;
             };
             let off = outlines[k].off_mm(x, sample.y_mm, sample.z_mm);
@@ -152,4 +183,30 @@ fn noise_mm(image: &RangeImage, regions: &RegionMap, label: u16) -> f64 {
         return 0.0;
     }
     *scales.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use range_image::Lattice;
+
+    #[test]
+    fn samples_outside_are_told_by_the_nodes_nearest_to_them() {
+        let mut image = RangeImage::masked(Lattice { pitch_mm: 0.5 }, 2, 4, 3, 1);
+        image.set_z_mm(0, 0, Some(1.0));
+        image.set_z_mm(1, 0, Some(1.0));
+        let regions = RegionMap::new(&image, vec![1, 0, 0]);
+        let mut outside = Outside::default();
+        // At the three nodes, the last of them without a value, and off the grid.
+        for x in [1.2, 1.7, 1.6, 2.0, 9.0, 0.7] {
+            outside.add(&image, &regions, [x, 2.1]);
+        }
+        outside.add(&image, &regions, [1.0, 2.3]);
+        let Outside {
+            masked,
+            crumbs,
+            regions,
+        } = outside;
+        assert_eq!((masked, crumbs, regions), (4, 2, 1));
+    }
 }
