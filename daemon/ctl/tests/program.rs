@@ -288,7 +288,7 @@ fn points_without_a_measurement_are_left_out_and_told() {
 fn scattered_dots_are_no_part_and_the_user_learns_why() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
-    let dots = (0..25).map(|k| format!("{} {} 0\n", k % 5, k / 5));
+    let dots = (0..16).map(|k| format!("{} {} 0\n", k % 4, k / 4));
     fs::write(at.join("dots.xyz"), dots.collect::<String>()).unwrap();
     let output = relief(at, &["convert", "dots.xyz"]);
     let told = String::from_utf8_lossy(&output.stderr);
