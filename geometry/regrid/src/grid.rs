@@ -173,6 +173,7 @@ impl GridWorker {
                 most_noise_mm: allowed_mm.max(4.0 * noise_mm),
                 // A window that is not full may be of lone ones.
                 strays: !dense || node.noise.is_none_or(|noise| noise.clean_share < 1.0),
+                clean: node.noise.is_some_and(|noise| noise.clean_share >= CLEAN),
                 spacing,
                 effort: Effort {
                     most_planes: PLANES_PER_DRAW * settings.draws,
@@ -300,6 +301,9 @@ const BESIDE: f64 = 0.7;
 /// there is a sample wherever one should be: runs of outliers lie in the surface's stead, they
 /// do not end it.
 const STREWN: f64 = 2.0;
+/// Share of clean samples from which on what lies on no surface tells of another one. Edges cost
+/// some, since the differences that tell are those of three samples.
+const CLEAN: f64 = 0.95;
 /// Columns on either side that tell of the noise.
 const NOISE_COLUMNS: usize = 8;
 /// Least noise believed, in spacings: scans without any are computed ones.

@@ -173,6 +173,55 @@ fn consensus_keeps_ridges() {
     assert!(worst < 0.4, "{worst}");
 }
 
+/// Short blocks on a base, whose flanks are two samples wide: with large faces in every window,
+/// and the base on either side of the block and beyond its ends, the flank keeps its nodes.
+#[test]
+fn consensus_keeps_flanks_between_faces() {
+    let (own, all) = own_nodes_of_flanks(0.8);
+    assert!(all > 350, "{all}");
+    assert!(own * 100 >= all * 83, "{own} of {all}");
+}
+
+/// The same of flanks little more than one sample wide, of which a window holds next to nothing.
+#[test]
+fn consensus_keeps_flanks_of_one_sample() {
+    let (own, all) = own_nodes_of_flanks(0.5);
+    assert!(all >= 200, "{all}");
+    assert!(own * 100 >= all * 60, "{own} of {all}");
+}
+
+/// How many nodes well within flanks of this width have their z, of how many.
+fn own_nodes_of_flanks(width_mm: f64) -> (usize, usize) {
+    const TOP_MM: f64 = 5.0;
+    const HALF_LENGTH_MM: f64 = 6.0;
+    let (mut own, mut all) = (0, 0);
+    for (seed, turn) in [(5, 0.0), (6, 0.35), (7, 0.8), (8, 1.57)] {
+        let (sin, cos) = libm::sincos(turn);
+        // From the block's middle line, and along it.
+        let across = |x: f64, y: f64| cos * (x - 15.0) + sin * (y - 15.0);
+        let along = |x: f64, y: f64| cos * (y - 15.0) - sin * (x - 15.0);
+        let rise = |x: f64, y: f64| {
+            let inside = along(x, y).abs() < HALF_LENGTH_MM;
+            let rise = (0.5 * TOP_MM + width_mm - across(x, y).abs()) / width_mm;
+            if inside { rise.clamp(0.0, 1.0) } else { 0.0 }
+        };
+        let height = |x: f64, y: f64| 0.1 * x + 2.4 * rise(x, y);
+        let mut noise = Noise::new(seed);
+        let columns = scan(30.0, (0.4, 0.4), (0.1, 0.3), |x, y| {
+            Some(height(x, y) + NOISE_MM * noise.normal())
+        });
+        let settings = RegridSettings::with_pitch(0.4);
+        for (x, y, z) in nodes(&image(&columns, &settings)) {
+            let beside_end = along(x, y).abs() > HALF_LENGTH_MM - 1.0;
+            if !beside_end && (0.1..0.9).contains(&rise(x, y)) {
+                all += 1;
+                own += usize::from((z - height(x, y)).abs() < 0.3);
+            }
+        }
+    }
+    (own, all)
+}
+
 /// The window averages: noise at the nodes is well below that of the samples, and on a
 /// sphere the bias of a plane stays below the noise.
 #[test]

@@ -2,8 +2,8 @@
 
 use super::bend::lift_mm;
 use super::posterior::Posterior;
-use super::side::{Labelled, SEEN, lengthen, separate};
-use super::surfaces::{Effort, PlaneSums, Surface, Surfaces};
+use super::side::{Labelled, SEEN, lengthen, separate_strip};
+use super::surfaces::{Effort, LEAST_INLIERS, PlaneSums, Surface, Surfaces};
 use crate::draws::Draws;
 use crate::neighbours::Neighbour;
 use crate::window::Spacing;
@@ -24,6 +24,15 @@ const POOR: f64 = 0.38;
 /// How many times more samples must agree with a surface of twice the noise for that to be
 /// the noise.
 const GAIN: f64 = 1.3;
+/// Share of a surface's samples that lie on no other, from which on it is one of its own.
+const OWN: f64 = 0.25;
+/// The samples next to a node: where any of these lies on no surface found, it may be one of a
+/// strip, of which a window holds too few.
+const NEXT: usize = 4;
+/// Windows in which such a strip is sought, along which it may have samples enough.
+const STRIP: usize = 5;
+/// Surfaces looked at there, since others may have more samples than the strip next to the node.
+const STRIPS: usize = 2;
 /// Share of a window's samples, the nearest, that z rests on: fewer than the search needs to
 /// withstand outliers in runs, since planes round creases the more the wider they are.
 const NEAREST: f64 = 0.8;
@@ -39,6 +48,8 @@ pub(crate) struct Conditions {
     pub(crate) most_noise_mm: f64,
     /// Whether there are outliers around, or nothing is known of them.
     pub(crate) strays: bool,
+    /// Whether so few outliers are around that samples on no surface tell of another one.
+    pub(crate) clean: bool,
     /// Local spacing of the samples.
     pub(crate) spacing: Spacing,
     /// How hard surfaces are looked for in a window.
@@ -51,6 +62,8 @@ pub(crate) struct Consensus {
     surfaces: Surfaces,
     found: Vec<Surface>,
     wide: Vec<Neighbour>,
+    /// Samples of a wider window that no surface holds.
+    left: Vec<Neighbour>,
     /// Samples of a still wider window, where they were needed.
     far: Vec<Neighbour>,
     labelled: Vec<Labelled>,
@@ -75,7 +88,10 @@ impl Consensus {
         let noise_mm = self.look(window, conditions, draws);
         let nearest = (NEAREST * conditions.effort.neighbours as f64).round() as usize;
         let first = self.found.first().map_or(0, |s| s.inliers) as f64;
-        if self.found.len() == 1 && first >= ENOUGH * conditions.effort.neighbours as f64 {
+        if self.found.len() == 1
+            && first >= ENOUGH * conditions.effort.neighbours as f64
+            && !(conditions.clean && is_beside_others(window, &self.found))
+        {
             for surface in &mut self.found {
                 settle(surface, window, nearest);
             }
@@ -92,8 +108,7 @@ impl Consensus {
             // Here outliers have the better of the window; farther away they do not.
             let wide = self.surfaces.find(&self.wide, noise_mm, &thorough, draws);
             if !wide.is_empty() {
-                self.found.clear();
-                self.found.extend_from_slice(wide);
+                keep_narrow(&mut self.found, wide, window);
             }
         } else if self.found.len() == 1 {
             // Outliers may leave too little of a second one.
@@ -102,16 +117,22 @@ impl Consensus {
                 .surfaces
                 .find(&self.wide[..number], noise_mm, &thorough, draws);
             if wide.len() > 1 {
-                self.found.clear();
-                self.found.extend_from_slice(wide);
+                keep_narrow(&mut self.found, wide, window);
             }
         }
         for surface in &mut self.found {
             settle(surface, &self.wide, nearest);
         }
+        if conditions.clean
+            && is_beside_others(window, &self.found)
+            && let Some(mut strip) = self.strip(window, noise_mm, &thorough, draws)
+        {
+            settle(&mut strip, &self.wide, nearest);
+            self.found.push(strip);
+        }
         let mut other = 1;
         while other < self.found.len() {
-            match self.place(other, window.len(), conditions.spacing, &mut wider) {
+            match self.place(other, window.len(), conditions, &mut wider) {
                 Place::First => other += 1,
                 Place::Other => {
                     self.found.swap(0, other);
@@ -184,18 +205,48 @@ impl Consensus {
         noise_mm
     }
 
+    /// The surface of the samples next to the node that no other holds, as it shows in a wider
+    /// window among all that no other holds.
+    fn strip(
+        &mut self,
+        window: &[Neighbour],
+        noise_mm: f64,
+        effort: &Effort,
+        draws: &mut Draws,
+    ) -> Option<Surface> {
+        let number = (STRIP * window.len()).min(self.wide.len());
+        let found = &self.found;
+        let is_left = |n: &&Neighbour| !found.iter().any(|s| s.holds(n));
+        self.left.clear();
+        self.left.extend(self.wide[..number].iter().filter(is_left));
+        for _ in 0..STRIPS {
+            let strip = self.surfaces.strip(&self.left, noise_mm, effort, draws)?;
+            let (mut next, mut held) = (0, 0);
+            for n in next_to(window).iter().filter(is_left) {
+                next += 1;
+                held += usize::from(strip.holds(n));
+            }
+            if 2 * held > next {
+                return Some(strip);
+            }
+            self.left.retain(|n| !strip.holds(n));
+        }
+        None
+    }
+
     /// Whether the node lies on the side of the first surface or on that of another.
     fn place(
         &mut self,
         other: usize,
         samples: usize,
-        spacing: Spacing,
+        conditions: &Conditions,
         wider: &mut impl FnMut(&mut Vec<Neighbour>, usize),
     ) -> Place {
+        let Conditions { spacing, clean, .. } = *conditions;
         let (first, other) = (self.found[0], self.found[other]);
         let meet = (first.plane.c - other.plane.c).abs() <= first.width_mm;
         label(&self.wide, &first, &other, spacing, &mut self.labelled);
-        let Some(mut line) = separate(&mut self.labelled, &mut self.posterior) else {
+        let Some(mut line) = separate_strip(&mut self.labelled, clean, &mut self.posterior) else {
             return if meet { Place::First } else { Place::Nowhere };
         };
         if line.is_near() {
@@ -230,6 +281,31 @@ impl Consensus {
             Place::First
         }
     }
+}
+
+/// Puts the surfaces of a wider window before those of the node's own, of which only those
+/// stay that are others: a strip between two faces has few of the wider window's samples, and
+/// either face has more, but most of those next to the node are the strip's.
+fn keep_narrow(found: &mut Vec<Surface>, wide: &[Surface], window: &[Neighbour]) {
+    found.retain(|surface| {
+        let (mut held, mut alone) = (0, 0);
+        for n in window.iter().filter(|n| surface.holds(n)) {
+            held += 1;
+            alone += usize::from(!wide.iter().any(|other| other.holds(n)));
+        }
+        alone >= LEAST_INLIERS && alone as f64 > OWN * f64::from(held)
+    });
+    found.splice(0..0, wide.iter().copied());
+}
+
+fn next_to(window: &[Neighbour]) -> &[Neighbour] {
+    &window[..NEXT.min(window.len())]
+}
+
+/// Whether a sample next to the node lies on no surface found.
+fn is_beside_others(window: &[Neighbour], found: &[Surface]) -> bool {
+    let is_left = |n: &Neighbour| !found.iter().any(|s| s.holds(n));
+    next_to(window).iter().any(is_left)
 }
 
 /// How many more samples of the window would agree with the surface if the noise were twice
@@ -315,4 +391,51 @@ fn settle(surface: &mut Surface, samples: &[Neighbour], most: usize) {
         surface.inliers = inliers;
     }
     surface.lift_mm = lift_mm(surface, samples, most);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plane::Plane;
+
+    fn surface(a: f64, c: f64) -> Surface {
+        Surface {
+            plane: Plane { a, b: 0.0, c },
+            width_mm: 0.2,
+            inliers: 0,
+            lift_mm: 0.0,
+        }
+    }
+
+    /// Faces on two levels and a flank two samples wide between them, around a node on it.
+    fn flank() -> Vec<Neighbour> {
+        let z = |x: f64| (2.0 * x).clamp(-2.0, 2.0);
+        let mut samples = Vec::new();
+        for column in -4..4 {
+            for row in -3..=3 {
+                let (x, y) = (f64::from(column) + 0.4, f64::from(row));
+                samples.push(Neighbour::at(x, y, z(x)));
+            }
+        }
+        samples.sort_by(Neighbour::order);
+        samples
+    }
+
+    #[test]
+    fn a_flank_stays_beside_the_faces_of_a_wider_window() {
+        let wide = [surface(0.0, -2.0), surface(0.0, 2.0)];
+        let mut found = vec![surface(2.0, 0.0)];
+        keep_narrow(&mut found, &wide, &flank());
+        let planes: Vec<_> = found.iter().map(|s| (s.plane.a, s.plane.c)).collect();
+        assert_eq!(planes, [(0.0, -2.0), (0.0, 2.0), (2.0, 0.0)]);
+    }
+
+    #[test]
+    fn a_wider_window_says_more_of_the_same_surface() {
+        let wide = [surface(0.0, -2.0), surface(0.0, 2.0)];
+        // Nearly the upper face, and a plane that joins few samples.
+        let mut found = vec![surface(0.02, 1.95), surface(0.0, 0.8)];
+        keep_narrow(&mut found, &wide, &flank()[..20]);
+        assert_eq!(found.len(), 2);
+    }
 }

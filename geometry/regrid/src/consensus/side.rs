@@ -32,6 +32,8 @@ const CLEAR: f64 = 1.2;
 const CLEAN: f64 = 0.1;
 /// Windows tried, each with half the samples of the one before.
 const WINDOWS: usize = 3;
+/// Fewer samples tell of no line.
+const LEAST_NEARER: usize = 16;
 /// Turns of lengthening a line, each with the samples beside the line of the one before.
 pub(super) const TURNS: usize = 2;
 /// Spacings from a line within which samples on the wrong side may be the line's fault.
@@ -115,6 +117,27 @@ impl Line {
 /// so on. `None` where the two sets do not lie apart. Samples that no surface can have are
 /// taken out.
 pub(crate) fn separate(samples: &mut Vec<Labelled>, posterior: &mut Posterior) -> Option<Line> {
+    separate_where(samples, WINDOWS, false, posterior)
+}
+
+/// The same of two surfaces of which one may be a strip, with more of the other beyond it or
+/// around its end: where all samples do not lie apart, the nearer ones show the near edge. Where
+/// hardly any are outliers, fewer of them do.
+pub(crate) fn separate_strip(
+    samples: &mut Vec<Labelled>,
+    clean: bool,
+    posterior: &mut Posterior,
+) -> Option<Line> {
+    let windows = if clean { WINDOWS + 1 } else { WINDOWS };
+    separate_where(samples, windows, true, posterior)
+}
+
+fn separate_where(
+    samples: &mut Vec<Labelled>,
+    windows: usize,
+    may_be_strip: bool,
+    posterior: &mut Posterior,
+) -> Option<Line> {
     // Far from the edge the nearer samples tell.
     let near = samples.get(..samples.len() / NEARER)?;
     if let Some(raw) = odds(near, [0.0; 3])
@@ -126,11 +149,15 @@ pub(crate) fn separate(samples: &mut Vec<Labelled>, posterior: &mut Posterior) -
         return Some(line);
     }
     let mut best = None;
-    for window in 0..WINDOWS {
+    for window in 0..windows {
         let mut line = odds(samples, [0.0; 3])?;
         let (mut wrong, share) = wrong_side(samples, &line);
         if share > MIXED {
-            break;
+            if !may_be_strip || best.is_some() || samples.len() < 2 * LEAST_NEARER {
+                break;
+            }
+            samples.truncate(samples.len() / 2);
+            continue;
         }
         if wrong > 0 && take_out_strays(samples, &line) {
             line = odds(samples, [0.0; 3])?;
@@ -146,7 +173,7 @@ pub(crate) fn separate(samples: &mut Vec<Labelled>, posterior: &mut Posterior) -
             break;
         }
         samples.truncate(samples.len() / 2);
-        if window + 1 < WINDOWS && samples.len() < 16 {
+        if window + 1 < windows && samples.len() < LEAST_NEARER {
             break;
         }
     }
@@ -362,6 +389,25 @@ pub(super) mod tests {
             (line.distance() - clean.distance()).abs() < 0.05,
             "{line:?}"
         );
+    }
+
+    #[test]
+    fn the_near_edge_of_a_strip_is_found_with_the_first_set_on_either_side() {
+        for width in [2.0, 2.5, 3.0] {
+            let strip = |u: f64| u > 0.4 && u < 0.4 + width;
+            let mut samples = grid(9.0, |_| 0.0);
+            for s in &mut samples {
+                s.label = if strip(s.u) { -1.0 } else { 1.0 };
+            }
+            // Beyond the strip lies a third surface, and behind that the first again.
+            samples.retain(|s| s.u < 0.4 + width || s.u > 5.0);
+            let line = separate_strip(&mut samples, false, &mut Posterior::default());
+            let distance = line.map(|line| line.distance());
+            assert!(
+                distance.is_some_and(|d| (d - 0.4).abs() < 0.5),
+                "{width}: {distance:?}"
+            );
+        }
     }
 
     #[test]

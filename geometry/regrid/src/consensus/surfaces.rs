@@ -14,7 +14,7 @@ const LEAST_PLANES: usize = 6;
 /// Most surfaces told apart in one window: those of a corner.
 const MOST_SURFACES: usize = 3;
 /// Fewest samples of a surface.
-const LEAST_INLIERS: usize = 6;
+pub(super) const LEAST_INLIERS: usize = 6;
 /// Fewest samples that must agree with a plane through three of them for it to be refined.
 const LEAST_DRAWN: f64 = 5.0;
 /// Fewest pairs of neighbouring columns that both have two or more of a surface's samples.
@@ -24,6 +24,9 @@ const LEAST_PAIRS: usize = 2;
 /// Fewest samples of a surface that do not come from the two columns with most of them: two
 /// runs of outliers always have a plane in common.
 const LEAST_OTHERS: usize = 4;
+/// Runs of outliers along a column are hardly ever as long: with so many samples in each of two
+/// columns a strip that runs along them is believed.
+const LONG_RUN: usize = 10;
 /// With so many of them the columns need not lie beside each other.
 const MANY_OTHERS: usize = 10;
 /// Steepest slope that a camera sees anything of: beyond 80 degrees hardly any light comes
@@ -88,6 +91,8 @@ pub(crate) struct Surfaces {
     scratch: Vec<f64>,
     /// The columns of the window, and how many samples of each agree with a plane.
     columns: Vec<(usize, usize)>,
+    /// Whether long runs along two columns are believed.
+    among_few_outliers: bool,
     found: Vec<Surface>,
 }
 
@@ -143,6 +148,7 @@ impl Surfaces {
     /// Forgets all surfaces, and leaves every sample of a window to the next one.
     fn begin(&mut self, window: &[Neighbour]) {
         self.found.clear();
+        self.among_few_outliers = false;
         self.left.clear();
         self.left.extend_from_slice(window);
         self.columns.clear();
@@ -175,6 +181,27 @@ impl Surfaces {
             self.take(window, plane, width_mm);
         }
         &self.found
+    }
+
+    /// The surface with most evidence among the samples that others leave over in a wide window,
+    /// with hardly any outliers around.
+    pub(crate) fn strip(
+        &mut self,
+        samples: &[Neighbour],
+        noise_mm: f64,
+        effort: &Effort,
+        draws: &mut Draws,
+    ) -> Option<Surface> {
+        self.begin(samples);
+        self.among_few_outliers = true;
+        if samples.len() < LEAST_INLIERS {
+            return None;
+        }
+        let width_mm = WIDTH * noise_mm;
+        let most_planes = effort.most_planes.min(MOST_FURTHER);
+        let plane = self.best(width_mm, most_planes, draws)?;
+        self.take(samples, plane, width_mm);
+        self.found.first().copied()
     }
 
     /// Adds a surface, whose samples are left to no other.
@@ -231,7 +258,10 @@ impl Surfaces {
         let few = self.columns.len() <= LEAST_PAIRS;
         let others = number - longest - second;
         number >= LEAST_INLIERS
-            && (few || others >= MANY_OTHERS || pairs >= LEAST_PAIRS && others >= LEAST_OTHERS)
+            && (few
+                || self.among_few_outliers && second >= LONG_RUN
+                || others >= MANY_OTHERS
+                || pairs >= LEAST_PAIRS && others >= LEAST_OTHERS)
     }
 
     fn load(&mut self, window: &[Neighbour]) {
