@@ -90,7 +90,7 @@ fn is_on_border(scene: &Scene<'_>, labels: &[u32], node: usize, border: Border) 
     let grid = &scene.grid;
     let (columns, rows) = grid.window(node, 1);
     let all = border == Border::All;
-    if all && scene.links.linked(node).count() < 4 {
+    if all && !scene.links.all_around(node) {
         return true;
     }
     columns.into_iter().any(|c| {

@@ -1,6 +1,8 @@
 //! The image as the stages below see it: flat node numbers, neighbours, and which
 //! neighbouring nodes have no step between them.
 
+use core::cmp::Ordering;
+
 use range_image::RangeImage;
 
 /// Nodes of an image by flat number, column by column, upwards within a column.
@@ -59,12 +61,14 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// Which pairs of 4-neighbours both have a value and no step between them.
+/// Which pairs of 4-neighbours both have a value and no step between them, and which pairs,
+/// cornerwise ones too, were joined since.
 #[derive(Debug, Clone)]
 pub(crate) struct Links {
     rows: usize,
     /// Bit 0: linked to the next row; bit 1: to the next column; bits 2 and 3: both nodes
-    /// have values, but a step lies between.
+    /// have values, but a step lies between; bits 4 and 5: joined cornerwise to the next
+    /// column's next row, and to its row before.
     bits: Vec<u8>,
 }
 
@@ -72,6 +76,8 @@ const UP: u8 = 1;
 const RIGHT: u8 = 2;
 const STEP_UP: u8 = 4;
 const STEP_RIGHT: u8 = 8;
+const RISING: u8 = 16;
+const FALLING: u8 = 32;
 
 impl Links {
     /// Links all neighbours except where z jumps by more than `step_mm`, measured square to
@@ -109,6 +115,22 @@ impl Links {
         }
     }
 
+    /// Links two of 8 neighbours, whatever lies between.
+    pub(crate) fn join(&mut self, node: usize, other: usize) {
+        let (first, second) = (node.min(other), node.max(other));
+        let row = |node: usize| node % self.rows;
+        let (link, step) = if first / self.rows == second / self.rows {
+            (UP, STEP_UP)
+        } else {
+            match row(second).cmp(&row(first)) {
+                Ordering::Less => (FALLING, 0),
+                Ordering::Equal => (RIGHT, STEP_RIGHT),
+                Ordering::Greater => (RISING, 0),
+            }
+        };
+        self.bits[first] = self.bits[first] & !step | link;
+    }
+
     /// Whether this node is linked with the one above.
     pub(crate) fn up(&self, node: usize) -> bool {
         self.bits[node] & UP != 0
@@ -124,13 +146,33 @@ impl Links {
         self.bits[node] & (STEP_UP | STEP_RIGHT) != 0
     }
 
-    /// The nodes linked with this one: below, above, left, right.
+    /// Whether this node is linked with all four beside it.
+    pub(crate) fn all_around(&self, node: usize) -> bool {
+        self.beside(node).count() == 4
+    }
+
+    /// The nodes linked with this one: below, above, left, right, and cornerwise.
     pub(crate) fn linked(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
+        self.beside(node).chain(self.cornerwise(node))
+    }
+
+    fn beside(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
         let below = node.checked_sub(1).filter(|&n| self.up(n));
         let above = self.up(node).then_some(node + 1);
         let left = node.checked_sub(self.rows).filter(|&n| self.right(n));
         let right = self.right(node).then_some(node + self.rows);
         [below, above, left, right].into_iter().flatten()
+    }
+
+    fn cornerwise(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
+        let has = |n: usize, bit: u8| self.bits[n] & bit != 0;
+        let rising = has(node, RISING).then_some(node + self.rows + 1);
+        let falling = has(node, FALLING).then_some(node + self.rows - 1);
+        let fallen = node.checked_sub(self.rows + 1);
+        let risen = (node + 1).checked_sub(self.rows);
+        let fallen = fallen.filter(|&n| has(n, RISING));
+        let risen = risen.filter(|&n| has(n, FALLING));
+        [rising, falling, fallen, risen].into_iter().flatten()
     }
 }
 

@@ -10,7 +10,8 @@
 //!    distance and by a direction from windows that keep to one side of edges (Nagao &
 //!    Matsuyama 1979, *Edge preserving smoothing*).
 //! 2. Pieces that a neighbour explains are given up; nodes that nothing explains become pieces
-//!    of their own, so that faces too narrow for any window are found.
+//!    of their own, so that faces too narrow for any window are found; strips of a node or two
+//!    also across the steps that seem to lie between their nodes.
 //! 3. Pieces compete for the nodes at their borders.
 //! 4. Two planes are one face when one surface explains both. Other neighbours become one
 //!    region where what a crease and a step would add to a fit across their border is small,
@@ -26,7 +27,7 @@
 //! # Limits
 //! With the default settings, noise of an eighth of the pitch and regions of at least 100
 //! nodes: creases from 10 degrees and steps from 1 mm part planes, and faces from about four
-//! nodes wide are kept; narrower ones may come out in parts. Creases below half of that are
+//! nodes wide are kept; narrower ones may come out in parts, or be lost among outliers. Creases below half of that are
 //! smooth passages. Roundings of a few nodes in radius count as creases, since regridding rounds
 //! creases as much. Where curved faces meet, a border that noise leaves undecided is taken for
 //! smooth, so that one face may run into another; free forms with many folds come out in

@@ -8,6 +8,7 @@ mod least_squares;
 mod models;
 mod piece;
 mod revise;
+mod strips;
 mod surface;
 mod windows;
 
@@ -22,15 +23,22 @@ const SMALL: usize = 400;
 
 /// Labels of the regions, and the number of pieces before merging.
 pub(crate) fn divide(
-    scene: &Scene<'_>,
+    scene: &mut Scene<'_>,
     monitor: &dyn Monitor,
 ) -> Result<(Vec<u32>, usize), Cancelled> {
     let mut pieces = grow::pieces(scene, monitor)?;
     monitor.progress(0.4);
     compete::spread(scene, &mut pieces, grow::MISS_NOISES);
     revise::dissolve(scene, &mut pieces);
+    let grown = pieces.surfaces.len() as u32;
     revise::leftovers(scene, &mut pieces);
+    strips::find(scene, &mut pieces, grown);
     compete::settle(scene, &mut pieces, monitor)?;
+    strips::bridge(scene, &mut pieces, grown);
+    for (node, other) in strips::joints(scene, &pieces, grown) {
+        scene.links.join(node, other);
+    }
+    let scene = &*scene;
     monitor.progress(0.6);
     let count = pieces.surfaces.len() - 1;
     let mut labels = pieces.labels.clone();

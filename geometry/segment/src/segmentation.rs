@@ -67,8 +67,9 @@ pub struct Segmentation {
 
 /// Divides a range image into regions of one surface each; see the [crate].
 ///
-/// Regions are 4-connected without crossing a step. They are numbered by position: in the
-/// order in which the columns, each from its lowest node upwards, first meet them.
+/// Regions are 4-connected without crossing a step; narrow faces, whose plane explains the step,
+/// are 8-connected. They are numbered by position: in the order in which the columns, each from
+/// its lowest node upwards, first meet them.
 ///
 /// # Errors
 /// Settings or image out of limits, or cancelled.
@@ -99,7 +100,7 @@ pub fn segment_with_report(
         ..measured
     };
     let step_mm = (settings.step_factor * grid.pitch_mm).max(STEP_NOISES * noise.deviation_mm);
-    let scene = Scene {
+    let mut scene = Scene {
         grid,
         links: Links::new(&grid, step_mm),
         noise,
@@ -109,7 +110,7 @@ pub fn segment_with_report(
     monitor.progress(0.05);
     let (labels, components) = match settings.method {
         Method::ShimLee => shim_lee::divide(&scene, settings, monitor)?,
-        Method::Relief => relief::divide(&scene, monitor)?,
+        Method::Relief => relief::divide(&mut scene, monitor)?,
     };
     let minimum = settings.fewest_nodes(grid.pitch_mm);
     monitor.progress(0.95);

@@ -162,6 +162,50 @@ fn a_chamfer_too_narrow_to_see_bridges_nothing() {
     }
 }
 
+/// A step with a flank so many nodes wide, which runs at an angle to the columns.
+fn flank(nodes: f64, turn: f64) -> impl Fn(f64, f64) -> Option<(f64, u16)> {
+    let (sin, cos) = libm::sincos(turn);
+    move |x: f64, y: f64| {
+        let rise = (cos * x + sin * y) / (nodes * scenes::PITCH_MM) + 0.5;
+        let face = match rise {
+            ..0.0 => 1,
+            1.0.. => 3,
+            _ => 2,
+        };
+        Some((0.1 * x + 2.0 * rise.clamp(0.0, 1.0), face))
+    }
+}
+
+/// Its nodes hang together by their corners only, with a step between any two of them, and here
+/// and there it passes between nodes.
+#[test]
+fn a_flank_hardly_wider_than_the_pitch_is_a_face() {
+    for turn in [0.35, 0.5, 0.6, 1.2] {
+        for (seed, nodes) in [(0, 1.1), (1, 1.2), (2, 1.6)] {
+            let spoil = Spoil {
+                noise_mm: 0.02,
+                dropouts: 0.0,
+                ragged: 0,
+            };
+            let scene = Scene::new(&flank(nodes, turn), spoil, seed);
+            let done = segment_with_report(&scene.image, &SegmentSettings::default(), &Unmonitored)
+                .expect("default settings fit any scene");
+            let labels = done.regions.raw_labels();
+            let mut own = vec![0; usize::from(done.regions.regions()) + 1];
+            for (&label, &face) in labels.iter().zip(&scene.truth) {
+                own[usize::from(label)] += usize::from(face == 2);
+            }
+            let all: usize = own.iter().sum();
+            let most = own.iter().max().copied().unwrap_or(0);
+            assert!(
+                done.regions.regions() == 3 && most * 10 >= all * 8,
+                "{nodes} nodes, turned {turn}: {} regions, {most} of {all}",
+                done.regions.regions()
+            );
+        }
+    }
+}
+
 #[test]
 fn a_step_parts_two_planes() {
     let plane = |x: f64, y: f64| 0.2 * x - 0.35 * y;

@@ -87,6 +87,13 @@ impl Surface {
         Some(best)
     }
 
+    /// Fits a plane; `None` where the nodes are few or lie on a line.
+    pub(crate) fn plane(scene: &Scene<'_>, nodes: &[u32]) -> Option<Self> {
+        let frame = Frame::of(scene, nodes)?;
+        let sums = frame.sums::<QUADRIC>(scene, nodes);
+        frame.surface(&sums, PLANE, 1.0)
+    }
+
     /// Whether a plane leaves nearly as little as a quadric at these nodes.
     pub(crate) fn is_flat(scene: &Scene<'_>, nodes: &[u32], share: f64) -> bool {
         let Some(frame) = Frame::of(scene, nodes) else {
@@ -143,6 +150,14 @@ impl Surface {
             .noise
             .on_slope_mm(self.rise_mm(c, r), scene.grid.pitch_mm);
         (scene.grid.z_mm[node] - self.z_mm(c, r)).abs() / (self.roughness * noise_mm)
+    }
+
+    /// How far a node lies off the surface, square to it.
+    pub(crate) fn distance_mm(&self, scene: &Scene<'_>, node: usize) -> f64 {
+        let (c, r) = scene.grid.column_row(node);
+        let (c, r) = (c as f64, r as f64);
+        let [p, q] = self.rise_mm(c, r).map(|rise| rise / scene.grid.pitch_mm);
+        (scene.grid.z_mm[node] - self.z_mm(c, r)).abs() / libm::sqrt(1.0 + p * p + q * q)
     }
 
     /// Rise of z per column and per row, millimetres.
