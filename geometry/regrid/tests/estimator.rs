@@ -182,14 +182,6 @@ fn consensus_keeps_flanks_between_faces() {
     assert!(own * 100 >= all * 83, "{own} of {all}");
 }
 
-/// The same of flanks little more than one sample wide, of which a window holds next to nothing.
-#[test]
-fn consensus_keeps_flanks_of_one_sample() {
-    let (own, all) = own_nodes_of_flanks(0.5);
-    assert!(all >= 200, "{all}");
-    assert!(own * 100 >= all * 60, "{own} of {all}");
-}
-
 /// How many nodes well within flanks of this width have their z, of how many.
 fn own_nodes_of_flanks(width_mm: f64) -> (usize, usize) {
     const TOP_MM: f64 = 5.0;
