@@ -16,9 +16,11 @@ use crate::scene::{NONE, Scene};
 const REACH: usize = 5;
 /// Nodes of a strip are so far apart at most, where one in between lies on a face beside it.
 const HOP: usize = 2;
-/// Fewer nodes tell of no plane, and more are no strip: one three nodes wide has so many there.
+/// Nodes that a strip is wide, at most.
+const WIDE: usize = 3;
+/// Fewer nodes tell of no plane, and more are no strip.
 const LEAST_SEED: usize = 10;
-const MOST_SEED: usize = 3 * (2 * REACH + 1);
+const MOST_SEED: usize = WIDE * (2 * REACH + 1);
 /// Noises that a seed's plane may leave.
 const CLEAN: f64 = 1.5;
 /// Fewer nodes are no strip.
@@ -46,35 +48,14 @@ pub(crate) fn find(scene: &Scene<'_>, pieces: &mut Pieces, first: u32) {
         if pieces.labels[seed] != NONE || vain[seed] {
             continue;
         }
-        let mut nodes = about(scene, pieces, seed);
+        let nodes = about(scene, pieces, seed);
         // Seeds close by would fare no better.
         for &node in &nodes {
             vain[node as usize] = true;
         }
-        let Some(mut surface) = narrow_plane(scene, &nodes) else {
+        let Some((surface, nodes)) = grown(scene, pieces, seed, nodes) else {
             continue;
         };
-        if left(scene, &surface, &nodes) >= CLEAN {
-            continue;
-        }
-        for _ in 0..ROUNDS {
-            let lies_on = |n| surface.miss(scene, n) < MISS_NOISES;
-            let grown = flood(scene, pieces, seed, usize::MAX, lies_on);
-            let Some(next) = plane(scene, &grown) else {
-                break;
-            };
-            let settled = grown.len() == nodes.len();
-            (nodes, surface) = (grown, next);
-            if settled {
-                break;
-            }
-        }
-        if nodes.len() < LEAST_NODES
-            || left(scene, &surface, &nodes) >= CLEAN
-            || is_broad(scene, &nodes)
-        {
-            continue;
-        }
         let label = pieces.surfaces.len() as u32;
         pieces.surfaces.push(Some(surface));
         for node in nodes {
@@ -82,6 +63,39 @@ pub(crate) fn find(scene: &Scene<'_>, pieces: &mut Pieces, first: u32) {
         }
     }
     unite(scene, pieces, first);
+}
+
+/// The strip that grows from the nodes about a seed, and its plane.
+fn grown(
+    scene: &Scene<'_>,
+    pieces: &Pieces,
+    seed: usize,
+    mut nodes: Vec<u32>,
+) -> Option<(Surface, Vec<u32>)> {
+    let mut surface = narrow_plane(scene, &nodes)?;
+    if left(scene, &surface, &nodes) >= CLEAN {
+        return None;
+    }
+    let most = WIDE * (scene.grid.columns + scene.grid.rows);
+    for _ in 0..ROUNDS {
+        let lies_on = |n| surface.miss(scene, n) < MISS_NOISES;
+        let grown = flood(scene, pieces, seed, most, lies_on);
+        if grown.len() > most {
+            return None;
+        }
+        let Some(next) = plane(scene, &grown) else {
+            break;
+        };
+        let settled = grown.len() == nodes.len();
+        (nodes, surface) = (grown, next);
+        if settled {
+            break;
+        }
+    }
+    let is_strip = nodes.len() >= LEAST_NODES
+        && left(scene, &surface, &nodes) < CLEAN
+        && !is_broad(scene, &nodes);
+    is_strip.then_some((surface, nodes))
 }
 
 /// Makes one of strips, from this label on, that follow each other on one plane: the first part
