@@ -80,8 +80,11 @@ pub(crate) fn settle_nodes(
                     };
                     let goes_on = |face: &Face| {
                         let Surface::Patches(surface) = &face.surface;
-                        let there_mm = surface.z(image.x_mm(column), image.y_mm(row));
-                        (z_mm - there_mm).abs() <= OWN * image.pitch_mm()
+                        let (x_mm, y_mm) = (image.x_mm(column), image.y_mm(row));
+                        let above_mm = z_mm - surface.z(x_mm, y_mm);
+                        // Next to its silhouette a face is so steep that above is not away.
+                        let away_mm = above_mm * surface.normal(x_mm, y_mm)[2];
+                        away_mm.abs() <= OWN * image.pitch_mm()
                     };
                     let is_next = around(image, column, row)
                         .filter_map(|(column, row)| face_at(column, row))
