@@ -303,7 +303,7 @@ const BESIDE: f64 = 0.7;
 const STREWN: f64 = 2.0;
 /// Share of clean samples from which on what lies on no surface tells of another one. Edges cost
 /// some, since the differences that tell are those of three samples.
-const CLEAN: f64 = 0.985;
+const CLEAN: f64 = 0.95;
 /// Columns on either side that tell of the noise.
 const NOISE_COLUMNS: usize = 8;
 /// Least noise believed, in spacings: scans without any are computed ones.

@@ -182,6 +182,15 @@ fn consensus_keeps_flanks_between_faces() {
     assert!(own * 100 >= all * 83, "{own} of {all}");
 }
 
+/// So does a flank hardly wider than the pitch, of which no window holds more than a line of
+/// samples, at most of its nodes.
+#[test]
+fn consensus_keeps_flanks_of_one_sample() {
+    let (own, all) = own_nodes_of_flanks(0.5);
+    assert!(all > 180, "{all}");
+    assert!(own * 100 >= all * 58, "{own} of {all}");
+}
+
 /// How many nodes well within flanks of this width have their z, of how many.
 fn own_nodes_of_flanks(width_mm: f64) -> (usize, usize) {
     const TOP_MM: f64 = 5.0;
