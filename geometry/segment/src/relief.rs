@@ -20,6 +20,10 @@ use range_image::{Cancelled, Monitor};
 /// Smaller regions, and curved ones, join a neighbour when nothing speaks against it; a plane
 /// that is larger only when it is certain.
 const SMALL: usize = 400;
+/// Steps for every link from which on a border is a step and its links are noise's: where a plane
+/// ends, and between free forms, which break into steps where they are steep.
+const STEPS_OF_PLANE: usize = 1;
+const STEPS: usize = 3;
 
 /// Labels of the regions, and the number of pieces before merging.
 pub(crate) fn divide(
@@ -53,9 +57,12 @@ pub(crate) fn divide(
             }
             let is_small = sizes[0].min(sizes[1]) <= SMALL;
             let is_beside_plane = models.beside_plane(scene, labels, border, sizes);
-            // Where a plane ends mostly in steps, a few links across them are noise's. Free
-            // forms are not judged so: they break into steps where they are steep.
-            if is_beside_plane && border.steps > border.pairs.len() {
+            let most = if is_beside_plane {
+                STEPS_OF_PLANE
+            } else {
+                STEPS
+            };
+            if border.steps > most * border.pairs.len() {
                 return None;
             }
             if certain || !is_small && is_beside_plane {

@@ -222,6 +222,34 @@ fn a_step_parts_two_planes() {
     check("boss", &boss, 2);
 }
 
+/// Two free forms with a step between that dwindles to nothing at one end, as where a round thing
+/// rests on the ground it overhangs. A few links there do not make them one, unless pieces of
+/// both sides grew together beside them.
+#[test]
+fn a_step_that_dwindles_at_its_end_parts_free_forms() {
+    let ground = |x: f64, y: f64| 3.0 * libm::sin(x / 12.0) * libm::cos(y / 15.0);
+    let torn = move |x: f64, y: f64| {
+        let up = x > 0.2 * y;
+        let step = 0.1 * (y + 45.0).clamp(0.0, 20.0);
+        let z = ground(x, y) + if up { step } else { 0.0 };
+        (y.abs() < 45.0).then_some((z, 1 + u16::from(up)))
+    };
+    let parted = |seed: &u64| {
+        let spoil = Spoil {
+            noise_mm: 0.05,
+            dropouts: 0.0,
+            ragged: 0,
+        };
+        let scene = Scene::new(&torn, spoil, *seed);
+        let done = segment_with_report(&scene.image, &settings(Method::Relief), &Unmonitored)
+            .expect("default settings fit any scene");
+        let verdict = scene.judge(&done.regions);
+        verdict.regions == 2 && verdict.right >= 0.97
+    };
+    let seeds = 0..10;
+    assert!(seeds.filter(parted).count() >= 7);
+}
+
 #[test]
 fn one_surface_is_one_region() {
     let plane = |x: f64, y: f64| Some((0.6 * x - 0.25 * y, 1));
