@@ -75,8 +75,9 @@ pub struct RegionFit {
 /// border, and what smoothing may do.
 pub(crate) const SURFACE_MARGIN: f64 = 3.0;
 
-/// Narrowest span of a fitted spline, pitches.
-const LEAST_SPAN: f64 = 2.0;
+/// Narrowest span of a fitted spline, pitches: halving brings spans as near to two pitches as it
+/// can.
+const LEAST_SPAN: f64 = core::f64::consts::SQRT_2;
 
 /// A node with its place and height in millimetres.
 #[derive(Debug, Clone, Copy)]
