@@ -113,6 +113,9 @@ pub struct SettingsReport {
     /// What is done with a table or back plane: `remove` or `keep`.
     #[serde(default)]
     pub background: String,
+    /// What becomes of regions whose surfaces join smoothly: `split` or `keep`.
+    #[serde(default)]
+    pub smooth_joins: String,
     /// Region of interest, least and greatest x; `null` where there is no limit.
     #[serde(default)]
     pub roi_x_mm: [Option<f64>; 2],

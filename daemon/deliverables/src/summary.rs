@@ -69,6 +69,7 @@ pub(crate) fn settings(settings: &Settings, cad: &CadOptions) -> SettingsReport 
         minimum_nodes: settings.segment.minimum_nodes,
         minimum_area_mm2: settings.segment.minimum_area_mm2,
         background: settings.background.as_str().to_owned(),
+        smooth_joins: settings.smooth_joins.as_str().to_owned(),
         roi_x_mm: limits(settings.regrid.roi.x_mm),
         roi_y_mm: limits(settings.regrid.roi.y_mm),
         roi_z_mm: limits(settings.regrid.roi.z_mm),

@@ -95,6 +95,10 @@ fn shaping(settings: &pipeline::Settings) -> SettingOverrides {
         ("regrid.reach_columns", regrid.reach_columns.into()),
         ("regrid.estimator", regrid.estimator.as_str().into()),
         ("segment.minimum_nodes", segment.minimum_nodes.into()),
+        (
+            "segment.smooth_joins",
+            settings.smooth_joins.as_str().into(),
+        ),
         ("reconstruct.kinds", settings.kinds.as_str().into()),
         (
             "reconstruct.regularize",

@@ -98,6 +98,16 @@ pub enum BackgroundPolicy {
     Keep,
 }
 
+/// What becomes of a region of several surfaces that join smoothly.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SmoothJoins {
+    /// It is taken apart into faces of one kind each.
+    Split,
+    /// It stays one.
+    Keep,
+}
+
 /// Which kinds of surface faces may be of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -139,6 +149,10 @@ pub struct SegmentConfig {
     /// What is done with a recognised table, back plane or fixture.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub background: Option<BackgroundPolicy>,
+    /// What becomes of a region of several surfaces that join smoothly; kinds `auto` of method
+    /// `relief` only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smooth_joins: Option<SmoothJoins>,
 }
 
 /// From regions to trimmed surfaces.
@@ -362,6 +376,13 @@ impl Processing {
             self.segment.background.map(|policy| match policy {
                 BackgroundPolicy::Remove => pipeline::BackgroundPolicy::Remove,
                 BackgroundPolicy::Keep => pipeline::BackgroundPolicy::Keep,
+            }),
+        );
+        set(
+            &mut settings.smooth_joins,
+            self.segment.smooth_joins.map(|joins| match joins {
+                SmoothJoins::Split => pipeline::SmoothJoins::Split,
+                SmoothJoins::Keep => pipeline::SmoothJoins::Keep,
             }),
         );
         set(

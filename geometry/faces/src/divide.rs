@@ -2,7 +2,7 @@
 
 use range_image::{Cancelled, Monitor, RangeImage, RegionMap};
 use rayon::prelude::*;
-use shapes::{Fit, Verdict, decide};
+use shapes::{Fit, decide};
 
 use crate::compete::{NONE, Pieces};
 use crate::field::{Field, Set, places};
@@ -24,6 +24,15 @@ const MOST_OFF: f64 = 3.0;
 /// Blocks off that make a region one of several surfaces.
 const MOST_STRAYED: usize = 2;
 
+/// What becomes of the regions of an image.
+#[derive(Debug, Clone)]
+pub struct Divided {
+    /// The regions, of one surface each as far as they are of shapes.
+    pub regions: RegionMap,
+    /// Regions of several surfaces that stay whole, since no labels are left.
+    pub unlabelled: usize,
+}
+
 /// Takes regions apart into those of one surface each, and joins those that are of one.
 ///
 /// # Errors
@@ -33,7 +42,7 @@ pub fn divide(
     regions: &RegionMap,
     observations: &Observations,
     monitor: &dyn Monitor,
-) -> Result<RegionMap, Cancelled> {
+) -> Result<Divided, Cancelled> {
     let mut nodes: Vec<Vec<usize>> = vec![Vec::new(); usize::from(regions.regions())];
     for (node, label) in regions.raw_labels().iter().enumerate() {
         if let Some(own) = usize::from(*label).checked_sub(1) {
@@ -58,21 +67,34 @@ pub fn divide(
         Ok(pieces.iter().map(of_image).collect())
     });
     let split: Vec<Result<Vec<Vec<usize>>, Cancelled>> = split.collect();
+    let split = split.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut labels = regions.raw_labels().to_vec();
-    let mut next = regions.regions();
-    for pieces in split {
-        // The first keeps the label.
-        for piece in pieces?.iter().skip(1) {
-            let Some(label) = next.checked_add(1) else {
-                break;
-            };
-            next = label;
-            piece.iter().for_each(|node| labels[*node] = label);
-        }
-    }
+    let unlabelled = relabel(&mut labels, regions.regions(), &split);
     join(image, &mut labels, observations, monitor)?;
     place_borders(image, &mut labels, observations, monitor)?;
-    Ok(RegionMap::new(image, labels))
+    Ok(Divided {
+        regions: RegionMap::new(image, labels),
+        unlabelled,
+    })
+}
+
+/// Labels the pieces of each region, the first of which keeps the label. Gives how many regions
+/// stay whole since there are no labels left for their pieces.
+fn relabel(labels: &mut [u16], regions: u16, split: &[Vec<Vec<usize>>]) -> usize {
+    let mut next = regions;
+    let mut whole = 0;
+    for pieces in split {
+        let more = pieces.len().saturating_sub(1);
+        let Some(last) = u16::try_from(more).ok().and_then(|m| next.checked_add(m)) else {
+            whole += 1;
+            continue;
+        };
+        for (piece, label) in pieces[1.min(pieces.len())..].iter().zip(next + 1..=last) {
+            piece.iter().for_each(|node| labels[*node] = label);
+        }
+        next = last;
+    }
+    whole
 }
 
 /// Gives nodes at the borders of regions to those whose shape explains them best.
@@ -101,10 +123,7 @@ fn place_borders(
     let fits = sets.par_iter().map(|places| {
         monitor.check()?;
         let samples = field.samples_of(places, SOME);
-        match decide(&samples, observations.area()).verdict {
-            Verdict::Shape(fit) => Ok(Some(*fit)),
-            Verdict::FreeForm | Verdict::Unknown => Ok(None),
-        }
+        Ok(decide(&samples, observations.area()).into_fit())
     });
     let fits: Vec<Result<Option<Fit>, Cancelled>> = fits.collect();
     let mut pieces = Pieces {
@@ -154,4 +173,24 @@ fn strayed(field: &Field<'_>, fit: &Fit, half: usize) -> usize {
         }
     }
     strayed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_region_gets_labels_for_all_of_its_pieces_or_none() {
+        let mut labels = vec![1, 1, 2, 2, 2, 3, 3];
+        let split = [
+            vec![vec![0], vec![1]],
+            vec![vec![2], vec![3], vec![4]],
+            vec![vec![5], vec![6]],
+        ];
+        let whole = relabel(&mut labels, u16::MAX - 2, &split);
+        assert_eq!(whole, 1);
+        assert_eq!(labels, [1, u16::MAX - 1, 2, 2, 2, 3, u16::MAX]);
+        assert_eq!(relabel(&mut labels, 3, &[Vec::new(), vec![vec![2]]]), 0);
+        assert_eq!(labels[2], 2);
+    }
 }

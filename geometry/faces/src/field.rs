@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use nalgebra::Vector3;
 use range_image::RangeImage;
-use shapes::{Fit, Sample, Shape, Verdict, decide};
+use shapes::{Fit, Sample, Shape, decide};
 
 use crate::observations::Observations;
 
@@ -205,10 +205,7 @@ impl<'a> Field<'a> {
     /// The shape that a set's samples speak for, those so far from its border.
     pub(crate) fn fit(&self, set: &[bool], far: usize, most: usize) -> Option<Fit> {
         let samples = self.samples(set, far, most);
-        match decide(&samples, self.observations.area()).verdict {
-            Verdict::Shape(fit) => Some(*fit),
-            Verdict::FreeForm | Verdict::Unknown => None,
-        }
+        decide(&samples, self.area()).into_fit()
     }
 
     /// Whether there is a node.

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use range_image::{Cancelled, Monitor, RangeImage};
-use shapes::{Evidence, Sample, Shape, Verdict, decide};
+use shapes::{Evidence, Sample, Shape, decide};
 
 use crate::observations::Observations;
 
@@ -112,10 +112,10 @@ impl Regions<'_> {
 
 /// Whether one shape costs no more than two surfaces do.
 fn are_one(a: &(Vec<Sample>, Evidence), b: &(Vec<Sample>, Evidence), area: f64) -> bool {
-    let (Some(shape_a), Some(shape_b)) = (shape(&a.1), shape(&b.1)) else {
+    let (Some(fit_a), Some(fit_b)) = (a.1.fit(), b.1.fit()) else {
         return false;
     };
-    if off(&shape_a, &b.0).min(off(&shape_b, &a.0)) > FAR {
+    if off(&fit_a.shape, &b.0).min(off(&fit_b.shape, &a.0)) > FAR {
         return false;
     }
     let samples: Vec<Sample> = a.0.iter().chain(&b.0).copied().collect();
@@ -125,14 +125,7 @@ fn are_one(a: &(Vec<Sample>, Evidence), b: &(Vec<Sample>, Evidence), area: f64) 
         let best = evidence.candidates.iter().find(is_shape);
         best.map_or(f64::INFINITY, |candidate| candidate.score)
     });
-    shape(&both).is_some() && scores[2] <= scores[0] + scores[1]
-}
-
-fn shape(evidence: &Evidence) -> Option<Shape> {
-    match &evidence.verdict {
-        Verdict::Shape(fit) => Some(fit.shape),
-        Verdict::FreeForm | Verdict::Unknown => None,
-    }
+    both.fit().is_some() && scores[2] <= scores[0] + scores[1]
 }
 
 /// The median distance of samples off a shape, in their deviations.

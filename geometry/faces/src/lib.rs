@@ -21,5 +21,5 @@ mod join;
 mod observations;
 mod split;
 
-pub use divide::divide;
+pub use divide::{Divided, divide};
 pub use observations::Observations;

@@ -64,7 +64,7 @@ fn divided(
     let observations = Observations::new(SIDE * SIDE, &samples, 1.0);
     let regions = RegionMap::new(&image, labels);
     let divided = divide(&image, &regions, &observations, &Unmonitored).expect("not cancelled");
-    (image, divided)
+    (image, divided.regions)
 }
 
 /// Two planes at a right angle, seen at 45 degrees each, with a fillet of 6 mm between them: from

@@ -26,7 +26,7 @@ mod settings;
 pub use background::{BackgroundPolicy, Crumb, NodeRole, UnknownPolicy};
 pub use columns::{Columns, InMemory, ReadAgainError};
 pub use extent::{Extent, finest_pitch_mm, no_surface, unusual_size};
-pub use kinds::{Basis, Kinds, RegionKind, UnknownKinds};
+pub use kinds::{Basis, Kinds, RegionKind, SmoothJoins, UnknownKinds};
 pub use method::{Method, UnknownMethod};
 pub use observer::{Observer, Stage};
 pub use outlines::SettledNodes;
@@ -40,4 +40,4 @@ pub use regularize::{
     Settings as RegularizeSettings, Target,
 };
 pub use segment::{Background, BackgroundKind, BackgroundRegion, Plane, View};
-pub use settings::{Regularize, Settings, SettingsError, SmoothJoins};
+pub use settings::{Regularize, Settings, SettingsError};

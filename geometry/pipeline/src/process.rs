@@ -1,6 +1,6 @@
 //! The stages in their order.
 
-use faces::Observations;
+use faces::{Divided, Observations};
 use range_image::{Cancelled, Column, RangeImage, RegionMap};
 use reconstruct::metrics::compare;
 use reconstruct::{Evidence, Fitted, Method, ReconstructError, Reconstruction};
@@ -254,6 +254,7 @@ fn in_view(
     let columns = within.as_ref().map(|within| within as &dyn Columns);
     let view = view.within(roi.x_mm, roi.y_mm);
     let mut part = divide(image, &view, settings, observer)?;
+    let mut unlabelled = 0;
     let part_image = part.image.as_ref().unwrap_or(image);
     let is_relief = settings.reconstruct.method == Method::Relief;
     let has_kinds = settings.kinds == Kinds::Auto && is_relief;
@@ -264,7 +265,8 @@ fn in_view(
         && settings.smooth_joins == SmoothJoins::Split
         && let Some(samples) = &samples
     {
-        part.regions = faces(part_image, &part.regions, samples, observer)?;
+        let faces = faces(part_image, &part.regions, samples, observer)?;
+        (part.regions, unlabelled) = (faces.regions, faces.unlabelled);
     }
 
     observer.stage(Stage::Reconstruct);
@@ -310,6 +312,12 @@ fn in_view(
     }
     let notes = regularities.iter().flat_map(|own| &own.notes);
     reconstruction.warnings.extend(notes.cloned());
+    if unlabelled > 0 {
+        reconstruction.warnings.push(format!(
+            "{unlabelled} regions of several surfaces stay one face each: there are more faces \
+             than 65535; choose a larger pitch or a larger minimum region"
+        ));
+    }
     let mut settled = None;
     if let Some(columns) = columns.filter(|_| !beside.is_empty()) {
         let nodes = settle_nodes(
@@ -341,7 +349,7 @@ fn faces(
     regions: &RegionMap,
     samples: &[OnRegion],
     observer: &dyn Observer,
-) -> Result<RegionMap, Cancelled> {
+) -> Result<Divided, Cancelled> {
     let at_node = |on: &OnRegion| {
         let [column, row] = on.nearest(image);
         (column * image.rows() + row, on.sample)

@@ -4,7 +4,7 @@ use reconstruct::ReconstructSettings;
 use regrid::{Estimator, RegridSettings};
 use segment::SegmentSettings;
 
-use crate::{BackgroundPolicy, Kinds, Method};
+use crate::{BackgroundPolicy, Kinds, Method, SmoothJoins};
 
 /// The settings of every stage that can change the result.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,21 +47,6 @@ impl Regularize {
             Self::On(settings) => Some(settings.bound),
         }
     }
-}
-
-/// What becomes of a region of several surfaces that join smoothly.
-///
-/// No command and no configuration offers the choice yet: taking organic shapes apart, to find
-/// that they are of no kinds, takes seconds, and the numbers of the faces found are less sure
-/// than they say.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum SmoothJoins {
-    /// It stays one.
-    #[default]
-    Keep,
-    /// It is taken apart into faces of one kind each ([`faces::divide`]), whose numbers rest on
-    /// samples up to their borders.
-    Split,
 }
 
 /// A setting that cannot be used. The message says which, its limits, and its value.

@@ -45,6 +45,26 @@ pub struct Evidence {
     pub candidates: Vec<Candidate>,
 }
 
+impl Evidence {
+    /// The shape that the samples speak for, if they do for one.
+    #[must_use]
+    pub fn fit(&self) -> Option<&Fit> {
+        match &self.verdict {
+            Verdict::Shape(fit) => Some(fit),
+            Verdict::FreeForm | Verdict::Unknown => None,
+        }
+    }
+
+    /// The same, to keep.
+    #[must_use]
+    pub fn into_fit(self) -> Option<Fit> {
+        match self.verdict {
+            Verdict::Shape(fit) => Some(*fit),
+            Verdict::FreeForm | Verdict::Unknown => None,
+        }
+    }
+}
+
 /// Independent samples for each free number that a surface must have to be looked at.
 const PER_NUMBER: f64 = 3.0;
 /// Distances count up to so many deviations.

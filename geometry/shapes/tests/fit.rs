@@ -138,6 +138,37 @@ fn noise_along_rays_does_not_tilt_a_slope() {
 }
 
 #[test]
+fn what_turns_away_is_as_wide_as_it_is() {
+    // A rod seen from above to 75 degrees on either side, where noise along z is four times as
+    // great as on top: it moves samples by so much that the slope is another there.
+    const RADIUS_MM: f64 = 3.0;
+    let mut pulls = Vec::new();
+    for seed in 0..60 {
+        let mut random = Random(seed * 91 + 3);
+        let rod: Vec<Sample> = (0..3000)
+            .map(|_| {
+                let angle = (150.0 * random.uniform() - 75.0_f64).to_radians();
+                let (sin, cos) = libm::sincos(angle);
+                let sigma_mm = NOISE_MM / cos;
+                let z = RADIUS_MM * cos + sigma_mm * random.normal();
+                Sample {
+                    point_mm: Vector3::new(RADIUS_MM * sin, 40.0 * random.uniform(), z),
+                    ray: Vector3::z(),
+                    sigma_mm,
+                }
+            })
+            .collect();
+        let found = fit(Family::Cylinder, &rod, 1.0).expect("enough samples");
+        pulls.push(pull(found.numbers.radius_mm, RADIUS_MM));
+    }
+    let mean = pulls.iter().sum::<f64>() / pulls.len() as f64;
+    let square = pulls.iter().map(|pull| pull * pull).sum::<f64>() / pulls.len() as f64;
+    // By the slope at the samples it would be 4 deviations too narrow; 1.3 are left, which are not
+    // yet understood.
+    assert!(mean.abs() < 2.0 && square < 5.0, "{mean} {square}");
+}
+
+#[test]
 fn what_is_too_flat_or_too_little_is_of_no_such_family() {
     let plane = &cases()[0];
     let few = samples(plane, 3, 1);

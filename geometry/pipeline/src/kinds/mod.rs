@@ -12,9 +12,8 @@ use rayon::prelude::*;
 use regularize::Adjusted;
 use shapes::{Evidence, Numbers, Shape, Verdict};
 
-use crate::SmoothJoins;
 use bearing::Bearing;
-pub use policy::{Kinds, UnknownKinds};
+pub use policy::{Kinds, SmoothJoins, UnknownKinds};
 use samples::OnRegion;
 
 /// A region's kind of surface.

@@ -34,6 +34,30 @@ impl fmt::Display for Kinds {
     }
 }
 
+/// What becomes of a region of several surfaces that join smoothly.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum SmoothJoins {
+    /// It is taken apart into faces of one kind each ([`faces::divide`]).
+    Split,
+    /// It stays one.
+    #[default]
+    Keep,
+}
+
+impl SmoothJoins {
+    /// Every choice.
+    pub const ALL: [Self; 2] = [Self::Split, Self::Keep];
+
+    /// As it is spelt in settings and reports.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Split => "split",
+            Self::Keep => "keep",
+        }
+    }
+}
+
 /// No such choice.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is no choice of kinds; known are auto and freeform")]

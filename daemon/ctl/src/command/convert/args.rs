@@ -7,7 +7,7 @@ use deliverables::{
     CadOptions, Entities, LengthUnit, MeshFormat, MeshOptions, PointFormat, Schema, file_stem,
 };
 use jiff::Timestamp;
-use pipeline::{Kinds, Method, Settings};
+use pipeline::{Kinds, Method, Settings, SmoothJoins};
 use scan_files::Units;
 
 use crate::command::part::PartArgs;
@@ -40,6 +40,10 @@ pub(crate) struct Args {
     /// for them (auto), or free forms all; default: auto
     #[arg(long, value_name = "KINDS", value_enum)]
     kinds: Option<KindsName>,
+    /// Take regions apart where their surfaces join smoothly, as a fillet and a plane do (split),
+    /// or leave them whole (keep); default: what a .scan file was set to, else keep
+    #[arg(long, value_name = "WHAT", value_enum)]
+    smooth_joins: Option<SmoothJoinsName>,
     /// Root mean square distance from the range image at which a surface is near enough,
     /// millimetres
     #[arg(long, value_name = "MM")]
@@ -123,6 +127,12 @@ enum MethodName {
 enum KindsName {
     Auto,
     Freeform,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SmoothJoinsName {
+    Split,
+    Keep,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -342,6 +352,12 @@ impl Args {
             settings.kinds = match kinds {
                 KindsName::Auto => Kinds::Auto,
                 KindsName::Freeform => Kinds::FreeForm,
+            };
+        }
+        if let Some(joins) = self.smooth_joins {
+            settings.smooth_joins = match joins {
+                SmoothJoinsName::Split => SmoothJoins::Split,
+                SmoothJoinsName::Keep => SmoothJoins::Keep,
             };
         }
         if let Some(seed) = self.seed {
