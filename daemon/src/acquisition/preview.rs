@@ -88,7 +88,7 @@ pub(crate) fn preview(
 fn shaping(settings: &pipeline::Settings) -> SettingOverrides {
     let (regrid, segment, reconstruct) =
         (&settings.regrid, &settings.segment, &settings.reconstruct);
-    let all: [(&str, serde_json::Value); 10] = [
+    let all: [(&str, serde_json::Value); 11] = [
         ("regrid.pitch_mm", regrid.pitch_mm.into()),
         ("regrid.neighbours", regrid.neighbours.into()),
         ("regrid.draws", regrid.draws.into()),
