@@ -17,6 +17,8 @@ const MOST_OFF: f64 = 4.0;
 const FREE: f64 = 4.0;
 /// What it costs to be unlike a neighbour, in the same.
 const UNLIKE: f64 = 1.5;
+/// How many times as far off a shape as it may a node lies that is no node of it.
+const ACROSS: f64 = 2.0;
 /// Nodes at the border of a piece that its shape is not fitted to.
 const FAR: usize = 1;
 /// Samples that shapes are fitted to.
@@ -161,8 +163,13 @@ impl Pieces<'_, '_> {
             return None;
         }
         let near = self.field.around(place, REACH).map(|p| self.labels[p]);
+        // What lies across a step is near in the image alone.
+        let is_near = |label: usize| {
+            let fit = self.fits[label].as_ref();
+            fit.is_some_and(|fit| label == own || self.field.off(&fit.shape, place) <= ACROSS)
+        };
         let mut near: Vec<usize> = near
-            .filter(|label| *label != NONE && self.fits[*label].is_some())
+            .filter(|label| *label != NONE && is_near(*label))
             .collect();
         near.sort_unstable();
         near.dedup();

@@ -71,7 +71,8 @@ pub fn divide(
     let mut labels = regions.raw_labels().to_vec();
     let unlabelled = relabel(&mut labels, regions.regions(), &split);
     join(image, &mut labels, observations, monitor)?;
-    place_borders(image, &mut labels, observations, monitor)?;
+    let changed = changed(regions.raw_labels(), &labels);
+    place_borders(image, &mut labels, &changed, observations, monitor)?;
     Ok(Divided {
         regions: RegionMap::new(image, labels),
         unlabelled,
@@ -97,16 +98,32 @@ fn relabel(labels: &mut [u16], regions: u16, split: &[Vec<Vec<usize>>]) -> usize
     whole
 }
 
-/// Gives nodes at the borders of regions to those whose shape explains them best.
+/// Which labels, as indices, have lost or gained nodes.
+fn changed(before: &[u16], after: &[u16]) -> Vec<bool> {
+    let most = before.iter().chain(after).copied().max().unwrap_or(0);
+    let mut changed = vec![false; usize::from(most) + 1];
+    for (old, new) in before.iter().zip(after).filter(|(old, new)| old != new) {
+        changed[usize::from(*old)] = true;
+        changed[usize::from(*new)] = true;
+    }
+    changed
+}
+
+/// Gives nodes at the borders of changed regions to those whose shape explains them best. Other
+/// borders are where the nodes on either side have them, at steps, too.
 fn place_borders(
     image: &RangeImage,
     labels: &mut [u16],
+    changed: &[bool],
     observations: &Observations,
     monitor: &dyn Monitor,
 ) -> Result<(), Cancelled> {
     let labelled: Vec<usize> = (0..labels.len())
         .filter(|node| labels[*node] != 0)
         .collect();
+    if !changed.contains(&true) {
+        return Ok(());
+    }
     let Some(field) = Field::new(image, observations, &labelled) else {
         return Ok(());
     };
@@ -136,7 +153,10 @@ fn place_borders(
         if let Some(node) = field.node(place)
             && *label != NONE
         {
-            labels[node.index] = *label as u16 + 1;
+            let (old, new) = (&mut labels[node.index], *label as u16 + 1);
+            if changed[usize::from(*old)] || changed[usize::from(new)] {
+                *old = new;
+            }
         }
     }
     Ok(())

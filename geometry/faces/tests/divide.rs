@@ -131,6 +131,17 @@ fn a_surface_that_was_cut_is_joined_and_another_is_not() {
 }
 
 #[test]
+fn a_border_stays_where_it_is_between_regions_that_are_whole() {
+    // One column beside the ridge.
+    let halves = |column, _| if column < SIDE / 2 - 1 { 1 } else { 2 };
+    let (_, roof) = divided(|x, _| -0.2 * (x - MIDDLE_MM).abs(), halves);
+    let moved = (0..SIDE)
+        .flat_map(|column| (0..SIDE).map(move |row| (column, row)))
+        .filter(|&(column, row)| roof.label(column, row) != halves(column, row));
+    assert_eq!(moved.count(), 0);
+}
+
+#[test]
 fn a_rim_is_taken_from_the_plane_that_it_hardly_disturbs() {
     let (edge_mm, from_mm) = (27.0, 22.0);
     let rounded = |x: f64, y: f64| {
@@ -157,11 +168,14 @@ fn a_rim_is_taken_from_the_plane_that_it_hardly_disturbs() {
 #[test]
 fn nodes_at_a_ragged_border_go_to_the_surface_that_they_lie_on() {
     let ridge = (MIDDLE_MM / PITCH_MM).round() as usize;
+    // The second was cut, and is joined.
     let ragged = |column, row| {
         if column + row * 7 % 3 < ridge + 1 {
             1
-        } else {
+        } else if row < SIDE / 2 {
             2
+        } else {
+            3
         }
     };
     let (_, regions) = divided(|x, _| -0.2 * (x - MIDDLE_MM).abs(), ragged);

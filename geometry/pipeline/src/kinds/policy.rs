@@ -38,9 +38,9 @@ impl fmt::Display for Kinds {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum SmoothJoins {
     /// It is taken apart into faces of one kind each ([`faces::divide`]).
+    #[default]
     Split,
     /// It stays one.
-    #[default]
     Keep,
 }
 

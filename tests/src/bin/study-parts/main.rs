@@ -67,9 +67,9 @@ struct Options {
     /// List every face that is not as it should be
     #[arg(long)]
     list: bool,
-    /// Take regions apart at smooth joins, which the service does not do yet
+    /// Leave regions whole whose surfaces join smoothly
     #[arg(long, conflicts_with = "write")]
-    split: bool,
+    keep: bool,
     /// Give the shapes the regularities that they are likely to have
     #[arg(long, conflicts_with = "write")]
     regularize: bool,
@@ -84,8 +84,8 @@ struct Options {
 impl Options {
     /// What is done otherwise than the service does it.
     fn change(&self, settings: &mut Settings) {
-        if self.split {
-            settings.smooth_joins = SmoothJoins::Split;
+        if self.keep {
+            settings.smooth_joins = SmoothJoins::Keep;
         }
         if self.regularize {
             settings.regularize = Regularize::On(RegularizeSettings::default());

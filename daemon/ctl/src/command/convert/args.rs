@@ -41,7 +41,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "KINDS", value_enum)]
     kinds: Option<KindsName>,
     /// Take regions apart where their surfaces join smoothly, as a fillet and a plane do (split),
-    /// or leave them whole (keep); default: what a .scan file was set to, else keep
+    /// or leave them whole (keep); default: what a .scan file was set to, else split
     #[arg(long, value_name = "WHAT", value_enum)]
     smooth_joins: Option<SmoothJoinsName>,
     /// Root mean square distance from the range image at which a surface is near enough,
