@@ -2,7 +2,7 @@
 
 use range_image::{Cancelled, Monitor};
 use rayon::prelude::*;
-use shapes::{is_smooth, spread};
+use shapes::{Family, Fit, Shape, fit, is_smooth, spread};
 
 use crate::compete::{NONE, Pieces};
 use crate::field::{Field, Set, count, places};
@@ -20,6 +20,13 @@ const EXPLAINED: f64 = 0.5;
 const BESIDE: usize = 8;
 /// Nodes of a piece beside another that make them neighbours.
 const CONTACT: usize = 3;
+/// How much more variance a plane may leave of a piece than its shape does for the piece to be flat,
+/// samples that tell, and deviations up to which they count as off.
+const FLAT: f64 = 2.0;
+const SAMPLES: usize = 500;
+const STRAY: f64 = 4.0;
+/// Cosine of the turn (0.1 rad) up to which flat pieces of one region meet in no crease.
+const NO_CREASE: f64 = 0.995;
 /// Windows of a size that are looked at in a region, at most, and how many at once.
 const MOST_SEEDS: usize = 60;
 const AT_ONCE: usize = 8;
@@ -177,10 +184,38 @@ fn is_smooth_between(field: &Field<'_>, a: &Piece, b: &Piece) -> bool {
     let beside = |own: &Set, other: &Set| {
         field.samples_at(places(&field.near(own, other, BESIDE)).into_iter())
     };
+    if meet_gently(field, (fit_a, &a.nodes), (fit_b, &b.nodes)) {
+        return true;
+    }
     is_smooth(&[
         (fit_a, beside(&a.nodes, &b.nodes)),
         (fit_b, beside(&b.nodes, &a.nodes)),
     ])
+}
+
+/// Whether two pieces are flat and meet in no crease. Faces join smoothly where their curvature
+/// changes, and flat ones have none: these are parts of a surface that is wavy, as a plate is to
+/// a scanner that is not quite straight.
+fn meet_gently(field: &Field<'_>, a: (&Fit, &Set), b: (&Fit, &Set)) -> bool {
+    let flat = |(own, nodes): (&Fit, &Set)| {
+        if let Shape::Plane(_) = own.shape {
+            return Some(own.clone());
+        }
+        let samples = field.samples(nodes, 0, SAMPLES);
+        let plane = fit(Family::Plane, &samples, field.area())?;
+        let left = |fit: &Fit| {
+            fit.offs(&samples)
+                .map(|o| o.abs().min(STRAY).powi(2))
+                .sum::<f64>()
+        };
+        (left(&plane) <= FLAT * left(own)).then_some(plane)
+    };
+    let (Some(plane_a), Some(plane_b)) = (flat(a), flat(b)) else {
+        return false;
+    };
+    // Planes have the same normal everywhere.
+    let normal = |plane: &Fit| plane.shape.normal(&nalgebra::Vector3::zeros());
+    normal(&plane_a).dot(&normal(&plane_b)).abs() > NO_CREASE
 }
 
 /// What is grown from windows of a size all over what is open.

@@ -116,6 +116,13 @@ fn what_is_of_one_surface_stays_whole() {
 }
 
 #[test]
+fn a_plate_that_a_scanner_sees_wavy_stays_whole() {
+    // Strips of it are planes, turned by 2 degrees against each other.
+    let wavy = |x: f64, _: f64| 0.1 * x + 0.08 * libm::asin(libm::sin(x / 4.0));
+    assert_eq!(divided(wavy, |_, _| 1).1.regions(), 1);
+}
+
+#[test]
 fn a_surface_that_was_cut_is_joined_and_another_is_not() {
     let cylinder = |x: f64, _: f64| libm::sqrt(40.0 * 40.0 - (x - MIDDLE_MM).powi(2));
     let halves = |column, _| if column < SIDE / 3 { 1 } else { 2 };
