@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 
-use crate::shell;
+use crate::{shell, study};
 
 /// The judge's packages, pinned: another OpenCASCADE may judge otherwise.
 const PACKAGES: [&str; 2] = ["cadquery-ocp==8.0.1.1.0", "numpy"];
@@ -81,10 +81,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     packages.extend(options.gmsh.then_some(GMSH));
     let python = python_with(&place, &packages)?;
     let scenes = options.out.clone().unwrap_or_else(|| place.join("scenes"));
-    shell::run(
-        "cargo",
-        &["build", "--release", "--package", "relief-tests", "--bins"],
-    )?;
+    study::build()?;
     let judges = Judges {
         python,
         cadmpeg: cadmpeg(&place)?,

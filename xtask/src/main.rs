@@ -59,6 +59,8 @@ enum Chore {
     ///
     /// Needs `systemd-analyze`, which it installs on Debian as root.
     Units,
+    /// Build the studies, judges and other programs of the checks, all at once.
+    Programs,
     /// Make the Debian package of service, command line, units, manual pages and completions.
     ///
     /// Needs Debian's tools; installs `cargo-deb` below the target folder.
@@ -83,6 +85,7 @@ fn main() -> anyhow::Result<()> {
             study::program("soak", &options)
         }
         Chore::Units => units::check(),
+        Chore::Programs => study::build(),
         Chore::Deb(options) => deb::run(&options),
         Chore::Vm(vm) => vm::run(&vm),
         Chore::Full => full(),

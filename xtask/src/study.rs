@@ -121,6 +121,13 @@ pub(crate) fn service() -> Result<()> {
     shell::run("cargo", &["build", "--release", "--package", "reliefd"])
 }
 
+/// Builds all programs of the tests. From here, since libraries with build scripts are built anew
+/// where the environment differs, and that of a chore does.
+pub(crate) fn build() -> Result<()> {
+    let words = ["build", "--release", "--package", "relief-tests", "--bins"];
+    shell::run("cargo", &words)
+}
+
 /// Runs a program of the tests' crate, built for speed.
 pub(crate) fn program(name: &str, options: &[OsString]) -> Result<()> {
     program_of("relief-tests", name, options)
