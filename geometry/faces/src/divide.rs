@@ -21,6 +21,9 @@ const FEWEST: usize = 8;
 const STRAYED: f64 = 4.0;
 /// Samples count as off up to so many deviations.
 const MOST_OFF: f64 = 3.0;
+/// A shape about which samples deviate by more than this is one of no surface, and says nothing of
+/// their noise.
+const MOST_DEVIATION: f64 = 2.0;
 /// Blocks off that make a region one of several surfaces.
 const MOST_STRAYED: usize = 2;
 
@@ -187,7 +190,7 @@ fn strayed(field: &Field<'_>, fit: &Fit, half: usize) -> usize {
             if samples.len() >= FEWEST {
                 let offs = fit.offs(&samples).map(|off| off.clamp(-MOST_OFF, MOST_OFF));
                 let mean = offs.sum::<f64>() / samples.len() as f64;
-                let chance = fit.deviation() / (samples.len() as f64).sqrt();
+                let chance = fit.deviation().min(MOST_DEVIATION) / (samples.len() as f64).sqrt();
                 strayed += usize::from(mean.abs() > STRAYED * chance);
             }
         }
@@ -197,7 +200,50 @@ fn strayed(field: &Field<'_>, fit: &Fit, half: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+    use range_image::{Lattice, NodeQuality};
+    use shapes::Sample;
+
     use super::*;
+
+    /// Whether a strip of 6 by 150 nodes is of one shape, with a sample at each and z by row.
+    fn is_one_strip(z_mm: impl Fn(f64) -> f64) -> bool {
+        const SIGMA_MM: f64 = 0.01;
+        let mut image = RangeImage::masked(Lattice { pitch_mm: 0.15 }, 0, 0, 6, 150);
+        let mut samples = Vec::new();
+        for node in 0..900 {
+            let (column, row) = (node / 150, node % 150);
+            // Between -1 and 1, and in no order.
+            let turned = (node as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+            let mixed = (turned ^ (turned >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 40;
+            let stray = mixed as f64 / f64::from(1 << 23) - 1.0;
+            let z_mm = z_mm(image.y_mm(row)) + 1.7 * SIGMA_MM * stray;
+            image.set_z_mm(column, row, Some(z_mm));
+            let quality = NodeQuality {
+                inliers: 30,
+                samples: 32,
+                scale_mm: SIGMA_MM as f32,
+                nearest_mm: 0.0,
+            };
+            image.set_quality(column, row, quality);
+            let sample = Sample {
+                point_mm: Vector3::new(image.x_mm(column), image.y_mm(row), z_mm),
+                ray: Vector3::z(),
+                sigma_mm: SIGMA_MM,
+            };
+            samples.push((node, sample));
+        }
+        let observations = Observations::new(900, &samples, 1.0);
+        let all: Vec<usize> = (0..900).collect();
+        is_one(&Field::new(&image, &observations, &all).unwrap())
+    }
+
+    #[test]
+    fn a_shape_that_nothing_lies_on_does_not_make_a_region_one() {
+        assert!(is_one_strip(|y| 0.4 * y));
+        // Some shape is nearest to waves, too.
+        assert!(!is_one_strip(|y| libm::sin(1.5 * y)));
+    }
 
     #[test]
     fn a_region_gets_labels_for_all_of_its_pieces_or_none() {
