@@ -40,13 +40,21 @@ pub enum Set {
 /// Which scenes of a set.
 ///
 /// Those for tuning may be looked at while a method is made; those for judging are for its
-/// figures only.
+/// figures only. Figures are looked at, too, and what has been chosen since knows of them; those
+/// that confirm are scanned when a method is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Purpose {
     /// Seeds 1, 2, ...
     Tune,
     /// Seeds 1001, 1002, ...
     Judge,
+    /// Seeds 2001, 2002, ...
+    Confirm,
+}
+
+impl Purpose {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Tune, Self::Judge, Self::Confirm];
 }
 
 /// A region with fewer nodes is listed, not counted.
@@ -80,6 +88,7 @@ impl Set {
         let first = match purpose {
             Purpose::Tune => 1,
             Purpose::Judge => 1001,
+            Purpose::Confirm => 2001,
         };
         first..first + self.scenes()
     }

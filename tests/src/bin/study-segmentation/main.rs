@@ -16,7 +16,7 @@ mod tally;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use clap::{Parser, ValueEnum};
 use rayon::prelude::*;
 use relief_tests::scenes::{Purpose, Set, View};
@@ -31,7 +31,7 @@ use crate::tally::{Finding, Tally};
 #[derive(Debug, Parser)]
 #[command(name = "study-segmentation", version)]
 struct Options {
-    /// Scenes to look at while tuning, or those for figures only
+    /// Scenes to look at while tuning, those for figures only, or those for the last word
     #[arg(long = "set", value_enum, default_value = "tune")]
     purpose: PurposeName,
     /// The first few scenes of each set only
@@ -61,7 +61,7 @@ struct Options {
     /// Other parameters for CGAL
     #[arg(long, value_name = "WORDS", requires = "peers")]
     cgal: Option<String>,
-    /// Write the tables to docs/studies/segmentation.md
+    /// Write the tables to docs/studies/segmentation.md, or those of scenes that confirm beside it
     #[arg(long)]
     write: bool,
     /// Fail unless every bar holds
@@ -76,6 +76,21 @@ struct Options {
 enum PurposeName {
     Tune,
     Judge,
+    Confirm,
+}
+
+impl PurposeName {
+    /// Where its figures are written, and what stands above them.
+    fn page(self) -> Result<(&'static str, &'static str)> {
+        match self {
+            Self::Tune => bail!("scenes for tuning have no page: add `--set judge`"),
+            Self::Judge => Ok(("segmentation.md", include_str!("preface.md"))),
+            Self::Confirm => Ok((
+                "segmentation-confirmed.md",
+                include_str!("preface-confirmed.md"),
+            )),
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -114,6 +129,7 @@ impl Options {
         let purpose = match self.purpose {
             PurposeName::Tune => Purpose::Tune,
             PurposeName::Judge => Purpose::Judge,
+            PurposeName::Confirm => Purpose::Confirm,
         };
         let seeds = set.seeds(purpose);
         match self.scene {
@@ -172,6 +188,7 @@ impl Account {
 
 /// Whether everything that was checked holds.
 fn run(options: &Options) -> Result<bool> {
+    let page = options.write.then(|| options.purpose.page()).transpose()?;
     let store = Store::open()?;
     let mut account = Account::default();
     if let Some(folder) = &options.pictures {
@@ -225,9 +242,9 @@ fn run(options: &Options) -> Result<bool> {
         }
     }
     account.say(&report::verdicts(&bars));
-    if options.write {
-        let file = material::root().join("docs/studies/segmentation.md");
-        let text = format!("{}{}", include_str!("preface.md"), account.0);
+    if let Some((name, preface)) = page {
+        let file = material::root().join("docs/studies").join(name);
+        let text = format!("{preface}{}", account.0);
         std::fs::create_dir_all(file.parent().context("no folder")?)?;
         std::fs::write(&file, text).with_context(|| format!("cannot write {}", file.display()))?;
     }
