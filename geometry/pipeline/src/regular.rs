@@ -190,7 +190,7 @@ mod tests {
         let bearings = [Bearing {
             samples,
             area: 1.0,
-            beside: Vec::new(),
+            ..Bearing::default()
         }];
         let is_borne = |deviations: f64| {
             let Shape::Plane(mut plane) = found.shape else {

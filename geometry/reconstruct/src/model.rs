@@ -69,7 +69,7 @@ pub enum EdgeKind {
 pub enum EdgeOrigin {
     /// The samples beside it tell.
     Measured,
-    /// The surfaces on its two sides intersect there.
+    /// The surfaces on its two sides intersect there, or touch.
     Intersected,
     /// It is drawn between the nodes of its two sides, and nothing tells more.
     Assumed,

@@ -189,12 +189,12 @@ impl<'a> Fitted<'a> {
         };
         let placement = Placement::of(image);
         let cracks = trace(&self.pieces);
-        let placed = intersections(&cracks, &self.surfaces, placement);
-        monitor.progress(0.4);
         let fitted = self.surfaces.iter().zip(&self.nodes);
         let sides: Vec<(&PatchSurface, f64)> = fitted
             .map(|(surface, nodes)| (surface, residuals(image, nodes, surface).0))
             .collect();
+        let placed = intersections(&cracks, &sides, placement);
+        monitor.progress(0.4);
         let outlines = Outlines {
             steps: steps(&cracks, &placed, &sides, placement),
             samples: evidence
@@ -358,7 +358,10 @@ fn origins(
     placement: Placement,
     monitor: &dyn Monitor,
 ) -> Result<Vec<EdgeOrigin>, Cancelled> {
-    let surfaces: Vec<&PatchSurface> = carriers.iter().map(|carrier| &carrier.surface).collect();
+    let fitted = carriers
+        .iter()
+        .map(|carrier| (&carrier.surface, carrier.rms_mm));
+    let surfaces: Vec<(&PatchSurface, f64)> = fitted.collect();
     let is_crease: Vec<bool> = kinds.iter().map(|kind| *kind == EdgeKind::Crease).collect();
     let is_met = meet(planar, &surfaces, &is_crease, placement, monitor)?;
     let edges = planar.edges.iter().zip(is_met);

@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Vector2;
 use range_image::{RangeImage, RegionMap};
 use shapes::{Evidence, Fit, Sample, Shape, decide};
 
+use super::joins::Joining;
 use super::samples::OnRegion;
 use crate::neighbourhood::{DEEPEST, depth};
 
@@ -17,6 +19,9 @@ const AGREE: f64 = 2.0;
 const STRAY: f64 = 4.0;
 /// Deviations by which more than half of these must be off the neighbour's shape.
 const APART: f64 = 3.0;
+/// How far from a node another region may be for its samples to lie near that, in nodes: borders of
+/// smooth joins are off by no more.
+const JOINING: usize = 4;
 /// How much less sure the surface is at its border than in its middle, in variance.
 const AT_BORDER: f64 = 4.0;
 
@@ -27,6 +32,10 @@ pub(crate) struct Bearing {
     pub(crate) samples: Vec<Sample>,
     /// As [`shapes::fit`] has it.
     pub(crate) area: f64,
+    /// Those of them that lie near no other region.
+    pub(crate) far: Vec<Sample>,
+    /// Samples near other regions, well within or not.
+    pub(crate) joining: Vec<Joining>,
     /// Samples near the border, those together that lie beside the same neighbour, as deep, with
     /// its label. They may be the neighbour's.
     pub(crate) beside: Vec<(u16, Vec<Sample>)>,
@@ -38,28 +47,32 @@ impl Bearing {
         decide(&self.samples, self.area)
     }
 
-    /// A shape's numbers by the samples beside neighbours as well, where they agree: beside what
-    /// is of no region, and beside shapes that they are off. `shapes` are those of all regions, in
-    /// the order of their labels. Where a surface goes over into the next smoothly, no sample tells
-    /// which of both it is of.
-    pub(super) fn refine(&self, fit: &Fit, shapes: &[Option<Shape>]) -> Option<Fit> {
-        let mut samples = self.samples.clone();
+    /// The samples beside neighbours that are of a shape as well, where they agree with it: beside
+    /// what is of no region, and beside shapes that they are off; and the neighbours whose shape
+    /// goes on from this one, so that no distance tells which of both a sample is of. `shapes` are
+    /// those of all regions, in the order of their labels.
+    pub(super) fn besides(&self, fit: &Fit, shapes: &[Option<Shape>]) -> (Vec<Sample>, Vec<u16>) {
+        let (mut samples, mut smooth) = (Vec::new(), Vec::new());
         for (neighbour, beside) in &self.beside {
-            let is_apart = match usize::from(*neighbour).checked_sub(1) {
+            let shape = usize::from(*neighbour)
+                .checked_sub(1)
+                .map(|k| shapes.get(k));
+            let is_apart = match shape {
                 None => true,
-                Some(other) => match shapes.get(other) {
-                    Some(Some(shape)) => is_off(shape, beside),
-                    _ => false,
-                },
+                Some(Some(Some(shape))) if !is_off(shape, beside) => {
+                    smooth.push(*neighbour);
+                    false
+                }
+                Some(Some(Some(_))) => true,
+                _ => false,
             };
             if is_apart && agree(fit, beside) {
                 samples.extend(beside);
             }
         }
-        if samples.len() == self.samples.len() {
-            return None;
-        }
-        fit.again(&samples, self.area)
+        smooth.sort_unstable();
+        smooth.dedup();
+        (samples, smooth)
     }
 }
 
@@ -106,12 +119,23 @@ pub(super) fn of_samples(
         let mut beside: BTreeMap<(usize, u16), Vec<Sample>> = BTreeMap::new();
         // From the innermost on.
         for (depth, ring) in by_depth.into_iter().enumerate().rev() {
-            if bearing.samples.len() < ENOUGH {
-                bearing.samples.extend(ring.iter().map(|on| on.sample));
-                continue;
-            }
+            let is_within = bearing.samples.len() < ENOUGH;
             for on in ring {
                 let [column, row] = on.nearest(image);
+                match way(regions, column, row) {
+                    Some((neighbour, across)) => bearing.joining.push(Joining {
+                        sample: on.sample,
+                        neighbour,
+                        across,
+                        is_within,
+                    }),
+                    None if is_within => bearing.far.push(on.sample),
+                    None => {}
+                }
+                if is_within {
+                    bearing.samples.push(on.sample);
+                    continue;
+                }
                 let neighbour = neighbour(regions, column, row);
                 let group = beside.entry((depth, neighbour)).or_default();
                 group.push(on.sample);
@@ -135,6 +159,24 @@ fn depth_of(regions: &RegionMap, on: &OnRegion, label: usize) -> u8 {
         if is_own { depth(regions, c, r) } else { 0 }
     };
     corners.into_iter().map(depth).min().unwrap_or(0)
+}
+
+/// The region nearest to a node that is not its own, and the way there, no farther than
+/// [`JOINING`].
+fn way(regions: &RegionMap, column: usize, row: usize) -> Option<(u16, Vector2<f64>)> {
+    let own = regions.label(column, row);
+    let mut best: Option<(usize, u16, Vector2<f64>)> = None;
+    for c in column.saturating_sub(JOINING)..(column + JOINING + 1).min(regions.columns()) {
+        for r in row.saturating_sub(JOINING)..(row + JOINING + 1).min(regions.rows()) {
+            let label = regions.label(c, r);
+            let far = c.abs_diff(column).pow(2) + r.abs_diff(row).pow(2);
+            if label != own && label != 0 && best.is_none_or(|(least, ..)| far < least) {
+                let way = Vector2::new(c as f64 - column as f64, r as f64 - row as f64);
+                best = Some((far, label, way.normalize()));
+            }
+        }
+    }
+    best.map(|(_, label, across)| (label, across))
 }
 
 /// The label nearest to a node that is not its own.

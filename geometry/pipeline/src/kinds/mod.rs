@@ -1,6 +1,7 @@
 //! What kind of surface each region is.
 
 pub(crate) mod bearing;
+mod joins;
 mod nodes;
 mod policy;
 pub(crate) mod samples;
@@ -10,11 +11,14 @@ use core::num::NonZeroU16;
 use range_image::{Cancelled, Monitor, RangeImage, RegionMap};
 use rayon::prelude::*;
 use regularize::Adjusted;
-use shapes::{Evidence, Numbers, Shape, Verdict};
+use shapes::{Evidence, Fit, Numbers, Shape, Verdict};
 
 use bearing::Bearing;
 pub use policy::{Kinds, SmoothJoins, UnknownKinds};
 use samples::OnRegion;
+
+/// Rounds in which neighbours are fitted to what is theirs by each other's last shape.
+const ROUNDS: usize = 3;
 
 /// A region's kind of surface.
 #[derive(Debug, Clone)]
@@ -103,19 +107,38 @@ pub(crate) fn kinds(
             bearings,
         });
     }
-    let shapes: Vec<Option<Shape>> = decided.iter().map(RegionKind::shape).collect();
-    decided
-        .par_iter_mut()
-        .zip(&bearings)
-        .for_each(|(kind, bearing)| {
-            if let Verdict::Shape(fit) = &mut kind.evidence.verdict
-                && let Some(refined) = bearing.refine(fit, &shapes)
-            {
+    for _ in 0..ROUNDS {
+        let shapes: Vec<Option<Shape>> = decided.iter().map(RegionKind::shape).collect();
+        let refined = decided.par_iter().zip(&bearings).map(|(kind, bearing)| {
+            monitor.check()?;
+            let fit = kind.evidence.fit();
+            Ok(fit.and_then(|fit| refined(kind.label, fit, bearing, (&bearings, &shapes))))
+        });
+        let refined: Vec<Result<Option<Fit>, Cancelled>> = refined.collect();
+        for (kind, refined) in decided.iter_mut().zip(refined) {
+            if let (Some(refined), Verdict::Shape(fit)) = (refined?, &mut kind.evidence.verdict) {
                 **fit = refined;
             }
-        });
+        }
+    }
     Ok(Decided {
         kinds: decided,
         bearings,
     })
+}
+
+/// A region's shape by what is of it near its border, too.
+fn refined(
+    label: NonZeroU16,
+    fit: &Fit,
+    bearing: &Bearing,
+    all: (&[Bearing], &[Option<Shape>]),
+) -> Option<Fit> {
+    let (besides, smooth) = bearing.besides(fit, all.1);
+    let joined = joins::refine(label.get(), fit, all, &smooth, &besides);
+    if joined.is_some() || besides.is_empty() {
+        return joined;
+    }
+    let samples: Vec<_> = bearing.samples.iter().chain(&besides).copied().collect();
+    fit.again(&samples, bearing.area)
 }

@@ -81,6 +81,6 @@ fn bearing(image: &RangeImage, regions: &RegionMap, nodes: &[(usize, usize)]) ->
     Bearing {
         samples: samples.collect(),
         area,
-        beside: Vec::new(),
+        ..Bearing::default()
     }
 }

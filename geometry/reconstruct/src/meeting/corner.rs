@@ -108,6 +108,7 @@ fn solved(m: &[[f64; 2]; 2], right: [f64; 2]) -> Option<[f64; 2]> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::gap::Line;
     use super::super::testing::{PLACEMENT, plane};
     use super::*;
 
@@ -122,6 +123,7 @@ mod tests {
         let gap = |sides| Gap {
             sides,
             placement: PLACEMENT,
+            line: Line::Intersection,
         };
         let gaps = [gap([&a, &b]), gap([&b, &c]), gap([&c, &a])];
         let place = corner(&gaps, &[], [22.3, 23.8], 1.0, 0.05).unwrap();
@@ -139,6 +141,7 @@ mod tests {
         let gaps = [Gap {
             sides: [&a, &b],
             placement: PLACEMENT,
+            line: Line::Intersection,
         }];
         // The crease is x = 1, that is column 22; the outline rises by 45 degrees.
         let along = [0.5_f64.sqrt(); 2];

@@ -1,5 +1,5 @@
-//! Faces that meet: creases on the curves in which their surfaces intersect, corners where all
-//! faces around them have one height.
+//! Faces that meet: creases on the curves in which their surfaces intersect, smooth joins on those
+//! in which they touch, corners where all faces around them have one height.
 //!
 //! Borders are drawn between nodes, and smoothed; along a crease that leaves the two surfaces
 //! apart by what the drawing is off times the difference of their slopes. Here the vertices of a
@@ -10,6 +10,7 @@ mod corner;
 mod gap;
 #[cfg(test)]
 pub(crate) mod testing;
+mod touch;
 mod trace;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,7 +25,8 @@ use crate::border::deflect::bent;
 use crate::border::map::{MapEdge, PlanarMap};
 use crate::polygon::{cross, minus, norm, signed_area};
 use corner::corner;
-pub(crate) use gap::{Gap, Reach};
+pub(crate) use gap::{Gap, Line, Reach};
+pub(crate) use touch::touch;
 use trace::trace;
 
 /// How far a crease or a vertex is moved at most, and how much the surfaces bend there at least
@@ -33,6 +35,13 @@ const REACH: Reach = Reach {
     farthest: 0.75,
     least_bend: 0.05,
 };
+
+/// Slope (7 degrees) from which on a crease is one. Where surfaces bend less they may touch instead.
+const PLAIN_BEND: f64 = 0.12;
+
+/// How far surfaces that touch may be apart for their join to be where they meet, millimetres: what
+/// CAD programs sew.
+const TOUCHED_MM: f64 = 0.01;
 
 /// A crease is looked at so often, pitches.
 const STEP: f64 = 0.5;
@@ -65,12 +74,14 @@ struct Left {
     vertices: BTreeSet<usize>,
 }
 
-/// Puts creases where the surfaces of their sides intersect; gives which edges have come to lie
-/// there. `is_crease` says of an edge whether its surfaces go on across it; `surfaces[k]` belongs
-/// to piece `k + 1`. Outlines that follow their vertices far are not settled any more.
+/// Puts creases where the surfaces of their sides intersect, and smooth joins where they touch;
+/// gives which edges have come to lie where their surfaces meet. `is_crease` says of an edge
+/// whether its surfaces go on across it; `surfaces[k]` belongs to piece `k + 1`, with the root mean
+/// square of its residuals in millimetres. Outlines that follow their vertices far are not settled
+/// any more.
 pub(crate) fn meet(
     map: &mut PlanarMap,
-    surfaces: &[&PatchSurface],
+    surfaces: &[(&PatchSurface, f64)],
     is_crease: &[bool],
     placement: Placement,
     monitor: &dyn Monitor,
@@ -81,8 +92,8 @@ pub(crate) fn meet(
             surfaces.get(piece).copied()
         };
         let sides = [side(0)?, side(1)?];
-        let gap = Gap { sides, placement };
-        (*is_crease && edge.sides[0] != edge.sides[1] && is_near(&gap, edge)).then_some(gap)
+        let is_border = *is_crease && edge.sides[0] != edge.sides[1];
+        is_border.then(|| line(sides, placement, edge)).flatten()
     };
     let mut around = vec![Vec::new(); map.vertices.len()];
     for (e, edge) in map.edges.iter().enumerate() {
@@ -107,8 +118,11 @@ pub(crate) fn meet(
             break found;
         }
     };
-    let is_met = |e: usize| drawn.gaps[e].is_some() && !left.edges.contains(&e);
-    let is_met = (0..edges.len()).map(is_met).collect();
+    let is_met = |(e, edge): (usize, &MapEdge)| {
+        let gap = drawn.met(e, &left);
+        gap.is_some_and(|gap| gap.line == Line::Intersection || is_closed_up(&gap, edge))
+    };
+    let is_met = edges.iter().enumerate().map(is_met).collect();
     (map.vertices, map.edges) = (vertices, edges);
     Ok(is_met)
 }
@@ -119,7 +133,7 @@ type Traced = BTreeMap<(usize, [u64; 4]), Option<PiecewiseCubic<2>>>;
 /// The map as it was drawn.
 struct Drawn<'a> {
     map: &'a PlanarMap,
-    /// Of each edge whose surfaces intersect along it.
+    /// Of each edge whose surfaces intersect or touch along it.
     gaps: Vec<Option<Gap<'a>>>,
     /// Edges at each vertex.
     around: Vec<Vec<usize>>,
@@ -128,8 +142,34 @@ struct Drawn<'a> {
     areas: Vec<f64>,
 }
 
-/// Whether the surfaces intersect all along an edge and near to it.
-fn is_near(gap: &Gap<'_>, edge: &MapEdge) -> bool {
+/// The line of two surfaces that runs along an edge and near to it.
+fn line<'a>(
+    sides: [(&'a PatchSurface, f64); 2],
+    placement: Placement,
+    edge: &MapEdge,
+) -> Option<Gap<'a>> {
+    let gap = Gap {
+        sides: sides.map(|side| side.0),
+        placement,
+        line: Line::Intersection,
+    };
+    let meets = |least_bend: f64| {
+        let reach = Reach {
+            least_bend,
+            ..REACH
+        };
+        places(edge).all(|place| gap.nearest(place, reach).is_some())
+    };
+    if meets(PLAIN_BEND) {
+        return Some(gap);
+    }
+    let touched = touch(sides, placement, places(edge));
+    let touched = touched.map(|(gap, _)| gap);
+    touched.or_else(|| meets(REACH.least_bend).then_some(gap))
+}
+
+/// Places along an edge, but for its tips.
+fn places(edge: &MapEdge) -> impl ExactSizeIterator<Item = [f64; 2]> {
     let (first, last) = edge.path.domain();
     let (from, to) = if edge.start == edge.end {
         (first, last)
@@ -138,10 +178,23 @@ fn is_near(gap: &Gap<'_>, edge: &MapEdge) -> bool {
         (first + tip, last - tip)
     };
     let steps = ((to - from) / STEP).ceil().max(1.0) as usize;
-    (0..=steps).all(|k| {
+    (0..steps + 1).map(move |k| {
         let at = from + (to - from) * k as f64 / steps as f64;
-        gap.nearest(edge.path.evaluate(at), REACH).is_some()
+        edge.path.evaluate(at)
     })
+}
+
+/// Whether surfaces are so near to each other along an edge that it lies on both.
+fn is_closed_up(gap: &Gap<'_>, edge: &MapEdge) -> bool {
+    places(edge).all(|place| gap.height(place).0.abs() <= TOUCHED_MM)
+}
+
+/// How far an edge is moved onto its line.
+fn reach(gap: &Gap<'_>) -> Reach {
+    match gap.line {
+        Line::Intersection => REACH,
+        Line::Touch => touch::REACH,
+    }
 }
 
 impl Drawn<'_> {
@@ -234,13 +287,9 @@ impl Drawn<'_> {
                 .filter(|e| self.met(**e, left).is_none())
                 .map(|&e| leaving(&self.map.edges[e], v))
                 .collect();
-            let found = corner(
-                &creases,
-                &outlines,
-                *vertex,
-                REACH.farthest,
-                REACH.least_bend,
-            );
+            let farthest = creases.iter().map(|gap| reach(gap).farthest);
+            let farthest = farthest.fold(0.0, f64::max);
+            let found = corner(&creases, &outlines, *vertex, farthest, REACH.least_bend);
             match (found, worst(*vertex)) {
                 (Some(place), _) => *vertex = place,
                 // Without it the others may have a corner.
@@ -285,10 +334,10 @@ fn crease(gap: &Gap<'_>, edge: &MapEdge, ends: [[f64; 2]; 2]) -> Option<Piecewis
     for (k, end) in ends.into_iter().enumerate() {
         let off_mm = gap.at(end).0.abs();
         if off_mm.is_nan() || off_mm > EXACT_MM {
-            on[k] = gap.nearest(end, REACH)?;
+            on[k] = gap.nearest(end, reach(gap))?;
         }
     }
-    let path = trace(gap, &edge.path, on, REACH)?;
+    let path = trace(gap, &edge.path, on, reach(gap))?;
     if on == ends {
         return Some(path);
     }

@@ -1,10 +1,9 @@
-//! The curve in which two surfaces intersect, as a path between two vertices.
+//! The line in which two surfaces intersect or touch, as a path between two vertices.
 
 use nurbs::PiecewiseCubic;
 
 use super::gap::{Gap, Reach};
 use crate::border::path::hermite;
-use crate::model::SPACE_CURVE_TOLERANCE_MM;
 use crate::polygon::{cross, dot, minus, norm};
 
 /// Places of a piece at which the gap of the surfaces is looked at.
@@ -42,10 +41,10 @@ struct Stop {
     along: [f64; 2],
 }
 
-/// The intersection from one vertex to another, beside a path that is known to be near to it. Its
-/// pieces are cubics with the directions of the intersection at their ends, as many as it takes
-/// for the two surfaces to be within [`SPACE_CURVE_TOLERANCE_MM`] of each other all along; a
-/// straight line is one. `None` where that cannot be had.
+/// The line of two surfaces from one vertex to another, beside a path that is known to be near to
+/// it. Its pieces are cubics with the directions of the line at their ends, as many as it takes to
+/// be on it to [`Gap::tolerance_mm`] all along; a straight line is one. `None` where that cannot be
+/// had.
 pub(crate) fn trace(
     gap: &Gap<'_>,
     guide: &PiecewiseCubic<2>,
@@ -191,20 +190,22 @@ fn between(a: [f64; 2], b: [f64; 2], share: f64) -> [f64; 2] {
     [0, 1].map(|d| a[d] + share * (b[d] - a[d]))
 }
 
-/// Whether both surfaces have one height along a curve, given by shares of it.
+/// Whether a curve, given by shares of it, runs along the line.
 fn is_met(gap: &Gap<'_>, at: impl Fn(f64) -> [f64; 2]) -> bool {
     (1..PROBES).all(|k| {
         let (gap_mm, _) = gap.at(at(k as f64 / PROBES as f64));
         // Probing may miss the worst place, hence the half.
-        gap_mm.abs() <= SPACE_CURVE_TOLERANCE_MM / 2.0
+        gap_mm.abs() <= gap.tolerance_mm() / 2.0
     })
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::gap::Line;
     use super::super::testing::{PLACEMENT, graph, plane};
     use super::*;
     use crate::border::path::polyline;
+    use crate::model::SPACE_CURVE_TOLERANCE_MM;
     use nurbs::PatchSurface;
 
     const REACH: Reach = Reach {
@@ -231,6 +232,7 @@ mod tests {
         let gap = Gap {
             sides: [&a, &b],
             placement: PLACEMENT,
+            line: Line::Intersection,
         };
         let guide = PiecewiseCubic::line([0.0, 17.4], [40.0, 26.7], 41.0).unwrap();
         let path = trace(&gap, &guide, [[0.0, 17.0], [40.0, 27.0]], REACH).unwrap();
@@ -244,6 +246,7 @@ mod tests {
         let gap = Gap {
             sides: [&bowl, &flat],
             placement: PLACEMENT,
+            line: Line::Intersection,
         };
         let places: Vec<_> = (0..=48).map(|k| around(k % 48, 0.3)).collect();
         let guide = polyline(&places).unwrap();
@@ -289,6 +292,7 @@ mod tests {
         let gap = Gap {
             sides: [&bowl, &flat],
             placement: PLACEMENT,
+            line: Line::Intersection,
         };
         let places: Vec<_> = (0..=40).map(|k| around(k, 0.3)).collect();
         let guide = polyline(&places).unwrap();
@@ -304,6 +308,7 @@ mod tests {
         let gap = Gap {
             sides: [&a, &b],
             placement: PLACEMENT,
+            line: Line::Intersection,
         };
         let guide = PiecewiseCubic::line([0.0, 17.0], [40.0, 27.0], 41.0).unwrap();
         assert_eq!(
