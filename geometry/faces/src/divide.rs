@@ -9,24 +9,12 @@ use crate::field::{Field, Set, places};
 use crate::join::join;
 use crate::observations::Observations;
 use crate::split::split;
+use crate::strain::is_strained;
 
 /// Samples by which a region is told to be of one shape.
 const SAMPLES: usize = 4000;
 /// Samples by which regions are told where only their borders are at stake.
 const SOME: usize = 1000;
-/// Blocks of nodes that are looked at, to either side of their middle, and fewest samples of one.
-const BLOCKS: [usize; 2] = [2, 5];
-const FEWEST: usize = 8;
-/// Standard errors by which a block lies off the shape of its region if it is of another.
-const STRAYED: f64 = 4.0;
-/// Samples count as off up to so many deviations.
-const MOST_OFF: f64 = 3.0;
-/// A shape about which samples deviate by more than this is one of no surface, and says nothing of
-/// their noise.
-const MOST_DEVIATION: f64 = 2.0;
-/// Blocks off that make a region one of several surfaces.
-const MOST_STRAYED: usize = 2;
-
 /// What becomes of the regions of an image.
 #[derive(Debug, Clone)]
 pub struct Divided {
@@ -169,33 +157,8 @@ fn place_borders(
 /// of it.
 fn is_one(field: &Field<'_>) -> bool {
     let all = field.all();
-    let Some(fit) = field.fit(&all, 2, SAMPLES) else {
-        return false;
-    };
-    BLOCKS
-        .iter()
-        .all(|half| strayed(field, &fit, *half) < MOST_STRAYED)
-}
-
-/// Blocks of nodes whose samples lie off a shape in their mean.
-fn strayed(field: &Field<'_>, fit: &Fit, half: usize) -> usize {
-    let all = field.all();
-    let step = 2 * half + 1;
-    let mut strayed = 0;
-    for column in (half..field.columns()).step_by(step) {
-        for row in (half..field.rows()).step_by(step) {
-            let place = column * field.rows() + row;
-            let block = field.around(place, half).filter(|place| all[*place]);
-            let samples = field.samples_at(block);
-            if samples.len() >= FEWEST {
-                let offs = fit.offs(&samples).map(|off| off.clamp(-MOST_OFF, MOST_OFF));
-                let mean = offs.sum::<f64>() / samples.len() as f64;
-                let chance = fit.deviation().min(MOST_DEVIATION) / (samples.len() as f64).sqrt();
-                strayed += usize::from(mean.abs() > STRAYED * chance);
-            }
-        }
-    }
-    strayed
+    let fit = field.fit(&all, 2, SAMPLES);
+    fit.is_some_and(|fit| !is_strained(field, &fit, &all))
 }
 
 #[cfg(test)]

@@ -20,6 +20,7 @@ mod grow;
 mod join;
 mod observations;
 mod split;
+mod strain;
 
 pub use divide::{Divided, divide};
 pub use observations::Observations;

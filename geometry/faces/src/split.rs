@@ -7,6 +7,7 @@ use shapes::{Family, Fit, Shape, fit, is_smooth, spread};
 use crate::compete::{NONE, Pieces};
 use crate::field::{Field, Set, count, places};
 use crate::grow::{FEWEST, Piece, grow};
+use crate::strain::is_strained;
 
 /// Half-widths of the windows that pieces are grown from, in nodes, one after the other.
 const WINDOWS: [usize; 3] = [8, 5, 3];
@@ -14,6 +15,8 @@ const WINDOWS: [usize; 3] = [8, 5, 3];
 const OPEN: f64 = 0.9;
 /// A piece that has lost more than this share of its nodes to greater ones was no other surface.
 const LOST: f64 = 0.4;
+/// How far into a piece from its border nodes may be of the next surface, in nodes.
+const JOINED: usize = 5;
 /// Least share of a region that must be of shapes, once it is taken apart.
 const EXPLAINED: f64 = 0.5;
 /// How far to either side of a border between pieces samples tell whether it is one, in nodes.
@@ -33,6 +36,9 @@ const AT_ONCE: usize = 8;
 /// Pairs of pieces with a smooth surface in common that make a region a free form, where they are
 /// more than half of all pairs.
 const FEW_PAIRS: usize = 3;
+/// Of the greatest piece, the share that one must have to tell: scraps at the borders of others go on
+/// into these, whatever they are.
+const LEAST_TELLING: f64 = 0.05;
 /// Nodes of what is of no shape that make it a face: of fewer, the nearest pieces get them.
 const FREE: usize = 50;
 /// How far from its border such a face must reach, in nodes.
@@ -57,6 +63,7 @@ pub(crate) fn split(
                     .collect()
             }
         };
+        found.retain(|piece| is_of_one(field, piece));
         found.sort_by_key(|piece| core::cmp::Reverse(count(&piece.nodes)));
         for mut piece in found {
             let before = count(&piece.nodes);
@@ -94,6 +101,14 @@ pub(crate) fn split(
     let pieces = settled(field, pieces, monitor)?;
     let apart = apart(field, &pieces, monitor)?;
     Ok((apart.len() > 1).then_some(apart))
+}
+
+/// Whether what has grown is of one surface, and not of several that some shape is near to. What
+/// joins it smoothly may be of it as far as noise tells, so nodes near its border are not asked.
+fn is_of_one(field: &Field<'_>, piece: &Piece) -> bool {
+    let inner = field.within(&piece.nodes, JOINED);
+    let fit = piece.fit.as_ref();
+    fit.is_none_or(|fit| !is_strained(field, fit, &inner))
 }
 
 /// The pieces with every node of the field.
@@ -252,7 +267,11 @@ fn candidates(
 
 /// Whether pieces are for the most part of one smooth surface.
 fn is_free_form(field: &Field<'_>, pieces: &[Piece]) -> bool {
-    let pairs = touching(field, pieces);
+    let greatest = pieces.iter().map(|piece| count(&piece.nodes)).max();
+    let least = LEAST_TELLING * greatest.unwrap_or(0) as f64;
+    let tells = |piece: usize| count(&pieces[piece].nodes) as f64 >= least;
+    let pairs = touching(field, pieces).into_iter();
+    let pairs: Vec<_> = pairs.filter(|(a, b)| tells(*a) && tells(*b)).collect();
     let smooth = pairs
         .iter()
         .filter(|(a, b)| is_smooth_between(field, &pieces[*a], &pieces[*b]));
