@@ -439,7 +439,7 @@ pub struct MeshReport {
 pub struct EdgeLengthsReport {
     /// The samples beside them tell.
     pub measured_mm: f64,
-    /// The surfaces of their two faces intersect there.
+    /// The surfaces of their two faces intersect there, or touch.
     pub intersected_mm: f64,
     /// They are drawn smoothly between nodes.
     pub assumed_mm: f64,
