@@ -83,7 +83,7 @@ impl Gap<'_> {
         let [a, b, c] = [difference(2, 0), difference(1, 1), difference(0, 2)];
         // The direction in which the gap bends most, and how much.
         let (middle, half) = ((a + c) / 2.0, (a - c) / 2.0);
-        let radius = half.hypot(b).copysign(middle);
+        let radius = libm::hypot(half, b).copysign(middle);
         let curvature = middle + radius;
         let bend = curvature.abs() * self.placement.pitch_mm;
         if bend.is_nan() || bend < LEAST_CURVATURE {
