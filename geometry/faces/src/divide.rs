@@ -15,6 +15,7 @@ use crate::strain::is_strained;
 const SAMPLES: usize = 4000;
 /// Samples by which regions are told where only their borders are at stake.
 const SOME: usize = 1000;
+
 /// What becomes of the regions of an image.
 #[derive(Debug, Clone)]
 pub struct Divided {
