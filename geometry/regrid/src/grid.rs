@@ -209,6 +209,9 @@ impl GridWorker {
                 y_mm,
             };
             return surfaces.iter().enumerate().find_map(|(number, surface)| {
+                if number > 0 && !surface.spans_columns(&self.samples) {
+                    return None;
+                }
                 let fit = Fit {
                     plane: surface.plane,
                     tolerance: surface.width_mm,

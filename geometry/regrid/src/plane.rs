@@ -2,6 +2,7 @@
 
 use crate::draws::Draws;
 use crate::neighbours::Neighbour;
+use crate::solve::solve;
 
 /// Triples are taken as collinear when the sine of their angle at the first sample is
 /// below this: such a plane would magnify noise without bound.
@@ -41,6 +42,46 @@ impl Plane {
     /// Height of a sample above the plane.
     pub(crate) fn residual(&self, n: &Neighbour) -> f64 {
         n.z - (self.a * n.dx + self.b * n.dy + self.c)
+    }
+}
+
+/// Sums for a least-squares plane.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct PlaneSums {
+    one: f64,
+    x: f64,
+    y: f64,
+    xx: f64,
+    xy: f64,
+    yy: f64,
+    z: f64,
+    xz: f64,
+    yz: f64,
+}
+
+impl PlaneSums {
+    pub(crate) fn add(&mut self, x: f64, y: f64, z: f64, weight: f64) {
+        let (wx, wy) = (weight * x, weight * y);
+        self.one += weight;
+        self.x += wx;
+        self.y += wy;
+        self.xx += wx * x;
+        self.xy += wx * y;
+        self.yy += wy * y;
+        self.z += weight * z;
+        self.xz += wx * z;
+        self.yz += wy * z;
+    }
+
+    /// `None` where the samples are collinear.
+    pub(crate) fn plane(&self) -> Option<Plane> {
+        let matrix = [
+            [self.one, 0.0, 0.0],
+            [self.x, self.xx, 0.0],
+            [self.y, self.xy, self.yy],
+        ];
+        let [c, a, b] = solve(matrix, [self.z, self.xz, self.yz])?;
+        Some(Plane { a, b, c })
     }
 }
 

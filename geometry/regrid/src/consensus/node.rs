@@ -2,10 +2,11 @@
 
 use super::bend::lift_mm;
 use super::posterior::Posterior;
-use super::side::{Labelled, SEEN, lengthen, separate_strip};
-use super::surfaces::{Effort, LEAST_INLIERS, PlaneSums, Surface, Surfaces};
+use super::side::{Labelled, SEEN, lengthen, separate, separate_strip};
+use super::surfaces::{Effort, LEAST_INLIERS, Surface, Surfaces};
 use crate::draws::Draws;
 use crate::neighbours::Neighbour;
+use crate::plane::PlaneSums;
 use crate::window::Spacing;
 
 /// Samples looked at where surfaces meet, in windows: the line between them is the better
@@ -108,7 +109,7 @@ impl Consensus {
             // Here outliers have the better of the window; farther away they do not.
             let wide = self.surfaces.find(&self.wide, noise_mm, &thorough, draws);
             if !wide.is_empty() {
-                keep_narrow(&mut self.found, wide, window);
+                replace(&mut self.found, wide, conditions.clean, window);
             }
         } else if self.found.len() == 1 {
             // Outliers may leave too little of a second one.
@@ -117,7 +118,7 @@ impl Consensus {
                 .surfaces
                 .find(&self.wide[..number], noise_mm, &thorough, draws);
             if wide.len() > 1 {
-                keep_narrow(&mut self.found, wide, window);
+                replace(&mut self.found, wide, conditions.clean, window);
             }
         }
         for surface in &mut self.found {
@@ -246,7 +247,12 @@ impl Consensus {
         let (first, other) = (self.found[0], self.found[other]);
         let meet = (first.plane.c - other.plane.c).abs() <= first.width_mm;
         label(&self.wide, &first, &other, spacing, &mut self.labelled);
-        let Some(mut line) = separate_strip(&mut self.labelled, clean, &mut self.posterior) else {
+        let line = if clean {
+            separate_strip(&mut self.labelled, &mut self.posterior)
+        } else {
+            separate(&mut self.labelled, &mut self.posterior)
+        };
+        let Some(mut line) = line else {
             return if meet { Place::First } else { Place::Nowhere };
         };
         if line.is_near() {
@@ -283,10 +289,14 @@ impl Consensus {
     }
 }
 
-/// Puts the surfaces of a wider window before those of the node's own, of which only those
-/// stay that are others: a strip between two faces has few of the wider window's samples, and
-/// either face has more, but most of those next to the node are the strip's.
-fn keep_narrow(found: &mut Vec<Surface>, wide: &[Surface], window: &[Neighbour]) {
+/// Puts the surfaces of a wider window in the place of those of the node's own. With hardly any
+/// outliers around those stay that are others: a strip between two faces has few of the wider
+/// window's samples, and either face has more, but most of those next to the node are the
+/// strip's. Among outliers they are runs more often than strips.
+fn replace(found: &mut Vec<Surface>, wide: &[Surface], clean: bool, window: &[Neighbour]) {
+    if !clean {
+        found.clear();
+    }
     found.retain(|surface| {
         let (mut held, mut alone) = (0, 0);
         for n in window.iter().filter(|n| surface.holds(n)) {
@@ -425,7 +435,7 @@ mod tests {
     fn a_flank_stays_beside_the_faces_of_a_wider_window() {
         let wide = [surface(0.0, -2.0), surface(0.0, 2.0)];
         let mut found = vec![surface(2.0, 0.0)];
-        keep_narrow(&mut found, &wide, &flank());
+        replace(&mut found, &wide, true, &flank());
         let planes: Vec<_> = found.iter().map(|s| (s.plane.a, s.plane.c)).collect();
         assert_eq!(planes, [(0.0, -2.0), (0.0, 2.0), (2.0, 0.0)]);
     }
@@ -435,7 +445,7 @@ mod tests {
         let wide = [surface(0.0, -2.0), surface(0.0, 2.0)];
         // Nearly the upper face, and a plane that joins few samples.
         let mut found = vec![surface(0.02, 1.95), surface(0.0, 0.8)];
-        keep_narrow(&mut found, &wide, &flank()[..20]);
+        replace(&mut found, &wide, true, &flank()[..20]);
         assert_eq!(found.len(), 2);
     }
 }

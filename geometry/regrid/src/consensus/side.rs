@@ -121,15 +121,13 @@ pub(crate) fn separate(samples: &mut Vec<Labelled>, posterior: &mut Posterior) -
 }
 
 /// The same of two surfaces of which one may be a strip, with more of the other beyond it or
-/// around its end: where all samples do not lie apart, the nearer ones show the near edge. Where
-/// hardly any are outliers, fewer of them do.
+/// around its end: where all samples do not lie apart, the nearer ones show the near edge. For
+/// where hardly any are outliers, so that few samples tell.
 pub(crate) fn separate_strip(
     samples: &mut Vec<Labelled>,
-    clean: bool,
     posterior: &mut Posterior,
 ) -> Option<Line> {
-    let windows = if clean { WINDOWS + 1 } else { WINDOWS };
-    separate_where(samples, windows, true, posterior)
+    separate_where(samples, WINDOWS + 1, true, posterior)
 }
 
 fn separate_where(
@@ -401,7 +399,7 @@ pub(super) mod tests {
             }
             // Beyond the strip lies a third surface, and behind that the first again.
             samples.retain(|s| s.u < 0.4 + width || s.u > 5.0);
-            let line = separate_strip(&mut samples, false, &mut Posterior::default());
+            let line = separate_strip(&mut samples, &mut Posterior::default());
             let distance = line.map(|line| line.distance());
             assert!(
                 distance.is_some_and(|d| (d - 0.4).abs() < 0.5),

@@ -2,8 +2,7 @@
 
 use crate::draws::Draws;
 use crate::neighbours::Neighbour;
-use crate::plane::{LEAST_SINE, Plane};
-use crate::solve::solve;
+use crate::plane::{LEAST_SINE, Plane, PlaneSums};
 
 /// Standard deviations from a surface within which a sample speaks for it.
 pub(crate) const WIDTH: f64 = 3.0;
@@ -24,6 +23,8 @@ const LEAST_PAIRS: usize = 2;
 /// Fewest samples of a surface that do not come from the two columns with most of them: two
 /// runs of outliers always have a plane in common.
 const LEAST_OTHERS: usize = 4;
+/// The same among samples that others leave over in a wide window.
+const STRIP_OTHERS: usize = 8;
 /// Runs of outliers along a column are hardly ever as long: with so many samples in each of two
 /// columns a strip that runs along them is believed.
 const LONG_RUN: usize = 10;
@@ -76,6 +77,14 @@ pub(crate) struct Surface {
 impl Surface {
     pub(crate) fn holds(&self, n: &Neighbour) -> bool {
         self.plane.residual(n).abs() <= self.width_mm
+    }
+
+    /// Whether it has samples of more than one column in a window. Those of a single one may be
+    /// a run of outliers, and tell nothing of the surface across the columns.
+    pub(crate) fn spans_columns(&self, window: &[Neighbour]) -> bool {
+        let mut columns = window.iter().filter(|n| self.holds(n)).map(|n| n.strip);
+        let first = columns.next();
+        columns.any(|column| Some(column) != first)
     }
 }
 
@@ -255,13 +264,17 @@ impl Surfaces {
             .windows(2)
             .filter(|pair| pair.iter().all(|c| c.1 >= 2))
             .count();
-        let few = self.columns.len() <= LEAST_PAIRS;
         let others = number - longest - second;
-        number >= LEAST_INLIERS
-            && (few
-                || self.among_few_outliers && second >= LONG_RUN
-                || others >= MANY_OTHERS
-                || pairs >= LEAST_PAIRS && others >= LEAST_OTHERS)
+        if number < LEAST_INLIERS {
+            return false;
+        }
+        let beside = |least_others| pairs >= LEAST_PAIRS && others >= least_others;
+        if self.among_few_outliers {
+            // What is left of a wide window is the more likely to be runs, few as they are.
+            return second >= LONG_RUN || others >= MANY_OTHERS || beside(STRIP_OTHERS);
+        }
+        let few = self.columns.len() <= LEAST_PAIRS;
+        few || others >= MANY_OTHERS || beside(LEAST_OTHERS)
     }
 
     fn load(&mut self, window: &[Neighbour]) {
@@ -406,42 +419,70 @@ fn planes_needed(share: f64, most: usize) -> usize {
     (planes.ceil() as usize).max(LEAST_PLANES).min(most)
 }
 
-/// Sums for a least-squares plane.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct PlaneSums {
-    one: f64,
-    x: f64,
-    y: f64,
-    xx: f64,
-    xy: f64,
-    yy: f64,
-    z: f64,
-    xz: f64,
-    yz: f64,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-impl PlaneSums {
-    pub(crate) fn add(&mut self, x: f64, y: f64, z: f64, weight: f64) {
-        let (wx, wy) = (weight * x, weight * y);
-        self.one += weight;
-        self.x += wx;
-        self.y += wy;
-        self.xx += wx * x;
-        self.xy += wx * y;
-        self.yy += wy * y;
-        self.z += weight * z;
-        self.xz += wx * z;
-        self.yz += wy * z;
+    /// Samples in columns beside each other, so many in each, on one plane.
+    fn columns(lengths: &[usize]) -> Vec<Neighbour> {
+        let mut samples = Vec::new();
+        for (strip, &length) in lengths.iter().enumerate() {
+            for row in 0..length {
+                let (x, y) = (strip as f64 - 1.0, row as f64 - 2.0);
+                samples.push(Neighbour {
+                    strip,
+                    index: row,
+                    ..Neighbour::at(x, y, 3.0 + 0.1 * x)
+                });
+            }
+        }
+        samples.sort_by(Neighbour::order);
+        samples
     }
 
-    /// `None` where the samples are collinear.
-    pub(crate) fn plane(&self) -> Option<Plane> {
-        let matrix = [
-            [self.one, 0.0, 0.0],
-            [self.x, self.xx, 0.0],
-            [self.y, self.xy, self.yy],
-        ];
-        let [c, a, b] = solve(matrix, [self.z, self.xz, self.yz])?;
-        Some(Plane { a, b, c })
+    /// Whether a window's own surface, and a strip of a wide window, are found.
+    fn found(lengths: &[usize]) -> (bool, bool) {
+        let samples = columns(lengths);
+        let effort = Effort {
+            most_planes: 200,
+            neighbours: samples.len(),
+            guess: None,
+        };
+        let mut surfaces = Surfaces::default();
+        let mut draws = Draws::new(1, 2, 3);
+        let own = surfaces
+            .first(&samples, 0.05, &effort, &mut draws)
+            .is_some();
+        let strip = surfaces.strip(&samples, 0.05, &effort, &mut draws);
+        (own, strip.is_some())
+    }
+
+    #[test]
+    fn of_samples_left_over_runs_of_a_few_columns_are_no_strip() {
+        assert_eq!(found(&[5, 5, 4]), (true, false));
+        assert_eq!(found(&[5, 5, 4, 4]), (true, true));
+        assert_eq!(found(&[10, 10]), (true, true));
+    }
+
+    #[test]
+    fn two_runs_of_outliers_are_no_surface() {
+        assert_eq!(found(&[5, 5, 1]), (false, false));
+    }
+
+    #[test]
+    fn a_run_along_one_column_spans_none() {
+        let surface = Surface {
+            plane: Plane {
+                a: 0.1,
+                b: 0.0,
+                c: 3.0,
+            },
+            width_mm: 0.1,
+            inliers: 0,
+            lift_mm: 0.0,
+        };
+        assert!(!surface.spans_columns(&columns(&[8])));
+        assert!(!surface.spans_columns(&[]));
+        assert!(surface.spans_columns(&columns(&[8, 1])));
     }
 }

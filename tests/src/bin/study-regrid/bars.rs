@@ -24,7 +24,7 @@ impl Bounds {
     /// target where that is not reached, and stated apart from it.
     fn must(line: &Line) -> Self {
         let clustered = line.outliers == Outliers::Clustered;
-        let (few, gross) = if clustered { (4, 1e-4) } else { (0, 0.0) };
+        let (few, gross) = if clustered { (1, 1e-5) } else { (0, 0.0) };
         let target = Self::target(line);
         if line.share > 0.3 {
             return Self {
@@ -33,7 +33,6 @@ impl Bounds {
             };
         }
         Self {
-            rms_mm: if clustered { f64::INFINITY } else { 0.010 },
             gross,
             near: if line.share > 0.1 { 0.025 } else { 0.015 },
             in_between: few,

@@ -30,7 +30,8 @@ pub(crate) struct Figures {
 
 impl Figures {
     /// Counts the nodes of the image that lie among the samples, and names those that should
-    /// not be: on neither plane near the step, on the wrong one, without a value.
+    /// not be: on neither plane near the step, on the wrong one, far off away from it, without a
+    /// value.
     pub(crate) fn add(
         &mut self,
         image: &RangeImage,
@@ -50,12 +51,22 @@ impl Figures {
                 let row = usize::try_from(j - j_first).unwrap_or(usize::MAX);
                 let (x_mm, y_mm) = (lattice.line_mm(i), lattice.line_mm(j));
                 let z_mm = image.z_mm(column, row);
-                let before = (self.in_between, self.wrong_plane, self.holes);
+                let counts = |figures: &Self| {
+                    let Self {
+                        in_between,
+                        wrong_plane,
+                        holes,
+                        away_gross,
+                        ..
+                    } = *figures;
+                    (in_between, wrong_plane, holes, away_gross)
+                };
+                let before = counts(self);
                 self.holes += u64::from(z_mm.is_none() && inside(x_mm, y_mm));
                 if let Some(z_mm) = z_mm {
                     self.node(z_mm, truth, (x_mm, y_mm));
                 }
-                if before != (self.in_between, self.wrong_plane, self.holes) {
+                if before != counts(self) {
                     let (from_mm, true_mm) = (
                         truth.distance_to_step_mm(x_mm, y_mm),
                         truth.z_mm(x_mm, y_mm),

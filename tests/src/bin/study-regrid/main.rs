@@ -41,7 +41,7 @@ struct Options {
     /// Outliers of one kind only; no table is written
     #[arg(long, value_name = "KIND")]
     only: Option<String>,
-    /// Name every node on neither plane or on the wrong one, and every hole
+    /// Name every node on neither plane, on the wrong one or far off, and every hole
     #[arg(long)]
     list: bool,
     /// Leave out what other programs make of the same samples
