@@ -43,6 +43,10 @@ const PLAIN_BEND: f64 = 0.12;
 /// CAD programs sew.
 const TOUCHED_MM: f64 = 0.01;
 
+/// Share of a border's places that must find its line: a few are drawn too far off, mostly beside
+/// its ends.
+const LEAST_SHARE: f64 = 0.8;
+
 /// A crease is looked at so often, pitches.
 const STEP: f64 = 0.5;
 
@@ -158,7 +162,10 @@ fn line<'a>(
             least_bend,
             ..REACH
         };
-        places(edge).all(|place| gap.nearest(place, reach).is_some())
+        let places = places(edge);
+        let least = LEAST_SHARE * places.len() as f64;
+        let found = places.filter(|place| gap.nearest(*place, reach).is_some());
+        found.count() as f64 >= least
     };
     if meets(PLAIN_BEND) {
         return Some(gap);

@@ -6,6 +6,7 @@
 
 use nurbs::PatchSurface;
 
+use super::LEAST_SHARE;
 use super::gap::{Gap, Line, Reach};
 use crate::assemble::Placement;
 use crate::polygon::norm;
@@ -21,9 +22,6 @@ pub(crate) const REACH: Reach = Reach {
 /// differ in slope by so much (3 degrees) along the line.
 const APART: f64 = 1.0;
 const TURN: f64 = 0.05;
-
-/// Share of a border's places that must find the line.
-const LEAST_SHARE: f64 = 0.8;
 
 /// The line along which two surfaces touch near these places, in pitches, and the places on it.
 /// `sides` are the surfaces and the root mean squares of their residuals, millimetres. `None` where
