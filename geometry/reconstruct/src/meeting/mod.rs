@@ -36,6 +36,10 @@ const REACH: Reach = Reach {
     least_bend: 0.05,
 };
 
+/// How far, pitches, the end of a crease may be moved that runs out between outlines: there the last
+/// nodes are lost first, and a border is drawn by those that are left.
+const LONE_END: f64 = 2.0;
+
 /// Slope (7 degrees) from which on a crease is one. Where surfaces bend less they may touch instead.
 const PLAIN_BEND: f64 = 0.12;
 
@@ -112,6 +116,8 @@ pub(crate) fn meet(
         areas: areas(map, &map.edges),
         around,
         map,
+        surfaces,
+        placement,
     };
     let mut left = Left::default();
     let mut traced = Traced::new();
@@ -144,6 +150,8 @@ struct Drawn<'a> {
     conflicts: BTreeSet<Conflict>,
     /// Of each loop.
     areas: Vec<f64>,
+    surfaces: &'a [(&'a PatchSurface, f64)],
+    placement: Placement,
 }
 
 /// The line of two surfaces that runs along an edge and near to it.
@@ -252,6 +260,11 @@ impl Drawn<'_> {
             let edge = &self.map.edges[e];
             left.vertices.extend([edge.start, edge.end]);
         };
+        for (e, (edge, drawn)) in edges.iter().zip(&self.map.edges).enumerate() {
+            if edge.path != drawn.path && !self.is_covered(edge) {
+                leave(e, left);
+            }
+        }
         let found = crossings(self.map, &vertices, &edges);
         for (a, b) in found.difference(&self.conflicts) {
             leave(*a, left);
@@ -266,6 +279,20 @@ impl Drawn<'_> {
             }
         }
         (*left == known).then_some((vertices, edges))
+    }
+
+    /// Whether the surfaces of an edge's sides reach as far as it does.
+    fn is_covered(&self, edge: &MapEdge) -> bool {
+        let places = edge.path.sampled(PER_PIECE);
+        let sides = edge.sides.iter();
+        let surfaces = sides.filter_map(|side| self.surfaces.get((*side as usize).checked_sub(1)?));
+        surfaces.into_iter().all(|(surface, _)| {
+            let (u, v) = (surface.u_domain(), surface.v_domain());
+            places.iter().all(|place| {
+                let [x, y] = self.placement.to_mm(*place);
+                (u.0..=u.1).contains(&x) && (v.0..=v.1).contains(&y)
+            })
+        })
     }
 
     /// The surfaces of an edge that is to lie where they intersect.
@@ -295,7 +322,9 @@ impl Drawn<'_> {
                 .map(|&e| leaving(&self.map.edges[e], v))
                 .collect();
             let farthest = creases.iter().map(|gap| reach(gap).farthest);
-            let farthest = farthest.fold(0.0, f64::max);
+            let is_lone_end = creases.len() == 1 && !outlines.is_empty();
+            let least = if is_lone_end { LONE_END } else { 0.0 };
+            let farthest = farthest.fold(least, f64::max);
             let found = corner(&creases, &outlines, *vertex, farthest, REACH.least_bend);
             match (found, worst(*vertex)) {
                 (Some(place), _) => *vertex = place,
@@ -389,4 +418,69 @@ fn crossings(map: &PlanarMap, vertices: &[[f64; 2]], edges: &[MapEdge]) -> BTree
         .map(|(e, edge)| Strand::new(e, &edge.path, vertices[edge.start], vertices[edge.end]))
         .collect();
     conflicts(&strands)
+}
+
+#[cfg(test)]
+mod tests {
+    use range_image::Unmonitored;
+
+    use super::testing::{PLACEMENT, plane};
+    use super::*;
+    use crate::border::path::polyline;
+
+    /// Two planes that meet where the row is a quarter of the column, and 17. Of the crease between
+    /// them the last vertex is drawn so many rows aside, between outlines along the last column.
+    fn drawn(aside: f64) -> PlanarMap {
+        let vertices = vec![[0.0, 17.0], [40.0, 27.0 + aside], [40.0, 0.0], [40.0, 40.0]];
+        let edge = |start: usize, end: usize, sides: [u32; 2]| {
+            let mut places = vec![vertices[start], vertices[end]];
+            if sides == [1, 2] {
+                places.insert(1, [38.0, 26.5]);
+            }
+            MapEdge {
+                start,
+                end,
+                sides,
+                path: polyline(&places).unwrap(),
+                is_settled: true,
+            }
+        };
+        PlanarMap {
+            edges: vec![edge(0, 1, [1, 2]), edge(2, 1, [0, 2]), edge(1, 3, [0, 1])],
+            vertices,
+            ..PlanarMap::default()
+        }
+    }
+
+    /// Whether the crease is met, and where its last vertex comes to lie.
+    fn met(aside: f64, surfaces: [&PatchSurface; 2]) -> (bool, [f64; 2]) {
+        let mut map = drawn(aside);
+        let is_crease = [true, false, false];
+        let sides = surfaces.map(|surface| (surface, 0.01));
+        let is_met = meet(&mut map, &sides, &is_crease, PLACEMENT, &Unmonitored).unwrap();
+        (is_met[0], map.vertices[1])
+    }
+
+    #[test]
+    fn a_crease_is_led_to_its_end_between_outlines() {
+        let (a, b) = (plane(1.0, 0.25, 0.0), plane(0.0, 0.0, 1.0));
+        for aside in [0.3, 1.2, -1.8] {
+            let (is_met, [column, row]) = met(aside, [&a, &b]);
+            assert!(is_met, "{aside}");
+            assert!((column - 40.0).abs() < 0.1, "{column}");
+            assert!((row - 17.0 - column / 4.0).abs() < 1e-6, "{row}");
+        }
+        assert_eq!(met(4.0, [&a, &b]), (false, [40.0, 31.0]));
+    }
+
+    #[test]
+    fn no_crease_is_led_to_where_a_surface_does_not_reach() {
+        // 9.9 mm are less than column 40.
+        let breaks = [vec![-30.0, 9.9], vec![-30.0, 30.0]];
+        let [u, v] = breaks;
+        let z = |i: usize, _: usize| 1.0 + 0.25 * (-30.0 + 13.3 * i as f64);
+        let short = PatchSurface::through_thirds(u, v, z).unwrap();
+        let flat = plane(0.0, 0.0, 1.0);
+        assert_eq!(met(1.2, [&short, &flat]), (false, [40.0, 28.2]));
+    }
 }

@@ -10,7 +10,7 @@ use crate::polygon::{cross, dot, minus, norm};
 const PROBES: usize = 8;
 
 /// Pieces are not made shorter than this, pitches.
-const SHORTEST: f64 = 0.25;
+const SHORTEST: f64 = 0.05;
 
 /// Cosine of the angle (60 degrees) that the ends of a piece may turn from its chord.
 const LEAST_TURN_COSINE: f64 = 0.5;
@@ -39,6 +39,15 @@ const LENGTHS: usize = 2;
 struct Stop {
     place: [f64; 2],
     along: [f64; 2],
+    /// Where the guide is beside it.
+    at: f64,
+}
+
+/// What is followed, along what.
+struct Course<'a> {
+    gap: &'a Gap<'a>,
+    guide: &'a PiecewiseCubic<2>,
+    reach: Reach,
 }
 
 /// The line of two surfaces from one vertex to another, beside a path that is known to be near to
@@ -56,24 +65,29 @@ pub(crate) fn trace(
     if !is_closed && is_met(gap, |share| between(start, end, share)) {
         return PiecewiseCubic::line(start, end, norm(minus(end, start))).ok();
     }
+    let course = Course { gap, guide, reach };
     let parts = parts(guide).max(if is_closed { CLOSED_PARTS } else { 1 });
     let mut stops = Vec::with_capacity(parts + 1);
     for k in 0..=parts {
         let at = first + (last - first) * k as f64 / parts as f64;
         let place = match k {
-            0 => start,
-            k if k == parts => end,
-            _ => gap.nearest(guide.evaluate(at), reach)?,
+            0 => Some(start),
+            k if k == parts => Some(end),
+            _ => gap.nearest(guide.evaluate(at), reach),
         };
-        stops.push(stop(gap, place, guide.derivative(at, 1), reach)?);
+        // Where the guide is too far off there is another way between the stops beside it.
+        if let Some(place) = place {
+            stops.push(course.stop(place, guide.derivative(at, 1), at)?);
+        }
     }
     if is_closed {
         // One vertex, one direction.
-        stops[parts].along = stops[0].along;
+        let along = stops[0].along;
+        stops.last_mut()?.along = along;
     }
     let mut pieces = Vec::new();
     for pair in stops.windows(2) {
-        follow(gap, [pair[0], pair[1]], reach, MAX_DEPTH, &mut pieces)?;
+        course.follow([pair[0], pair[1]], MAX_DEPTH, &mut pieces)?;
     }
     let mut breaks = vec![0.0];
     let mut coefficients = Vec::with_capacity(pieces.len());
@@ -98,65 +112,68 @@ fn parts(guide: &PiecewiseCubic<2>) -> usize {
     (turn.min(room).ceil() as usize).clamp(1, MOST_PARTS)
 }
 
-/// The direction of the intersection at a place of it, on the side of another direction.
-fn stop(gap: &Gap<'_>, place: [f64; 2], towards: [f64; 2], reach: Reach) -> Option<Stop> {
-    let slope = gap.at(place).1;
-    let bend = norm(slope);
-    if bend.is_nan() || bend < reach.least_bend {
-        return None;
+impl Course<'_> {
+    /// The direction of the intersection at a place of it, on the side of another direction.
+    fn stop(&self, place: [f64; 2], towards: [f64; 2], at: f64) -> Option<Stop> {
+        let slope = self.gap.at(place).1;
+        let bend = norm(slope);
+        if bend.is_nan() || bend < self.reach.least_bend {
+            return None;
+        }
+        let along = [-slope[1] / bend, slope[0] / bend];
+        let sense = dot(along, towards);
+        if sense == 0.0 || sense.is_nan() {
+            return None;
+        }
+        let sign = 1.0_f64.copysign(sense);
+        Some(Stop {
+            place,
+            along: along.map(|c| sign * c),
+            at,
+        })
     }
-    let along = [-slope[1] / bend, slope[0] / bend];
-    let sense = dot(along, towards);
-    if sense == 0.0 || sense.is_nan() {
-        return None;
-    }
-    let sign = 1.0_f64.copysign(sense);
-    Some(Stop {
-        place,
-        along: along.map(|c| sign * c),
-    })
-}
 
-/// Adds the pieces between two stops, with their lengths.
-fn follow(
-    gap: &Gap<'_>,
-    [from, to]: [Stop; 2],
-    reach: Reach,
-    depth: usize,
-    pieces: &mut Vec<([[f64; 4]; 2], f64)>,
-) -> Option<()> {
-    let chord = minus(to.place, from.place);
-    let distance = norm(chord);
-    let is_long = distance > SHORTEST;
-    let turns_little = [from, to]
-        .iter()
-        .all(|stop| dot(stop.along, chord) > LEAST_TURN_COSINE * distance);
-    let (piece, length) = piece(from, to, distance);
-    let at = |share: f64| place(&piece, share * length);
-    if turns_little && is_met(gap, at) {
-        pieces.push((piece, length));
-        return Some(());
+    /// Adds the pieces between two stops, with their lengths.
+    fn follow(
+        &self,
+        [from, to]: [Stop; 2],
+        depth: usize,
+        pieces: &mut Vec<([[f64; 4]; 2], f64)>,
+    ) -> Option<()> {
+        let chord = minus(to.place, from.place);
+        let distance = norm(chord);
+        let is_long = distance > SHORTEST;
+        let turns_little = [from, to]
+            .iter()
+            .all(|stop| dot(stop.along, chord) > LEAST_TURN_COSINE * distance);
+        let (piece, length) = piece(from, to, distance);
+        let at = |share: f64| place(&piece, share * length);
+        if turns_little && is_met(self.gap, at) {
+            pieces.push((piece, length));
+            return Some(());
+        }
+        let depth = depth.checked_sub(1).filter(|_| is_long)?;
+        let (guess, towards) = if turns_little {
+            (at(0.5), chord)
+        } else {
+            let towards = [0, 1].map(|d| from.along[d] + to.along[d]);
+            (between(from.place, to.place, 0.5), towards)
+        };
+        // What does not lie between the two would fold the path back.
+        let is_between = |place: &[f64; 2]| {
+            let share = dot(minus(*place, from.place), chord) / (distance * distance);
+            (0.1..0.9).contains(&share)
+        };
+        let beside = (from.at + to.at) / 2.0;
+        let guided = self.gap.nearest(self.guide.evaluate(beside), self.reach);
+        let place = guided.filter(is_between).or_else(|| {
+            let found = self.gap.nearest(guess, wide(self.reach, distance));
+            found.filter(is_between)
+        })?;
+        let middle = self.stop(place, towards, beside)?;
+        self.follow([from, middle], depth, pieces)?;
+        self.follow([middle, to], depth, pieces)
     }
-    let depth = depth.checked_sub(1).filter(|_| is_long)?;
-    let (guess, towards) = if turns_little {
-        (at(0.5), chord)
-    } else {
-        let towards = [0, 1].map(|d| from.along[d] + to.along[d]);
-        (between(from.place, to.place, 0.5), towards)
-    };
-    let middle = stop(
-        gap,
-        gap.nearest(guess, wide(reach, distance))?,
-        towards,
-        reach,
-    )?;
-    // What does not lie between the two would fold the path back.
-    let share = dot(minus(middle.place, from.place), chord) / (distance * distance);
-    if !(0.1..0.9).contains(&share) {
-        return None;
-    }
-    follow(gap, [from, middle], reach, depth, pieces)?;
-    follow(gap, [middle, to], reach, depth, pieces)
 }
 
 /// Long pieces may bulge from their chords by more than a border is moved.
@@ -282,6 +299,25 @@ mod tests {
                 next
             };
             assert!(dot(before, next) > 1.0 - 1e-6, "{before:?} {next:?}");
+        }
+    }
+
+    #[test]
+    fn a_guide_may_be_too_far_off_in_a_place() {
+        let (bowl, flat) = bowl_and_plane();
+        let gap = Gap {
+            sides: [&bowl, &flat],
+            placement: PLACEMENT,
+            line: Line::Intersection,
+        };
+        let far = |k: u8| if (21..=27).contains(&k) { 2.0 } else { 0.3 };
+        let places: Vec<_> = (0..=48).map(|k| around(k % 48, far(k % 48))).collect();
+        let guide = polyline(&places).unwrap();
+        let vertex = around(0, 0.0);
+        let path = trace(&gap, &guide, [vertex, vertex], REACH).unwrap();
+        for place in path.sampled(16) {
+            let off = norm(minus(place, [20.0, 20.0])) - 16.0;
+            assert!(off.abs() < 1e-3, "{place:?} {off}");
         }
     }
 
