@@ -27,7 +27,7 @@ const SAMPLES: u32 = 128;
 const PITCH_MM: f64 = 0.5;
 /// By how much the longest may need more than the shortest. What it measures is 20 times as
 /// much: kept in memory, its samples alone would be 4.5 MB, and its range image 3 MB.
-const GROWTH_BYTES: usize = 512 * 1024;
+const GROWTH_BYTES: usize = 256 * 1024;
 
 /// Serves a recording, stops short of its last column, says so, and ends with its input.
 pub(crate) fn be_the_scanner(file: &Path, columns: u32) -> Result<()> {
