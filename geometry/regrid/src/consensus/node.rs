@@ -441,6 +441,15 @@ mod tests {
     }
 
     #[test]
+    fn among_outliers_the_surfaces_of_a_wider_window_stand_alone() {
+        let wide = [surface(0.0, -2.0), surface(0.0, 2.0)];
+        let mut found = vec![surface(2.0, 0.0)];
+        replace(&mut found, &wide, false, &flank());
+        let planes: Vec<_> = found.iter().map(|s| (s.plane.a, s.plane.c)).collect();
+        assert_eq!(planes, [(0.0, -2.0), (0.0, 2.0)]);
+    }
+
+    #[test]
     fn a_wider_window_says_more_of_the_same_surface() {
         let wide = [surface(0.0, -2.0), surface(0.0, 2.0)];
         // Nearly the upper face, and a plane that joins few samples.
