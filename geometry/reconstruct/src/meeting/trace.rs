@@ -230,6 +230,14 @@ mod tests {
         least_bend: 0.05,
     };
 
+    fn gap(sides: [&PatchSurface; 2]) -> Gap<'_> {
+        Gap {
+            sides,
+            placement: PLACEMENT,
+            line: Line::Intersection,
+        }
+    }
+
     /// They meet in the circle of radius 8 about the origin, which is column and row 20.
     fn bowl_and_plane() -> (PatchSurface, PatchSurface) {
         let bowl = graph(5.0, |x, y| (x * x + y * y) / 20.0);
@@ -246,11 +254,7 @@ mod tests {
     fn planes_meet_in_a_line() {
         // y = x / 4 + 1, that is row = column / 4 + 17.
         let (a, b) = (plane(1.0, 0.25, 0.0), plane(0.0, 0.0, 1.0));
-        let gap = Gap {
-            sides: [&a, &b],
-            placement: PLACEMENT,
-            line: Line::Intersection,
-        };
+        let gap = gap([&a, &b]);
         let guide = PiecewiseCubic::line([0.0, 17.4], [40.0, 26.7], 41.0).unwrap();
         let path = trace(&gap, &guide, [[0.0, 17.0], [40.0, 27.0]], REACH).unwrap();
         assert_eq!(path.pieces.len(), 1);
@@ -260,11 +264,7 @@ mod tests {
     #[test]
     fn a_bowl_and_a_plane_meet_in_a_circle_of_few_pieces() {
         let (bowl, flat) = bowl_and_plane();
-        let gap = Gap {
-            sides: [&bowl, &flat],
-            placement: PLACEMENT,
-            line: Line::Intersection,
-        };
+        let gap = gap([&bowl, &flat]);
         let places: Vec<_> = (0..=48).map(|k| around(k % 48, 0.3)).collect();
         let guide = polyline(&places).unwrap();
         let vertex = around(0, 0.0);
@@ -305,11 +305,7 @@ mod tests {
     #[test]
     fn a_guide_may_be_too_far_off_in_a_place() {
         let (bowl, flat) = bowl_and_plane();
-        let gap = Gap {
-            sides: [&bowl, &flat],
-            placement: PLACEMENT,
-            line: Line::Intersection,
-        };
+        let gap = gap([&bowl, &flat]);
         let far = |k: u8| if (21..=27).contains(&k) { 2.0 } else { 0.3 };
         let places: Vec<_> = (0..=48).map(|k| around(k % 48, far(k % 48))).collect();
         let guide = polyline(&places).unwrap();
@@ -325,11 +321,7 @@ mod tests {
     #[test]
     fn a_long_arc_is_followed_along_its_guide() {
         let (bowl, flat) = bowl_and_plane();
-        let gap = Gap {
-            sides: [&bowl, &flat],
-            placement: PLACEMENT,
-            line: Line::Intersection,
-        };
+        let gap = gap([&bowl, &flat]);
         let places: Vec<_> = (0..=40).map(|k| around(k, 0.3)).collect();
         let guide = polyline(&places).unwrap();
         let path = trace(&gap, &guide, [around(0, 0.0), around(40, 0.0)], REACH).unwrap();
@@ -341,11 +333,7 @@ mod tests {
     #[test]
     fn what_does_not_meet_is_not_traced() {
         let (a, b) = (plane(1.0, 0.01, 0.0), plane(0.0, 0.0, 0.0));
-        let gap = Gap {
-            sides: [&a, &b],
-            placement: PLACEMENT,
-            line: Line::Intersection,
-        };
+        let gap = gap([&a, &b]);
         let guide = PiecewiseCubic::line([0.0, 17.0], [40.0, 27.0], 41.0).unwrap();
         assert_eq!(
             trace(&gap, &guide, [[0.0, 17.0], [40.0, 27.0]], REACH),
