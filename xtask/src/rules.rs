@@ -77,6 +77,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     ("relief-tests", &EVERYTHING),
+    ("relief-studies", &STUDIES),
     ("relief-vm-systemd", &["sim-scanner"]),
     (
         "relief-vm-usb",
@@ -145,22 +146,37 @@ const COMMAND_LINE: [&str; 17] = [
     "storage",
 ];
 
-const EVERYTHING: [&str; 19] = [
+const EVERYTHING: [&str; 15] = [
     "cad-exchange",
+    "deliverables",
+    "pipeline",
+    "range-image",
+    "reconstruct",
+    "regrid",
+    "relief-api",
+    "reliefd",
+    "scan-files",
+    "scan-record",
+    "scanner-driver",
+    "scanner-protocol",
+    "shapes",
+    "sim-scanner",
+    "storage",
+];
+
+const STUDIES: [&str; 16] = [
     "deliverables",
     "nurbs",
     "pipeline",
     "range-image",
     "reconstruct",
     "regrid",
-    "relief",
     "relief-api",
+    "relief-tests",
     "relief-throughput",
-    "reliefd",
     "scan-files",
     "scan-record",
     "scanner-driver",
-    "scanner-protocol",
     "segment",
     "shapes",
     "sim-scanner",

@@ -121,16 +121,16 @@ pub(crate) fn service() -> Result<()> {
     shell::run("cargo", &["build", "--release", "--package", "reliefd"])
 }
 
-/// Builds all programs of the tests. From here, since libraries with build scripts are built anew
+/// Builds all studies. From here, since libraries with build scripts are built anew
 /// where the environment differs, and that of a chore does.
 pub(crate) fn build() -> Result<()> {
-    let words = ["build", "--release", "--package", "relief-tests", "--bins"];
+    let words = ["build", "--release", "-p", "relief-studies", "--bins"];
     shell::run("cargo", &words)
 }
 
-/// Runs a program of the tests' crate, built for speed.
+/// Runs a study, or another program of their crate, built for speed.
 pub(crate) fn program(name: &str, options: &[OsString]) -> Result<()> {
-    program_of("relief-tests", name, options)
+    program_of("relief-studies", name, options)
 }
 
 fn program_of(package: &str, name: &str, options: &[OsString]) -> Result<()> {

@@ -43,7 +43,7 @@ pub(crate) struct Store {
 /// The workspace's folder.
 pub(crate) fn root() -> PathBuf {
     let own = Path::new(env!("CARGO_MANIFEST_DIR"));
-    own.parent().unwrap_or(own).to_owned()
+    own.ancestors().nth(2).unwrap_or(own).to_owned()
 }
 
 /// Where builds and studies leave their files.

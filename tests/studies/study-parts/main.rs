@@ -96,7 +96,7 @@ impl Options {
 /// Parts of a short study.
 const SHORT: usize = 6;
 
-const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/studies/parts.md");
+const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/studies/parts.md");
 
 fn parse_seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
     let parse = |number: &str| number.trim().parse::<u64>().ok();

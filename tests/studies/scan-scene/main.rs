@@ -16,8 +16,8 @@
 //! there is no truth.
 //!
 //! ```sh
-//! cargo run --release -p relief-tests --bin scan-scene -- --object house --out out
-//! cargo run --release -p relief-tests --bin scan-scene -- --replay view.ply.gz --out out
+//! cargo run --release -p relief-studies --bin scan-scene -- --object house --out out
+//! cargo run --release -p relief-studies --bin scan-scene -- --replay view.ply.gz --out out
 //! ```
 
 mod truth;

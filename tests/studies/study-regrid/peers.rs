@@ -27,7 +27,7 @@ pub(crate) struct Python {
 }
 
 fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
 fn said(program: &Path, arguments: &[&str]) -> Result<String> {

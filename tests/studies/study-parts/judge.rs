@@ -42,7 +42,7 @@ pub(crate) struct Python(pub(crate) PathBuf);
 
 impl Python {
     fn said(&self, script: &str, words: &[String]) -> Result<String> {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let output = Command::new(&self.0)
             .args(["-B", script])
             .args(words)
