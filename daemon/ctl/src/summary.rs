@@ -53,6 +53,10 @@ pub(crate) fn lines(report: &Report) -> Vec<String> {
         report.settings.minimum_nodes,
         crumbs(report)
     ));
+    if !report.tangent.accepted.is_empty() {
+        let joins = output::counted(report.tangent.accepted.len(), "smooth join");
+        lines.push(format!("tangent      {joins}"));
+    }
     lines.extend(regularities(report));
     lines.extend(report.background.list.iter().map(|region| {
         format!(

@@ -1,6 +1,6 @@
 //! Regularities, for the report.
 
-use pipeline::{Refused, Regularities, Regularity, Regularize, Round, Target};
+use pipeline::{Refused, Regularities, Regularity, Regularize, Round, Tangent, Target};
 
 use crate::report::{RefusedReport, RegularitiesReport, RegularityReport};
 
@@ -16,6 +16,13 @@ pub(crate) fn round_name(regularize: &Regularize) -> Option<String> {
 }
 
 pub(crate) fn regularities(found: &Regularities) -> RegularitiesReport {
+    RegularitiesReport {
+        accepted: found.accepted.iter().map(accepted).collect(),
+        refused: found.refused.iter().map(refused).collect(),
+    }
+}
+
+pub(crate) fn tangent(found: &Tangent) -> RegularitiesReport {
     RegularitiesReport {
         accepted: found.accepted.iter().map(accepted).collect(),
         refused: found.refused.iter().map(refused).collect(),

@@ -28,6 +28,9 @@ pub struct Report {
     /// Nodes that belong to no region.
     #[serde(default)]
     pub crumbs: CrumbsReport,
+    /// The neighbours whose shapes were made to touch along a line.
+    #[serde(default)]
+    pub tangent: RegularitiesReport,
     /// The regularities that their shapes were given; `null` where none were looked for.
     #[serde(default)]
     pub regularities: Option<RegularitiesReport>,

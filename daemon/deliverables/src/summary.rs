@@ -7,7 +7,7 @@ use reconstruct::{Edge, EdgeKind, EdgeOrigin, Face, Model, Surface};
 
 use crate::deviations::Deviations;
 use crate::export::CadOptions;
-use crate::regular::{regularities, round_name};
+use crate::regular::{regularities, round_name, tangent};
 use crate::report::{
     BackgroundRegionReport, BackgroundReport, CrumbReport, CrumbsReport, EdgeLengthsReport,
     FreedomReport, ModelReport, OriginLengthsReport, RangeImageReport, RegionReport, RegionsReport,
@@ -33,6 +33,7 @@ impl Report {
             settings: settings(inputs.settings, inputs.cad),
             range_image: range_image(inputs),
             regions: regions(inputs.outcome),
+            tangent: tangent(&inputs.outcome.tangent),
             regularities: inputs.outcome.regularities.as_ref().map(regularities),
             background: background(inputs.outcome),
             crumbs: crumbs(inputs.outcome),

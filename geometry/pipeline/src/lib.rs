@@ -34,7 +34,7 @@ pub use part::{Part, divide};
 pub use process::{
     Outcome, PipelineError, process, process_columns, process_in_view, process_scan,
 };
-pub use regular::Regularities;
+pub use regular::{Regularities, Tangent};
 pub use regularize::{
     Adjusted, Kind as RegularityKind, Reason, Refused, Regularity, Round,
     Settings as RegularizeSettings, Target,

@@ -13,7 +13,7 @@ use crate::kinds::samples::{OnRegion, of_regions};
 use crate::kinds::{RegionKind, kinds};
 use crate::outlines::{self, Removed, SettledNodes, settle_nodes};
 use crate::part::divide;
-use crate::regular::{self, Regularities};
+use crate::regular::{self, Regularities, Tangent};
 use crate::{Background, Crumb, Kinds, NodeRole, View};
 use crate::{Observer, Settings, SettingsError, SmoothJoins, Stage};
 
@@ -31,6 +31,8 @@ pub struct Outcome {
     pub crumbs: Vec<Crumb>,
     /// What kind of surface each region of the part is, in the order of their labels.
     pub kinds: Vec<RegionKind>,
+    /// The neighbours that were made to touch along a line.
+    pub tangent: Tangent,
     /// The regularities that their shapes were given; `None` where none were looked for.
     pub regularities: Option<Regularities>,
     /// The model made of them, and how well it fits.
@@ -278,7 +280,7 @@ fn in_view(
             settings.smooth_joins,
             observer,
         )?;
-        let (kinds, regularities) = regular::regularize(decided, has_kinds, settings)?;
+        let tied = regular::tie(decided, has_kinds, settings)?;
         let removed = part.image.is_some().then_some(Removed {
             image,
             roles: &part.roles,
@@ -289,16 +291,16 @@ fn in_view(
             }
             _ => Some(Vec::new()),
         };
-        Ok::<_, PipelineError>((kinds, regularities, beside))
+        Ok::<_, PipelineError>((tied, beside))
     };
     let fit = || Fitted::of(part_image, &part.regions, &settings.reconstruct, observer);
     let (fitted, of_samples) = rayon::join(fit, of_samples);
-    let (fitted, (kinds, regularities, beside)) = (fitted?, of_samples?);
+    let (fitted, (tied, beside)) = (fitted?, of_samples?);
     let are_too_many = beside.is_none();
     let beside = beside.unwrap_or_default();
     let mut shapes: Vec<Option<Shape>> = Vec::new();
     if has_kinds {
-        shapes.extend(kinds.iter().map(RegionKind::shape));
+        shapes.extend(tied.kinds.iter().map(RegionKind::shape));
     }
     let evidence = Evidence {
         shapes: &shapes,
@@ -310,7 +312,7 @@ fn in_view(
                     by the nodes, half a pitch less sharp";
         reconstruction.warnings.push(told.to_owned());
     }
-    let notes = regularities.iter().flat_map(|own| &own.notes);
+    let notes = tied.regularities.iter().flat_map(|own| &own.notes);
     reconstruction.warnings.extend(notes.cloned());
     if unlabelled > 0 {
         reconstruction.warnings.push(format!(
@@ -335,8 +337,9 @@ fn in_view(
         background: part.background,
         roles: part.roles,
         crumbs: part.crumbs,
-        kinds,
-        regularities,
+        kinds: tied.kinds,
+        tangent: tied.tangent,
+        regularities: tied.regularities,
         reconstruction,
         settled,
         stages: vec![Stage::Segment, Stage::Reconstruct],

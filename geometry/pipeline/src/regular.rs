@@ -1,9 +1,11 @@
 //! Regularities among the shapes of regions, as their samples allow of them.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
-use regularize::{Adjusted, Fitted, Reason, Refused, Regularity, survival};
+use regularize::{
+    Adjusted, Fitted, Kind, Reason, Refused, Regularity, Regularized, TANGENT_BOUND, survival,
+};
 use shapes::{Fit, Verdict};
 
 use crate::kinds::bearing::Bearing;
@@ -27,36 +29,96 @@ pub struct Regularities {
     pub notes: Vec<String>,
 }
 
-/// Looks for regularities if asked to, and gives them to the shapes. `has_kinds` tells whether faces
-/// will be of the shapes.
-pub(crate) fn regularize(
+/// The neighbours that were made to touch along a line, as a fillet does with the faces beside it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Tangent {
+    /// Those that touch.
+    pub accepted: Vec<Regularity>,
+    /// Those that seemed to, and why they do not.
+    pub refused: Vec<Refused>,
+}
+
+/// Shapes by the samples of all.
+#[derive(Debug)]
+pub(crate) struct Tied {
+    pub(crate) kinds: Vec<RegionKind>,
+    pub(crate) tangent: Tangent,
+    /// `None` where none were looked for.
+    pub(crate) regularities: Option<Regularities>,
+}
+
+/// Makes neighbours touch that go over into each other smoothly, and looks for regularities if
+/// asked to. `has_kinds` tells whether faces will be of the shapes.
+pub(crate) fn tie(
     decided: Decided,
     has_kinds: bool,
     settings: &Settings,
-) -> Result<(Vec<RegionKind>, Option<Regularities>), SettingsError> {
-    let Decided {
-        mut kinds,
-        bearings,
-    } = decided;
-    let Regularize::On(settings) = &settings.regularize else {
-        return Ok((kinds, None));
+) -> Result<Tied, SettingsError> {
+    let mut tied = Tied {
+        kinds: decided.kinds,
+        tangent: Tangent::default(),
+        regularities: None,
     };
-    let mut found = Regularities::default();
-    let mut note = |why: &str| {
-        found
-            .notes
-            .push(format!("no regularities were looked for: {why}"))
+    if let Regularize::On(_) = &settings.regularize {
+        tied.regularities = Some(Regularities::default());
+    }
+    let by_nodes = tied.kinds.iter().any(|kind| kind.basis == Basis::Nodes);
+    let why = if !has_kinds {
+        Some("faces are free forms with these settings (method and kinds)")
+    } else if by_nodes {
+        Some("the samples are not at hand, without which it is not known how sure the shapes are")
+    } else {
+        None
     };
-    if !has_kinds {
-        note("faces are free forms with these settings (method and kinds)");
-        return Ok((kinds, Some(found)));
+    if let Some(why) = why {
+        if let Some(found) = &mut tied.regularities {
+            let note = format!("no regularities were looked for: {why}");
+            found.notes.push(note);
+        }
+        return Ok(tied);
     }
-    if kinds.iter().any(|kind| kind.basis == Basis::Nodes) {
-        note("the samples are not at hand, without which it is not known how sure the shapes are");
-        return Ok((kinds, Some(found)));
+    let scene = Scene {
+        size_mm: size_mm(&decided.bearings),
+        bearings: &decided.bearings,
+        touching: &decided.touching,
+    };
+    let groups = match (&settings.regularize, &mut tied.regularities) {
+        (Regularize::On(_), Some(found)) => vec![largest(fitted(&tied.kinds), &mut found.notes)],
+        _ => {
+            let groups = connected(fitted(&tied.kinds), &decided.touching).into_iter();
+            let none = &mut Vec::new();
+            groups.map(|group| largest(group, none)).collect()
+        }
+    };
+    for group in groups {
+        let found = scene.adjust(group, &tied.kinds, &settings.regularize)?;
+        for own in found.accepted {
+            match &mut tied.regularities {
+                Some(regularities) if own.kind != Kind::Tangent => regularities.accepted.push(own),
+                _ => tied.tangent.accepted.push(own),
+            }
+        }
+        for own in found.refused {
+            match &mut tied.regularities {
+                Some(regularities) if own.kind != Kind::Tangent => regularities.refused.push(own),
+                _ => tied.tangent.refused.push(own),
+            }
+        }
+        for adjusted in found.adjusted {
+            let mut kinds = tied.kinds.iter_mut();
+            let own = kinds.find(|kind| kind.label.get() == adjusted.label);
+            if let Some(own) = own {
+                own.adjusted = Some(Box::new(adjusted));
+            }
+        }
     }
-    let mut fitted: Vec<(usize, Fitted)> = Vec::new();
-    for kind in &kinds {
+    Ok(tied)
+}
+
+/// The shapes, each with how many samples it holds.
+fn fitted(kinds: &[RegionKind]) -> Vec<(usize, Fitted)> {
+    let mut fitted = Vec::new();
+    for kind in kinds {
         if let Verdict::Shape(fit) = &kind.evidence.verdict {
             let own = Fitted {
                 label: kind.label.get(),
@@ -66,8 +128,33 @@ pub(crate) fn regularize(
             fitted.push((fit.held, own));
         }
     }
+    fitted
+}
+
+/// Shapes by the pairs that tie them, in the order of their labels; those that none ties are left
+/// out.
+fn connected(fitted: Vec<(usize, Fitted)>, pairs: &[[u16; 2]]) -> Vec<Vec<(usize, Fitted)>> {
+    let mut group: BTreeMap<u16, u16> = pairs.iter().flatten().map(|own| (*own, *own)).collect();
+    for pair in pairs {
+        let [a, b] = pair.map(|own| group[&own]);
+        let (into, from) = (a.min(b), a.max(b));
+        for own in group.values_mut().filter(|own| **own == from) {
+            *own = into;
+        }
+    }
+    let mut groups: BTreeMap<u16, Vec<(usize, Fitted)>> = BTreeMap::new();
+    for own in fitted {
+        if let Some(group) = group.get(&own.1.label) {
+            groups.entry(*group).or_default().push(own);
+        }
+    }
+    groups.into_values().collect()
+}
+
+/// No more shapes than can be tied in a moment.
+fn largest(mut fitted: Vec<(usize, Fitted)>, notes: &mut Vec<String>) -> Vec<Fitted> {
     if fitted.len() > MOST {
-        found.notes.push(format!(
+        notes.push(format!(
             "regularities were looked for among the {MOST} shapes of the most samples only, of {}",
             fitted.len()
         ));
@@ -76,43 +163,57 @@ pub(crate) fn regularize(
         fitted.truncate(MOST);
         fitted.sort_by_key(|(_, own)| own.label);
     }
-    let mut fitted: Vec<Fitted> = fitted.into_iter().map(|(_, own)| own).collect();
-    let size_mm = size_mm(&bearings);
-    let adjusted = loop {
-        let all =
-            regularize::regularize(&fitted, size_mm, settings).map_err(|error| SettingsError {
-                stage: "reconstruct",
-                message: error.to_string(),
-            })?;
-        // Each of the tests has its part in the chance that one of them errs.
-        let least = survival(settings.bound.powi(2), 1) / all.adjusted.len().max(1) as f64;
-        let refusing: BTreeSet<u16> = all
-            .adjusted
-            .iter()
-            .filter(|adjusted| !is_borne(&kinds, &bearings, adjusted, least))
-            .map(|adjusted| adjusted.label)
-            .collect();
-        if refusing.is_empty() {
-            found.accepted = all.accepted;
-            found.refused.extend(all.refused);
-            break all.adjusted;
-        }
-        let ties = all.accepted.iter();
-        let ties = ties.filter(|own| own.labels.iter().any(|label| refusing.contains(label)));
-        found
-            .refused
-            .extend(ties.map(|own| Refused::of(own, Reason::Samples)));
-        fitted.retain(|own| !refusing.contains(&own.label));
-    };
-    for adjusted in adjusted {
-        let own = kinds
-            .iter_mut()
-            .find(|kind| kind.label.get() == adjusted.label);
-        if let Some(own) = own {
-            own.adjusted = Some(Box::new(adjusted));
+    fitted.into_iter().map(|(_, own)| own).collect()
+}
+
+/// What shapes are tied by, and by what they are judged.
+struct Scene<'a> {
+    size_mm: f64,
+    bearings: &'a [Bearing],
+    touching: &'a [[u16; 2]],
+}
+
+impl Scene<'_> {
+    /// What ties these shapes, as far as their samples allow of what it makes of them.
+    fn adjust(
+        &self,
+        mut fitted: Vec<Fitted>,
+        kinds: &[RegionKind],
+        regularize: &Regularize,
+    ) -> Result<Regularized, SettingsError> {
+        let mut refused = Vec::new();
+        let bound = regularize.bound().unwrap_or(TANGENT_BOUND);
+        loop {
+            let (touching, size_mm) = (self.touching, self.size_mm);
+            let mut found = match regularize {
+                Regularize::Off => regularize::join(&fitted, touching, size_mm),
+                Regularize::On(settings) => {
+                    let found = regularize::regularize(&fitted, touching, size_mm, settings);
+                    found.map_err(|error| SettingsError {
+                        stage: "reconstruct",
+                        message: error.to_string(),
+                    })?
+                }
+            };
+            // Each of the tests has its part in the chance that one of them errs.
+            let least = survival(bound.powi(2), 1) / found.adjusted.len().max(1) as f64;
+            let refusing: BTreeSet<u16> = found
+                .adjusted
+                .iter()
+                .filter(|adjusted| !is_borne(kinds, self.bearings, adjusted, least))
+                .map(|adjusted| adjusted.label)
+                .collect();
+            if refusing.is_empty() {
+                refused.append(&mut found.refused);
+                found.refused = refused;
+                return Ok(found);
+            }
+            let ties = found.accepted.iter();
+            let ties = ties.filter(|own| own.labels.iter().any(|label| refusing.contains(label)));
+            refused.extend(ties.map(|own| Refused::of(own, Reason::Samples)));
+            fitted.retain(|own| !refusing.contains(&own.label));
         }
     }
-    Ok((kinds, Some(found)))
 }
 
 /// Whether a region's samples allow of its adjusted shape: it costs no more than noise makes

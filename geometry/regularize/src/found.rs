@@ -39,6 +39,8 @@ pub enum Kind {
     RoundDistance,
     /// A half angle of a cone.
     RoundHalfAngle,
+    /// Surfaces that have one tangent plane along the line in which they meet.
+    Tangent,
 }
 
 impl Kind {
@@ -67,6 +69,7 @@ impl Kind {
             Self::RoundTubeRadius => "round tube radius",
             Self::RoundDistance => "round distance",
             Self::RoundHalfAngle => "round half angle",
+            Self::Tangent => "tangent",
         }
     }
 }

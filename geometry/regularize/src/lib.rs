@@ -18,6 +18,9 @@
 //!   than one standard uncertainty counts as one, so that the less is known, the less is found;
 //! - nothing is moved farther than the limits.
 //!
+//! Neighbours that are said to touch need no such proof: that they go over into each other smoothly
+//! is seen where they do. They are made to have one tangent plane along a line before all else.
+//!
 //! What all accepted ones make of the shapes is the weighted least squares of the fits' covariances
 //! with the regularities as conditions; the covariances lose what the conditions settle. Where
 //! regularities contradict each other, the less likely are refused. What others imply is not
@@ -31,11 +34,13 @@ mod rule;
 mod run;
 mod settings;
 mod state;
+mod touch;
 
 use shapes::{Joint, Numbers, Shape};
 
 use chart::Chart;
 use run::Run;
+pub use run::TANGENT_BOUND;
 use state::State;
 
 pub use chance::survival;
@@ -81,7 +86,8 @@ pub struct Regularized {
     pub refused: Vec<Refused>,
 }
 
-/// Finds regularities among shapes and adjusts these so that they have them. `size_mm` is the
+/// Finds regularities among shapes and adjusts these so that they have them. Those that are said to
+/// be `touching` go over into each other smoothly, and are made to do so first. `size_mm` is the
 /// size of the part: what places are spread over. The time it takes grows with the cube of the
 /// number of shapes: a hundred take about a second.
 ///
@@ -90,10 +96,29 @@ pub struct Regularized {
 /// nothing.
 pub fn regularize(
     shapes: &[Fitted],
+    touching: &[[u16; 2]],
     size_mm: f64,
     settings: &Settings,
 ) -> Result<Regularized, SettingsError> {
     settings.validate()?;
+    let all = |run: &mut Run<'_>| run.all();
+    Ok(adjust(shapes, touching, size_mm, settings, all))
+}
+
+/// As [`regularize`] with the limits of its defaults, but that those touch which are `touching` is
+/// all that shapes are given.
+#[must_use]
+pub fn join(shapes: &[Fitted], touching: &[[u16; 2]], size_mm: f64) -> Regularized {
+    adjust(shapes, touching, size_mm, &Settings::default(), |_| ())
+}
+
+fn adjust(
+    shapes: &[Fitted],
+    touching: &[[u16; 2]],
+    size_mm: f64,
+    settings: &Settings,
+    others: impl FnOnce(&mut Run<'_>),
+) -> Regularized {
     let is_known = |own: &&Fitted| {
         let base = Chart::of(&own.shape).base;
         let numbers = base.direction.iter().chain(base.place.iter());
@@ -102,12 +127,18 @@ pub fn regularize(
     };
     let known: Vec<&Fitted> = shapes.iter().filter(is_known).collect();
     if known.is_empty() || !(size_mm > 0.0 && size_mm.is_finite()) {
-        return Ok(Regularized::default());
+        return Regularized::default();
     }
     let labels: Vec<u16> = known.iter().map(|own| own.label).collect();
     let fits = known.iter().map(|own| (&own.shape, &own.joint));
     let mut run = Run::new(State::new(fits, size_mm), settings, &labels);
-    run.all();
+    let index = |label: u16| labels.iter().position(|own| *own == label);
+    let pairs = touching.iter();
+    let pairs: Vec<[usize; 2]> = pairs
+        .filter_map(|[a, b]| Some([index(*a)?, index(*b)?]))
+        .collect();
+    run.touch(&pairs);
+    others(&mut run);
     let adjusted = run.tied().into_iter().map(|shape| {
         let chart = &run.state.charts[shape];
         let told = run.state.told(shape);
@@ -123,9 +154,9 @@ pub fn regularize(
         }
     });
     let adjusted = adjusted.collect();
-    Ok(Regularized {
+    Regularized {
         adjusted,
         accepted: run.accepted,
         refused: run.refused,
-    })
+    }
 }

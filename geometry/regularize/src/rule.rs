@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 use shapes::Family;
 
-use crate::chart::{Chart, HALF_ANGLE, Told, across};
+use crate::chart::{Chart, HALF_ANGLE, RADIUS, Told, across};
+use crate::touch::{axes_off, ball_mm, meridians_off};
 
 /// Most equations of a rule.
 pub(crate) const ROWS: usize = 3;
@@ -46,6 +47,19 @@ pub(crate) enum Rule {
     AxesApart(usize, usize, f64),
     /// An axis runs so far from a plane, millimetres; the plane is the latter.
     AxisOffPlane(usize, usize, f64),
+    /// A ball that rolls in the first touches a plane, which is the latter.
+    TouchesPlane(usize, usize),
+    /// A cone touches a plane, which is the latter.
+    LiesOnPlane(usize, usize),
+    /// Cylinders of one direction touch.
+    AxesTouch(usize, usize),
+    /// Surfaces about one axis, which the latter has, touch.
+    MeridiansTouch(usize, usize),
+    /// An axis touches the circle about which the tube of a torus runs, in its plane. The torus is
+    /// the latter.
+    AlongSpine(usize, usize),
+    /// A centre lies on that circle.
+    OnSpine(usize, usize),
 }
 
 /// What an equation is in.
@@ -70,7 +84,13 @@ impl Rule {
             | Self::SameSize((a, _), (b, _))
             | Self::PlanesApart(a, b, _)
             | Self::AxesApart(a, b, _)
-            | Self::AxisOffPlane(a, b, _) => vec![a, b],
+            | Self::AxisOffPlane(a, b, _)
+            | Self::TouchesPlane(a, b)
+            | Self::LiesOnPlane(a, b)
+            | Self::AxesTouch(a, b)
+            | Self::MeridiansTouch(a, b)
+            | Self::AlongSpine(a, b)
+            | Self::OnSpine(a, b) => vec![a, b],
             Self::Mirrored([a, b], [c, d]) => vec![a, b, c, d],
             Self::Centred([a, b], c) => vec![a, b, c],
         }
@@ -89,8 +109,14 @@ impl Rule {
             Self::Orthogonal(..) | Self::AcrossFrame(..) => vec![(Unit::Angle, 1.0)],
             // The cosine is spread evenly from 0 to 1, but one may be off to both sides.
             Self::AtAngle(..) => vec![(Unit::Angle, 0.5)],
-            Self::Coplanar(..) => vec![place],
-            Self::Coaxial(..) | Self::OnAxis(..) => vec![place; 2],
+            Self::Coplanar(..)
+            | Self::TouchesPlane(..)
+            | Self::AxesTouch(..)
+            | Self::MeridiansTouch(..) => vec![place],
+            Self::LiesOnPlane(..) => vec![(Unit::Angle, 1.0), place],
+            Self::Coaxial(..) | Self::OnAxis(..) | Self::AlongSpine(..) | Self::OnSpine(..) => {
+                vec![place; 2]
+            }
             Self::Concentric(..) => vec![place; 3],
             Self::SameSize((_, HALF_ANGLE), _) => vec![(Unit::Angle, 0.785)],
             Self::SameSize((a, i), (b, j)) => {
@@ -168,8 +194,42 @@ impl Rule {
                 let (a, b) = (at(a), at(b));
                 one((a.place - b.place).dot(&b.direction).abs() - target)
             }
+            Self::TouchesPlane(a, b) => {
+                let (a, b) = (at(a), at(b));
+                one((a.place - b.place).dot(&b.direction).abs() - ball_mm(&a))
+            }
+            Self::LiesOnPlane(a, b) => {
+                let (a, b) = (at(a), at(b));
+                let lean = a.direction.dot(&b.direction).abs();
+                let apex_mm = (a.place - b.place).dot(&b.direction);
+                [lean - libm::sin(a.sizes[HALF_ANGLE]), apex_mm, 0.0]
+            }
+            Self::AxesTouch(a, b) => {
+                let bases = [a, b].map(|shape| &charts[shape].base);
+                one(axes_off([&at(a), &at(b)], bases))
+            }
+            Self::MeridiansTouch(a, b) => {
+                let bases = [a, b].map(|shape| &charts[shape].base);
+                one(meridians_off([&at(a), &at(b)], bases))
+            }
+            Self::AlongSpine(a, b) => {
+                let (a, b) = (at(a), at(b));
+                off_spine(&beside(&(a.place - b.place), &a.direction), &b)
+            }
+            Self::OnSpine(a, b) => {
+                let (a, b) = (at(a), at(b));
+                off_spine(&(a.place - b.place), &b)
+            }
         }
     }
+}
+
+/// How far something that lies there from the centre of a torus is off its spine: across its
+/// plane, and in it.
+fn off_spine(from_centre: &Vector3<f64>, torus: &Told) -> [f64; ROWS] {
+    let across = from_centre.dot(&torus.direction);
+    let out = beside(from_centre, &torus.direction).norm();
+    [across, out - torus.sizes[RADIUS], 0.0]
 }
 
 /// The part of a vector across a direction.

@@ -3,17 +3,22 @@
 use nalgebra::SMatrix;
 use shapes::Family;
 
-use crate::chance::{discoveries, tail};
+use crate::chance::{discoveries, survival, tail};
 use crate::chart::{HALF_ANGLE, MOST, TUBE};
 use crate::found::{Kind, Reason, Refused, Regularity, Target};
 use crate::propose::Proposals;
 use crate::rule::Rule;
 use crate::settings::{ANGLE_GRIDS_DEG, Settings};
 use crate::state::{Held, Standing, State};
+use crate::touch::ways;
 
 /// What is refused is listed where it is off by no more than so many times the bound, or, where
 /// others contradict it, by so many standard deviations.
 const WORTH_TELLING: f64 = 3.0;
+
+/// How many standard uncertainties neighbours that seem to touch may be off it, as
+/// [`Settings::bound`] has it: more than what is sought among all shapes, of which most have no tie.
+pub const TANGENT_BOUND: f64 = 4.0;
 
 /// A rule with how it stands.
 struct Candidate {
@@ -27,8 +32,8 @@ pub(crate) struct Run<'a> {
     pub(crate) state: State,
     settings: &'a Settings,
     labels: &'a [u16],
-    /// In step with what is accepted.
-    held: Vec<Held>,
+    /// In step with what is accepted: of tangent surfaces several.
+    held: Vec<Vec<Held>>,
     pub(crate) accepted: Vec<Regularity>,
     pub(crate) refused: Vec<Refused>,
 }
@@ -69,7 +74,8 @@ impl<'a> Run<'a> {
 
     /// The shapes that rules tie.
     pub(crate) fn tied(&self) -> Vec<usize> {
-        let mut tied: Vec<usize> = self.held.iter().flat_map(|own| own.rule.shapes()).collect();
+        let held = self.held.iter().flatten();
+        let mut tied: Vec<usize> = held.flat_map(|own| own.rule.shapes()).collect();
         tied.sort_unstable();
         tied.dedup();
         tied
@@ -93,7 +99,13 @@ impl<'a> Run<'a> {
         for candidate in candidates {
             self.try_one(&candidate);
         }
-        while self.held.len() > before && !self.state.solve(&self.held) {
+        self.solve_from(before);
+    }
+
+    /// Solves for all that holds together; what was accepted last, but for the first so many, is
+    /// given up where that leads nowhere.
+    fn solve_from(&mut self, before: usize) {
+        while self.held.len() > before && !self.state.solve(self.held.iter().flatten()) {
             self.held.pop();
             if let Some(last) = self.accepted.pop() {
                 self.refused.push(Refused::of(&last, Reason::Contradicted));
@@ -167,14 +179,7 @@ impl<'a> Run<'a> {
         if !self.is_within_limits(&moved) {
             return self.refuse(&candidate, Reason::Limit);
         }
-        let (mut turned_rad, mut moved_mm) = (0.0_f64, 0.0_f64);
-        for shape in candidate.rule.shapes() {
-            let [now, then] = [&self.state.moved, &moved].map(|all| self.state.of(all, shape));
-            let step: Vec<f64> = now.iter().zip(then).map(|(now, then)| then - now).collect();
-            let (turned, moved) = self.state.charts[shape].extent(&step);
-            turned_rad = turned_rad.max(turned);
-            moved_mm = moved_mm.max(moved);
-        }
+        let (turned_rad, moved_mm) = self.extent(&candidate.rule, &moved);
         let (kind, target) = self.kind(&candidate.rule);
         let (off_rad, off_mm) = self.state.off_at_fits(&candidate.rule);
         self.accepted.push(Regularity {
@@ -191,7 +196,60 @@ impl<'a> Run<'a> {
             moved_mm,
         });
         let held = self.state.hold(standing);
-        self.held.push(held);
+        self.held.push(vec![held]);
+    }
+
+    /// Makes neighbours touch that go over into each other smoothly, the likeliest first.
+    pub(crate) fn touch(&mut self, pairs: &[[usize; 2]]) {
+        let before = self.held.len();
+        let best = |state: &State, pair: &[usize; 2]| {
+            let ways = ways(pair[0], pair[1], &state.charts);
+            let found = ways.iter().filter_map(|way| Touching::of(state, way));
+            found.max_by(|a, b| a.p.total_cmp(&b.p))
+        };
+        let found = pairs.iter().filter_map(|pair| best(&self.state, pair));
+        let mut found: Vec<Touching> = found.collect();
+        found.sort_by(|a, b| {
+            let likely = b.p.total_cmp(&a.p);
+            likely.then_with(|| self.labels_of(&a.way[0]).cmp(&self.labels_of(&b.way[0])))
+        });
+        for first in found {
+            if first.p < tail(TANGENT_BOUND) {
+                self.refused.push(first.refused(self, Reason::TooFar));
+                continue;
+            }
+            let now = Touching::of(&self.state, &first.way);
+            let now = now.filter(|now| now.p >= tail(TANGENT_BOUND));
+            let Some(now) = now else {
+                self.refused.push(first.refused(self, Reason::Contradicted));
+                continue;
+            };
+            if now.held.is_empty() {
+                continue;
+            }
+            if !self.is_within_limits(&now.state.moved) {
+                self.refused.push(now.refused(self, Reason::Limit));
+                continue;
+            }
+            let told = now.accepted(self);
+            self.accepted.push(told);
+            self.held.push(now.held);
+            self.state = now.state;
+        }
+        self.solve_from(before);
+    }
+
+    /// By how much the free numbers become others in the shapes of a rule.
+    fn extent(&self, rule: &Rule, moved: &[f64]) -> (f64, f64) {
+        let (mut turned_rad, mut moved_mm) = (0.0_f64, 0.0_f64);
+        for shape in rule.shapes() {
+            let [now, then] = [&self.state.moved, moved].map(|all| self.state.of(all, shape));
+            let step: Vec<f64> = now.iter().zip(then).map(|(now, then)| then - now).collect();
+            let (turned, moved) = self.state.charts[shape].extent(&step);
+            turned_rad = turned_rad.max(turned);
+            moved_mm = moved_mm.max(moved);
+        }
+        (turned_rad, moved_mm)
     }
 
     fn is_within_limits(&self, moved: &[f64]) -> bool {
@@ -265,6 +323,92 @@ impl<'a> Run<'a> {
             Rule::PlanesApart(_, _, target)
             | Rule::AxesApart(_, _, target)
             | Rule::AxisOffPlane(_, _, target) => (Kind::RoundDistance, mm(target)),
+            Rule::TouchesPlane(..)
+            | Rule::LiesOnPlane(..)
+            | Rule::AxesTouch(..)
+            | Rule::MeridiansTouch(..)
+            | Rule::AlongSpine(..)
+            | Rule::OnSpine(..) => (Kind::Tangent, None),
         }
+    }
+}
+
+/// Two shapes that are to touch, with what becomes of all if they do.
+struct Touching {
+    way: Vec<Rule>,
+    state: State,
+    held: Vec<Held>,
+    /// As [`Standing`] has it, of all rules together.
+    squares: f64,
+    freedom: usize,
+    p: f64,
+    chance: f64,
+}
+
+impl Touching {
+    /// `None` where other rules make them not touch.
+    fn of(state: &State, way: &[Rule]) -> Option<Self> {
+        let mut own = Self {
+            way: way.to_vec(),
+            state: state.clone(),
+            held: Vec::new(),
+            squares: 0.0,
+            freedom: 0,
+            p: 1.0,
+            chance: 1.0,
+        };
+        for rule in way {
+            let standing = own.state.standing(rule, None)?;
+            if standing.is_contradicted() {
+                return None;
+            }
+            if standing.is_implied() {
+                continue;
+            }
+            own.squares += standing.squares;
+            own.freedom += standing.freedom;
+            own.chance *= standing.chance;
+            let held = own.state.hold(&standing);
+            own.held.push(held);
+        }
+        if own.freedom > 0 {
+            own.p = survival(own.squares, own.freedom);
+        }
+        Some(own)
+    }
+
+    /// How far both are off at the fits: angles, radians, and lengths, millimetres.
+    fn off(&self) -> (Option<f64>, Option<f64>) {
+        let off = |rule: &Rule| self.state.off_at_fits(rule);
+        let most = |a: Option<f64>, b: Option<f64>| match (a, b) {
+            (Some(a), Some(b)) => Some(a.max(b)),
+            (a, b) => a.or(b),
+        };
+        let each = self.way.iter().map(off);
+        each.fold((None, None), |(rad, mm), own| {
+            (most(rad, own.0), most(mm, own.1))
+        })
+    }
+
+    fn accepted(&self, run: &Run<'_>) -> Regularity {
+        let (off_rad, off_mm) = self.off();
+        let (turned_rad, moved_mm) = run.extent(&self.way[0], &self.state.moved);
+        Regularity {
+            kind: Kind::Tangent,
+            labels: run.labels_of(&self.way[0]),
+            target: None,
+            off_rad,
+            off_mm,
+            deviations: self.squares.sqrt(),
+            freedom: self.freedom,
+            p: self.p,
+            chance: self.chance,
+            turned_rad,
+            moved_mm,
+        }
+    }
+
+    fn refused(&self, run: &Run<'_>, reason: Reason) -> Refused {
+        Refused::of(&self.accepted(run), reason)
     }
 }

@@ -327,7 +327,7 @@ impl State {
 
     /// Solves for all rules together, from the fits on. `false` where that leads nowhere; the
     /// state is of no use then.
-    pub(crate) fn solve(&mut self, held: &[Held]) -> bool {
+    pub(crate) fn solve<'a>(&mut self, held: impl Iterator<Item = &'a Held> + Clone) -> bool {
         self.reset();
         let deviations: Vec<f64> = (0..self.all())
             .map(|i| self.covariance[i * self.all() + i].sqrt())
@@ -335,7 +335,7 @@ impl State {
         let mut here = self.moved.clone();
         for _ in 0..ROUNDS {
             self.reset();
-            for own in held {
+            for own in held.clone() {
                 let linear = self.linear(&own.rule, &here);
                 for sum in &own.sums {
                     let mut off = Vector3::from(linear.off).dot(sum);

@@ -152,7 +152,7 @@ fn a_round_number_is_on_the_coarsest_grid_that_explains_it() {
             sphere(Vector3::zeros(), radius),
             Known { size, ..WELL },
         )];
-        let found = regularize(&shapes, SIZE_MM, settings).unwrap();
+        let found = regularize(&shapes, &[], SIZE_MM, settings).unwrap();
         found.accepted.first().map(|own| (own.kind, own.target))
     };
     let mm = |value| Some((Kind::RoundRadius, Some(Target::Millimetres(value))));
@@ -184,7 +184,7 @@ fn angles_and_the_frame_count_only_if_asked_for() {
         fitted(2, plane(lean, Vector3::new(31.3, 4.0, 5.0)), WELL),
     ];
     let of = |settings: &Settings| {
-        let found = regularize(&shapes, SIZE_MM, settings).unwrap();
+        let found = regularize(&shapes, &[], SIZE_MM, settings).unwrap();
         let mut kinds: Vec<_> = found.accepted.iter().map(|own| own.kind).collect();
         kinds.sort_by_key(|kind| kind.as_str());
         kinds
@@ -196,7 +196,7 @@ fn angles_and_the_frame_count_only_if_asked_for() {
         ..settings
     };
     assert_eq!(of(&angles), [Kind::Angle]);
-    let found_angle = regularize(&shapes, SIZE_MM, &angles).unwrap();
+    let found_angle = regularize(&shapes, &[], SIZE_MM, &angles).unwrap();
     let normals: Vec<_> = found_angle
         .adjusted
         .iter()
@@ -231,7 +231,7 @@ fn nothing_is_moved_beyond_the_limits() {
         most_rad: 0.06,
         ..Settings::default()
     };
-    let far = regularize(&shapes, SIZE_MM, &settings).unwrap();
+    let far = regularize(&shapes, &[], SIZE_MM, &settings).unwrap();
     assert_eq!(far.accepted[0].kind, Kind::Parallel);
     assert!(far.adjusted[1].turned_rad > 0.04);
     // 2 degrees by default.
@@ -282,14 +282,14 @@ fn what_is_no_number_is_tied_to_nothing() {
     assert!(found_.accepted.iter().all(|own| own.labels == [1, 2]));
     assert_eq!(found_.accepted.len(), 1);
     for size_mm in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let none = regularize(&shapes, size_mm, &Settings::default()).unwrap();
+        let none = regularize(&shapes, &[], size_mm, &Settings::default()).unwrap();
         assert_eq!(none, Default::default());
     }
     let wrong = Settings {
         bound: 0.1,
         ..Settings::default()
     };
-    assert!(regularize(&shapes, SIZE_MM, &wrong).is_err());
+    assert!(regularize(&shapes, &[], SIZE_MM, &wrong).is_err());
 }
 
 /// A part of many ties, turned anyhow.
@@ -391,7 +391,7 @@ fn parts_of_all_sizes_are_treated_alike() {
             most_mm: 0.25 * factor,
             ..Settings::default()
         };
-        let found = regularize(&scaled, SIZE_MM * factor, &settings).unwrap();
+        let found = regularize(&scaled, &[], SIZE_MM * factor, &settings).unwrap();
         let is_of_numbers = |kind: Kind| {
             matches!(
                 kind,

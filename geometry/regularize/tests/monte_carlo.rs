@@ -322,7 +322,7 @@ fn the_bound_is_the_users() {
             bound,
             ..Settings::default()
         };
-        regularize(&shapes, SIZE_MM, &settings)
+        regularize(&shapes, &[], SIZE_MM, &settings)
             .unwrap()
             .accepted
             .len()

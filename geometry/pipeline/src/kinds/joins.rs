@@ -16,6 +16,8 @@ use super::bearing::Bearing;
 /// A region must hold this share of its samples near a join, and this share of those that it is
 /// fitted to, for the two surfaces to touch there at all.
 const LEAST_KEPT: f64 = 0.4;
+/// Samples that regions must have near each other to touch along a line.
+const LEAST_JOINING: usize = 20;
 /// By how much samples may lie farther from a surface that is fitted to others.
 const LOOSER: f64 = 1.1;
 
@@ -69,6 +71,32 @@ pub(super) fn refine(
     }
     let refined = fit.again(&samples, own.area)?;
     (refined.deviation() <= LOOSER * fit.deviation()).then_some(refined)
+}
+
+/// Labels of the regions that touch along a line which runs between them.
+pub(super) fn touching(bearings: &[Bearing], shapes: &[Option<Shape>]) -> Vec<[u16; 2]> {
+    let mut found = Vec::new();
+    for (label, (own, shape)) in (1..).zip(bearings.iter().zip(shapes)) {
+        let neighbours: BTreeSet<u16> = own.joining.iter().map(|j| j.neighbour).collect();
+        for neighbour in neighbours
+            .into_iter()
+            .filter(|neighbour| *neighbour > label)
+        {
+            let index = usize::from(neighbour) - 1;
+            let Some((other, Some(theirs))) = bearings.get(index).zip(shapes.get(index)) else {
+                continue;
+            };
+            let Some(shape) = shape else {
+                continue;
+            };
+            let samples = [joining(own, neighbour), joining(other, label)];
+            let are_enough = samples.iter().all(|near| near.len() >= LEAST_JOINING);
+            if are_enough && on_side([&samples[0], &samples[1]], shape, theirs).is_some() {
+                found.push([label, neighbour]);
+            }
+        }
+    }
+    found
 }
 
 /// Of the samples beside a region's borders, those that are not near a neighbour which it touches:

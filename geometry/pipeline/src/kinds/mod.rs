@@ -29,13 +29,13 @@ pub struct RegionKind {
     pub evidence: Evidence,
     /// What it rests on.
     pub basis: Basis,
-    /// The shape with its regularities, where it has any; the evidence is that of the samples
-    /// alone.
+    /// The shape as its neighbours that it touches and its regularities have it, where it has any;
+    /// the evidence is that of its own samples alone.
     pub adjusted: Option<Box<Adjusted>>,
 }
 
 impl RegionKind {
-    /// The shape, where it is one: with its regularities, if any were looked for.
+    /// The shape, where it is one: tied to others, if it is.
     #[must_use]
     pub fn shape(&self) -> Option<Shape> {
         self.told().map(|(shape, _)| shape)
@@ -66,6 +66,8 @@ pub enum Basis {
 pub(crate) struct Decided {
     pub(crate) kinds: Vec<RegionKind>,
     pub(crate) bearings: Vec<Bearing>,
+    /// Labels of regions that go over into each other smoothly, as far as samples tell.
+    pub(crate) touching: Vec<[u16; 2]>,
 }
 
 /// Decides for each region: by the samples where they are given, else by the nodes.
@@ -105,6 +107,7 @@ pub(crate) fn kinds(
         return Ok(Decided {
             kinds: decided,
             bearings,
+            touching: Vec::new(),
         });
     }
     for _ in 0..ROUNDS {
@@ -121,9 +124,12 @@ pub(crate) fn kinds(
             }
         }
     }
+    let shapes: Vec<Option<Shape>> = decided.iter().map(RegionKind::shape).collect();
+    let touching = joins::touching(&bearings, &shapes);
     Ok(Decided {
         kinds: decided,
         bearings,
+        touching,
     })
 }
 

@@ -180,7 +180,7 @@ pub(crate) fn torus(
 
 /// As [`regularize`], with the settings by default.
 pub(crate) fn found(shapes: &[Fitted]) -> Regularized {
-    regularize(shapes, SIZE_MM, &Settings::default()).expect("they are within their limits")
+    regularize(shapes, &[], SIZE_MM, &Settings::default()).expect("they are within their limits")
 }
 
 /// Direction of a plane or an axis.
