@@ -25,6 +25,9 @@ const STAND_IN: f64 = 0.1;
 /// How near to the line of touch is on it, millimetres.
 const ON_TOUCH_MM: f64 = 5e-3;
 
+/// How far apart surfaces are at most that lie on each other, millimetres.
+const BLUNT_MM: f64 = 2e-3;
+
 /// Which line of two surfaces is looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Line {
@@ -105,6 +108,14 @@ impl Gap<'_> {
             Line::Intersection => SPACE_CURVE_TOLERANCE_MM,
             Line::Touch => STAND_IN * ON_TOUCH_MM,
         }
+    }
+
+    /// Whether the line in which surfaces intersect runs out at a place, since they lie on each other
+    /// there and do not bend: so do two fillets that meet in a corner of the face that both touch.
+    pub(crate) fn is_blunt(&self, place: [f64; 2], reach: Reach) -> bool {
+        let (gap_mm, slope) = self.height(place);
+        let is_flat = gap_mm.abs() <= BLUNT_MM && norm(slope) < reach.least_bend;
+        self.line == Line::Intersection && is_flat
     }
 
     /// The place of the line nearest to another one, along the slope of what vanishes on it.

@@ -300,51 +300,89 @@ impl Drawn<'_> {
         self.gaps[e].filter(|_| !left.edges.contains(&e))
     }
 
+    /// Of creases without a common place the one without which the others have one, of several the
+    /// shortest; a smooth join rather than a crease, since there the surfaces are hardly apart. Where
+    /// more than one is too many, the one that is the farthest off.
+    fn odd(
+        &self,
+        v: usize,
+        place: [f64; 2],
+        meeting: &[(usize, Gap<'_>)],
+        outlines: &[[f64; 2]],
+    ) -> Option<usize> {
+        let length = |e: usize| {
+            let (first, last) = self.map.edges[e].path.domain();
+            last - first
+        };
+        let is_odd = |own: &&(usize, Gap<'_>)| {
+            let others = meeting.iter().filter(|other| other.0 != own.0);
+            let others: Vec<Gap<'_>> = others.map(|(_, gap)| *gap).collect();
+            let mut outlines = outlines.to_vec();
+            outlines.push(leaving(&self.map.edges[own.0], v));
+            common(&others, &outlines, place).is_some()
+        };
+        let least = |a: &&(usize, Gap<'_>), b: &&(usize, Gap<'_>)| {
+            let is_crease = |own: &(usize, Gap<'_>)| own.1.line == Line::Intersection;
+            let lengths = length(a.0).total_cmp(&length(b.0));
+            is_crease(a).cmp(&is_crease(b)).then(lengths)
+        };
+        if meeting.len() < 2 {
+            return None;
+        }
+        let odd = meeting.iter().filter(is_odd).min_by(least);
+        let odd = odd.map(|(e, _)| *e);
+        odd.or_else(|| worst(meeting, place).map(|(e, _)| e))
+    }
+
     /// Puts a vertex where its creases meet, or leaves it, or one of them, alone.
     fn place(&self, v: usize, vertex: &mut [f64; 2], left: &mut Left) {
         let of_vertex = self.around[v].iter();
         let meeting: Vec<(usize, Gap<'_>)> = of_vertex
             .filter_map(|&e| Some((e, self.met(e, left)?)))
             .collect();
-        // The crease whose surfaces are the farthest apart there.
-        let worst = |vertex: [f64; 2]| {
-            let off = |gap: &Gap<'_>| gap.at(vertex).0.abs();
-            let worst = meeting
-                .iter()
-                .max_by(|a, b| off(&a.1).total_cmp(&off(&b.1)));
-            worst.map(|(e, gap)| (*e, off(gap)))
-        };
         if !meeting.is_empty() && !left.vertices.contains(&v) {
-            let creases: Vec<Gap<'_>> = meeting.iter().map(|(_, gap)| *gap).collect();
             let of_vertex = self.around[v].iter();
             let outlines: Vec<[f64; 2]> = of_vertex
                 .filter(|e| self.met(**e, left).is_none())
                 .map(|&e| leaving(&self.map.edges[e], v))
                 .collect();
-            let farthest = creases.iter().map(|gap| reach(gap).farthest);
-            let is_lone_end = creases.len() == 1 && !outlines.is_empty();
-            let least = if is_lone_end { LONE_END } else { 0.0 };
-            let farthest = farthest.fold(least, f64::max);
-            let found = corner(&creases, &outlines, *vertex, farthest, REACH.least_bend);
-            match (found, worst(*vertex)) {
-                (Some(place), _) => *vertex = place,
-                // Without it the others may have a corner.
-                (None, Some((e, _))) if meeting.len() > 1 => {
-                    left.edges.insert(e);
-                    return;
-                }
-                (None, _) => {
-                    left.vertices.insert(v);
-                }
+            let all: Vec<Gap<'_>> = meeting.iter().map(|(_, gap)| *gap).collect();
+            if let Some(place) = common(&all, &outlines, *vertex) {
+                *vertex = place;
+            } else if let Some(e) = self.odd(v, *vertex, &meeting, &outlines) {
+                // Without it the others have a corner, or may have.
+                left.edges.insert(e);
+                return;
+            } else {
+                left.vertices.insert(v);
             }
         }
         // What is too far apart there cannot end there.
-        if let Some((e, off_mm)) = worst(*vertex)
+        if let Some((e, off_mm)) = worst(&meeting, *vertex)
             && (off_mm.is_nan() || off_mm > CORNER_MM)
         {
             left.edges.insert(e);
         }
     }
+}
+
+/// The crease whose surfaces are the farthest apart at a place, and how far.
+fn worst(meeting: &[(usize, Gap<'_>)], place: [f64; 2]) -> Option<(usize, f64)> {
+    let off = |(e, gap): &(usize, Gap<'_>)| {
+        let (gap_mm, slope) = gap.at(place);
+        // On a steep wall a little aside is a lot up or down.
+        (*e, gap_mm.abs() / norm(slope).max(1.0))
+    };
+    meeting.iter().map(off).max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Where creases meet near a place, between outlines that leave it.
+fn common(creases: &[Gap<'_>], outlines: &[[f64; 2]], place: [f64; 2]) -> Option<[f64; 2]> {
+    let is_lone_end = creases.len() == 1 && !outlines.is_empty();
+    let least = if is_lone_end { LONE_END } else { 0.0 };
+    let farthest = creases.iter().map(|gap| reach(gap).farthest);
+    let farthest = farthest.fold(least, f64::max);
+    corner(creases, outlines, place, farthest, REACH.least_bend)
 }
 
 /// Signed areas of all loops, square pitches.
@@ -369,7 +407,8 @@ fn crease(gap: &Gap<'_>, edge: &MapEdge, ends: [[f64; 2]; 2]) -> Option<Piecewis
     let mut on = ends;
     for (k, end) in ends.into_iter().enumerate() {
         let off_mm = gap.at(end).0.abs();
-        if off_mm.is_nan() || off_mm > EXACT_MM {
+        let is_on = off_mm <= EXACT_MM || gap.is_blunt(end, reach(gap));
+        if !is_on {
             on[k] = gap.nearest(end, reach(gap))?;
         }
     }
@@ -471,6 +510,57 @@ mod tests {
             assert!((row - 17.0 - column / 4.0).abs() < 1e-6, "{row}");
         }
         assert_eq!(met(4.0, [&a, &b]), (false, [40.0, 31.0]));
+    }
+
+    /// Two creases from one vertex on, the first longer, whose lines cross three columns off.
+    #[test]
+    fn of_creases_without_a_common_place_the_shorter_one_is_left() {
+        let vertices = vec![[10.0, 20.0], [40.0, 20.0], [25.0, 23.0]];
+        let edge = |end: usize, sides: [u32; 2]| MapEdge {
+            start: 0,
+            end,
+            sides,
+            path: polyline(&[vertices[0], vertices[end]]).unwrap(),
+            is_settled: true,
+        };
+        let edges = vec![edge(1, [1, 2]), edge(2, [1, 3])];
+        let mut map = PlanarMap {
+            edges,
+            vertices: vertices.clone(),
+            ..PlanarMap::default()
+        };
+        // The first crease is in row 20.35, the second a quarter of a row off where it is drawn.
+        let flat = plane(0.0, 0.0, 0.0);
+        let of = |place: [f64; 2], slope: f64| {
+            let [x, y] = PLACEMENT.to_mm(place);
+            plane(-(y - slope * x), -slope, 1.0)
+        };
+        let (first, second) = (of([10.0, 20.35], 0.0), of([10.0, 19.75], 0.2));
+        let sides = [&flat, &first, &second].map(|surface| (surface, 0.01));
+        let is_met = meet(&mut map, &sides, &[true; 2], PLACEMENT, &Unmonitored).unwrap();
+        assert_eq!(is_met, [true, false]);
+        assert!(
+            (map.vertices[0][1] - 20.35).abs() < 1e-6,
+            "{:?}",
+            map.vertices
+        );
+    }
+
+    #[test]
+    fn what_is_apart_on_a_steep_wall_is_near_aside() {
+        let (flat, steep, gentle) = (
+            plane(0.0, 0.0, 0.0),
+            plane(0.06, 4.0, 0.0),
+            plane(0.03, 0.5, 0.0),
+        );
+        let gap = |side| Gap {
+            sides: [side, &flat],
+            placement: PLACEMENT,
+            line: Line::Intersection,
+        };
+        let (e, off_mm) = worst(&[(5, gap(&steep)), (7, gap(&gentle))], [20.0, 20.0]).unwrap();
+        assert_eq!(e, 7);
+        assert!((off_mm - 0.03).abs() < 1e-12, "{off_mm}");
     }
 
     #[test]

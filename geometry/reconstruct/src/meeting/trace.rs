@@ -12,6 +12,10 @@ const PROBES: usize = 8;
 /// Pieces are not made shorter than this, pitches.
 const SHORTEST: f64 = 0.05;
 
+/// Towards an end where surfaces lie on each other they bend less and less: this share of what they
+/// must elsewhere tells there where they meet.
+const BLUNT_BEND: f64 = 0.1;
+
 /// Cosine of the angle (60 degrees) that the ends of a piece may turn from its chord.
 const LEAST_TURN_COSINE: f64 = 0.5;
 
@@ -65,6 +69,16 @@ pub(crate) fn trace(
     if !is_closed && is_met(gap, |share| between(start, end, share)) {
         return PiecewiseCubic::line(start, end, norm(minus(end, start))).ok();
     }
+    let is_blunt = [start, end].map(|place| gap.is_blunt(place, reach));
+    let share = if is_blunt.contains(&true) {
+        BLUNT_BEND
+    } else {
+        1.0
+    };
+    let reach = Reach {
+        least_bend: share * reach.least_bend,
+        ..reach
+    };
     let course = Course { gap, guide, reach };
     let parts = parts(guide).max(if is_closed { CLOSED_PARTS } else { 1 });
     let mut stops = Vec::with_capacity(parts + 1);
@@ -77,7 +91,13 @@ pub(crate) fn trace(
         };
         // Where the guide is too far off there is another way between the stops beside it.
         if let Some(place) = place {
-            stops.push(course.stop(place, guide.derivative(at, 1), at)?);
+            let towards = guide.derivative(at, 1);
+            let is_blunt = k == 0 && is_blunt[0] || k == parts && is_blunt[1];
+            stops.push(if is_blunt {
+                drawn(place, towards, at)?
+            } else {
+                course.stop(place, towards, at)?
+            });
         }
     }
     if is_closed {
@@ -174,6 +194,16 @@ impl Course<'_> {
         self.follow([from, middle], depth, pieces)?;
         self.follow([middle, to], depth, pieces)
     }
+}
+
+/// Where the surfaces do not bend which way the line leads is not seen, but drawn.
+fn drawn(place: [f64; 2], towards: [f64; 2], at: f64) -> Option<Stop> {
+    let length = norm(towards);
+    (length > 0.0).then(|| Stop {
+        place,
+        along: towards.map(|c| c / length),
+        at,
+    })
 }
 
 /// Long pieces may bulge from their chords by more than a border is moved.
@@ -328,6 +358,39 @@ mod tests {
         let (first, last) = path.domain();
         let length = 16.0 * 40.0 * core::f64::consts::PI / 24.0;
         assert!((last - first - length).abs() < 1e-3, "{}", last - first);
+    }
+
+    /// Two fillets run out into the plane z = 0, which they touch along x = 0 and y = 0.
+    #[test]
+    fn a_line_that_runs_out_where_surfaces_touch_is_followed_to_its_end() {
+        let a = graph(5.0, |x, _| -x * x / 6.0);
+        let b = graph(5.0, |_, y| -y * y / 6.0 - y * y * y / 60.0);
+        let gap = gap([&a, &b]);
+        let on = |y: f64| [20.0 + 2.0 * y * (1.0 + y / 10.0).sqrt(), 20.0 + 2.0 * y];
+        let ends = [on(0.0), on(4.0)];
+        for ends in [ends, [ends[1], ends[0]]] {
+            let aside = [0.1, -0.15, -0.4, -0.3, 0.2];
+            let mut places: Vec<_> = (0..=4).map(|k| on(f64::from(k))).collect();
+            for (place, aside) in places.iter_mut().zip(aside) {
+                place[0] += aside;
+            }
+            if ends[0] != on(0.0) {
+                places.reverse();
+            }
+            let guide = polyline(&places).unwrap();
+            let path = trace(&gap, &guide, ends, REACH).expect("it leads there");
+            for place in path.sampled(16) {
+                assert!(
+                    gap.height(place).0.abs() < SPACE_CURVE_TOLERANCE_MM,
+                    "{place:?}"
+                );
+            }
+        }
+        // Surfaces that are apart at the end do not run out there.
+        let low = graph(5.0, |x, _| -x * x / 6.0 - 0.003);
+        let gap = self::gap([&low, &b]);
+        let guide = polyline(&[on(0.0), on(4.0)]).unwrap();
+        assert_eq!(trace(&gap, &guide, ends, REACH), None);
     }
 
     #[test]
