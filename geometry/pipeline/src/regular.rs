@@ -265,6 +265,29 @@ mod tests {
     use shapes::{Family, Sample, Shape, decide, fit};
 
     #[test]
+    fn shapes_are_tied_in_groups_that_pairs_connect() {
+        let shape = Shape::Sphere(shapes::Sphere {
+            centre_mm: Vector3::zeros(),
+            radius_mm: 1.0,
+            is_hollow: false,
+        });
+        let own = |label: u16| Fitted {
+            label,
+            shape,
+            joint: shapes::Joint::zeros(),
+        };
+        let all: Vec<(usize, Fitted)> = (1..=9).map(|label| (100, own(label))).collect();
+        // The shape with label 12 is a free form.
+        let pairs = [[7, 8], [2, 5], [12, 3], [5, 9], [8, 4], [9, 2]];
+        let groups = connected(all, &pairs);
+        let labels = |group: &Vec<(usize, Fitted)>| -> Vec<u16> {
+            group.iter().map(|(_, own)| own.label).collect()
+        };
+        let groups: Vec<Vec<u16>> = groups.iter().map(labels).collect();
+        assert_eq!(groups, [vec![2, 5, 9], vec![3], vec![4, 7, 8]]);
+    }
+
+    #[test]
     fn samples_refuse_a_shape_that_they_are_off() {
         let chance = |k: f64| {
             let chance = libm::sin(k * 12.9898) * 43758.5453;
