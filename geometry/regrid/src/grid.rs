@@ -164,8 +164,10 @@ impl GridWorker {
         let mut draws = Draws::new(settings.seed, node.i, node.j);
         if settings.estimator == Estimator::Consensus {
             // Samples that support a node may be as far off. Where the columns seem noisier,
-            // as when no three samples in a row are free of outliers, the node itself tells.
-            let allowed_mm = support.inlier_floor * spacing.mean_mm / WIDTH;
+            // as when no three samples in a row are free of outliers, the node itself tells;
+            // but depths in coarse steps are as far off everywhere.
+            let rounding_mm = node.noise.map_or(0.0, |noise| noise.rounding_mm);
+            let allowed_mm = (support.inlier_floor * spacing.mean_mm / WIDTH).max(rounding_mm);
             let noise_mm = node.noise.map_or(allowed_mm, |noise| noise.deviation_mm);
             let least_mm = LEAST_NOISE * spacing.mean_mm;
             let conditions = Conditions {

@@ -250,3 +250,33 @@ fn noise_shrinks_and_curvature_is_followed() {
         assert!(error < limit, "{error}");
     }
 }
+
+/// Depths in steps of twice the spacing: a window's samples lie on two or three terraces, which
+/// are one surface.
+#[test]
+fn terraces_of_coarse_depths_are_one_surface() {
+    const STEP_MM: f64 = 0.35;
+    let plane = |x: f64, y: f64| 0.3 * x - 0.4 * y + 250.0;
+    let mut noise = Noise::new(3);
+    let columns = scan(12.0, (0.17, 0.17), (0.3, 0.6), |x, y| {
+        let z = plane(x, y) + 0.1 * NOISE_MM * noise.normal();
+        Some(STEP_MM * (z / STEP_MM).round())
+    });
+    let settings = RegridSettings {
+        estimator: Estimator::Consensus,
+        ..RegridSettings::with_pitch(0.17)
+    };
+    let image = image(&columns, &settings);
+    let (mut whole, mut number) = (0, 0);
+    for (column, row) in (0..image.columns()).flat_map(|c| (0..image.rows()).map(move |r| (c, r))) {
+        if let Some(quality) = image.quality(column, row) {
+            number += 1;
+            whole += usize::from(f64::from(quality.inliers) >= 0.95 * f64::from(quality.samples));
+        }
+    }
+    assert!(number > 4500, "{number} nodes");
+    assert!(whole as f64 > 0.95 * number as f64, "{whole} of {number}");
+    let nodes = nodes(&image);
+    let error = rms(nodes.iter().map(|(x, y, z)| z - plane(*x, *y)));
+    assert!(error < 0.1 * STEP_MM, "{error}");
+}

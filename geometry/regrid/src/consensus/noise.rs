@@ -23,6 +23,8 @@ const RESOLUTION_QUANTILE: f64 = 0.05;
 /// Standard deviation of the rounding to a resolution of 1, of which second differences
 /// show half steps.
 const ROUNDING: f64 = 0.58;
+/// Share of the differences next to nothing from which on depths do come in steps.
+const IN_STEPS: f64 = 0.08;
 /// Fewest differences that tell something.
 const LEAST: usize = 24;
 
@@ -34,6 +36,8 @@ const LEAST_CLEAN: f64 = 0.5;
 pub(crate) struct Noise {
     /// Standard deviation of z, millimetres.
     pub(crate) deviation_mm: f64,
+    /// The part of it that comes of depths in steps wider than the noise, millimetres.
+    pub(crate) rounding_mm: f64,
     /// About which share of the samples is free of outliers: the cube root of the share of
     /// differences that are, each made of three samples.
     pub(crate) clean_share: f64,
@@ -87,10 +91,13 @@ pub(crate) fn noise<'a>(
     let step = (zeros as f64 + RESOLUTION_QUANTILE * (number - zeros) as f64) as usize;
     let resolution_mm = ROUNDING * scratch.get(step).copied().unwrap_or(0.0);
     let deviation_mm = deviation_mm.max(resolution_mm);
+    let in_steps = zeros as f64 >= IN_STEPS * number as f64;
+    let rounding_mm = if in_steps { resolution_mm } else { 0.0 };
     let clean = scratch.partition_point(|d| *d <= WIDTH * deviation_mm) as f64 / WITHIN;
     let clean_share = libm::cbrt(clean / number as f64).min(1.0);
     Some(Noise {
         deviation_mm,
+        rounding_mm,
         clean_share: clean_share.max(LEAST_CLEAN),
     })
 }
@@ -230,7 +237,15 @@ mod tests {
             let found = noise(strips.iter(), &mut Vec::new()).unwrap();
             let ratio = found.deviation_mm / (0.35 / 12_f64.sqrt());
             assert!((0.8..1.5).contains(&ratio), "{outliers}: {found:?}");
+            let rounding = found.rounding_mm / (0.35 / 12_f64.sqrt());
+            assert!((0.7..1.5).contains(&rounding), "{outliers}: {found:?}");
         }
+    }
+
+    #[test]
+    fn fine_depths_are_hardly_rounded() {
+        let found = noise(strips(0.05, 0.001, 0.1).iter(), &mut Vec::new()).unwrap();
+        assert!(found.rounding_mm <= 0.0, "{found:?}");
     }
 
     #[test]
