@@ -21,7 +21,7 @@ const PLANE_SIDE: usize = 5;
 const NO_NOISE_MM2: f64 = 1e-14;
 
 /// Part of the tolerance at which nothing more is refined.
-const AIM: f64 = 0.25;
+const AIM: f64 = 0.1;
 
 /// Share of the nodes at which the shape has to be there.
 const MET: f64 = 0.98;
@@ -228,6 +228,33 @@ mod tests {
             // Few spans do not do.
             assert!(patches(&shape, &image, &nodes, &whole(), 2).is_none());
         }
+    }
+
+    /// A ring of half a tube, a few pitches wide, that is seen to where it is steep. Patches do not
+    /// follow it there to a micrometre, but far better than a fit to nodes would.
+    #[test]
+    fn a_narrow_ring_becomes_patches_of_its_shape() {
+        let (radius_mm, tube_mm) = (8.0, 3.0);
+        let shape = Shape::Torus(Torus {
+            centre_mm: Vector3::zeros(),
+            axis: Vector3::z(),
+            radius_mm,
+            tube_mm,
+            is_hollow: false,
+        });
+        let (image, nodes) = seen(&shape, tube_mm, 0.1, |_, _| true);
+        let domain = Domain {
+            x_mm: (-12.0, 12.0),
+            y_mm: (-12.0, 12.0),
+        };
+        let surface = patches(&shape, &image, &nodes, &domain, 256).unwrap();
+        let off = nodes.iter().map(|node| {
+            let (x, y) = (image.x_mm(node.column), image.y_mm(node.row));
+            let out = libm::sqrt(x * x + y * y) - radius_mm;
+            (libm::sqrt(out * out + surface.z(x, y).powi(2)) - tube_mm).powi(2)
+        });
+        let rms_mm = (off.sum::<f64>() / nodes.len() as f64).sqrt();
+        assert!(rms_mm < 0.005, "{rms_mm}");
     }
 
     /// Beyond its shoulders the descent leads to the lower side of the ring.

@@ -127,4 +127,4 @@ pub const SPACE_CURVE_TOLERANCE_MM: f64 = 1e-4;
 
 /// How far the patches of a face lie off its shape at the nodes of its region, root mean square
 /// along the normal, millimetres.
-pub const SHAPE_TOLERANCE_MM: f64 = 2e-3;
+pub const SHAPE_TOLERANCE_MM: f64 = 5e-3;
