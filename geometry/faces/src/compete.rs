@@ -21,6 +21,8 @@ const UNLIKE: f64 = 1.5;
 const ACROSS: f64 = 2.0;
 /// Nodes at the border of a piece that its shape is not fitted to.
 const FAR: usize = 1;
+/// Share of its nodes inside that makes a piece more than a strip.
+const STRIP: f64 = 0.8;
 /// Samples that shapes are fitted to.
 const SAMPLES: usize = 1000;
 /// Label of nodes of no piece.
@@ -55,13 +57,21 @@ impl Pieces<'_, '_> {
         Ok(())
     }
 
-    /// The places of each piece that lie away from its border.
+    /// The places of each piece that lie away from its border; all those of a strip, of which few
+    /// do, and which tell too little of how it bends.
     fn inner(&self) -> Vec<Vec<usize>> {
         let mut inner = vec![Vec::new(); self.fits.len()];
-        for (place, label) in self.labels.iter().enumerate() {
+        let mut all = inner.clone();
+        for (place, label) in self.labels.iter().enumerate().filter(|(_, l)| **l != NONE) {
             let is_inner = |p: usize| self.labels[p] == *label;
-            if *label != NONE && self.field.around(place, FAR).all(is_inner) {
+            all[*label].push(place);
+            if self.field.around(place, FAR).all(is_inner) {
                 inner[*label].push(place);
+            }
+        }
+        for (inner, all) in inner.iter_mut().zip(all) {
+            if (inner.len() as f64) < STRIP * all.len() as f64 {
+                *inner = all;
             }
         }
         inner
@@ -201,5 +211,56 @@ impl Pieces<'_, '_> {
         }
         self.fill();
         moved
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use range_image::Unmonitored;
+    use shapes::Shape;
+
+    use super::*;
+    use crate::testing::Scan;
+
+    /// Two planes and the fillet between them, of which they have taken a part: fitted to less and
+    /// less of the rest, it would bend more and more.
+    #[test]
+    fn a_fillet_regains_what_its_planes_have_taken() {
+        const RADIUS_MM: f64 = 9.3;
+        const FALL: f64 = 0.204;
+        let (middle_mm, half_mm) = (9.0, RADIUS_MM * libm::sin(FALL));
+        let scan = Scan::of((40, 200), 0.45, 0.05, |x, _| {
+            let from = (x - middle_mm).abs();
+            let on = from.min(half_mm);
+            libm::sqrt(RADIUS_MM * RADIUS_MM - on * on) - (from - on) * libm::tan(FALL)
+        });
+        let all: Vec<usize> = (0..8000).collect();
+        let field = Field::new(&scan.image, &scan.observations, &all).unwrap();
+        // The fillet is seen in the columns from 16 to 24.
+        let labels: Vec<usize> = (0..8000)
+            .map(|place: usize| match place / 200 {
+                0..16 => 0,
+                16..22 => 1,
+                _ => 2,
+            })
+            .collect();
+        let fit = |label: usize| {
+            let set: Vec<bool> = labels.iter().map(|l| *l == label).collect();
+            field.fit(&set, 0, SAMPLES)
+        };
+        let fits: Vec<Option<Fit>> = (0..3).map(fit).collect();
+        let mut pieces = Pieces {
+            field: &field,
+            labels,
+            fits,
+        };
+        pieces.compete(&Unmonitored).unwrap();
+        let own = pieces.labels.iter().filter(|l| **l == 1).count();
+        assert!(own > 7 * 200, "{own}");
+        let shape = pieces.fits[1].as_ref().unwrap().shape;
+        assert!(
+            matches!(shape, Shape::Cylinder(c) if (c.radius_mm - RADIUS_MM).abs() < 1.0),
+            "{shape:?}"
+        );
     }
 }

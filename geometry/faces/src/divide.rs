@@ -164,42 +164,14 @@ fn is_one(field: &Field<'_>) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
-    use range_image::{Lattice, NodeQuality};
-    use shapes::Sample;
-
     use super::*;
+    use crate::testing::Scan;
 
-    /// Whether a strip of 6 by 150 nodes is of one shape, with a sample at each and z by row.
+    /// Whether a strip of 6 by 150 nodes is of one shape, with z by row.
     fn is_one_strip(z_mm: impl Fn(f64) -> f64) -> bool {
-        const SIGMA_MM: f64 = 0.01;
-        let mut image = RangeImage::masked(Lattice { pitch_mm: 0.15 }, 0, 0, 6, 150);
-        let mut samples = Vec::new();
-        for node in 0..900 {
-            let (column, row) = (node / 150, node % 150);
-            // Between -1 and 1, and in no order.
-            let turned = (node as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-            let mixed = (turned ^ (turned >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 40;
-            let stray = mixed as f64 / f64::from(1 << 23) - 1.0;
-            let z_mm = z_mm(image.y_mm(row)) + 1.7 * SIGMA_MM * stray;
-            image.set_z_mm(column, row, Some(z_mm));
-            let quality = NodeQuality {
-                inliers: 30,
-                samples: 32,
-                scale_mm: SIGMA_MM as f32,
-                nearest_mm: 0.0,
-            };
-            image.set_quality(column, row, quality);
-            let sample = Sample {
-                point_mm: Vector3::new(image.x_mm(column), image.y_mm(row), z_mm),
-                ray: Vector3::z(),
-                sigma_mm: SIGMA_MM,
-            };
-            samples.push((node, sample));
-        }
-        let observations = Observations::new(900, &samples, 1.0);
+        let scan = Scan::of((6, 150), 0.15, 0.01, |_, y| z_mm(y));
         let all: Vec<usize> = (0..900).collect();
-        is_one(&Field::new(&image, &observations, &all).unwrap())
+        is_one(&Field::new(&scan.image, &scan.observations, &all).unwrap())
     }
 
     #[test]

@@ -35,9 +35,20 @@ pub(crate) struct Piece {
 /// The nodes around a window that are of its surface, where that is of a shape. Only `open`
 /// nodes are taken.
 pub(crate) fn grow(field: &Field<'_>, open: &[bool], window: &[usize]) -> Option<Piece> {
+    grow_from(field, open, window, FAR)
+}
+
+/// The same of what others have left over. They have taken what may be of the next surface, so
+/// nodes at its border are its own, and in a strip they tell the most of how it bends.
+pub(crate) fn grow_left(field: &Field<'_>, open: &[bool], left: &[usize]) -> Option<Piece> {
+    grow(field, open, left).or_else(|| grow_from(field, open, left, 0))
+}
+
+/// Fits leave out nodes so `far` from the border of what has grown.
+fn grow_from(field: &Field<'_>, open: &[bool], window: &[usize], far: usize) -> Option<Piece> {
     let mut nodes = vec![false; field.len()];
     window.iter().for_each(|place| nodes[*place] = open[*place]);
-    let mut fit = field.fit(&nodes, FAR, SOME)?;
+    let mut fit = field.fit(&nodes, far, SOME)?;
     for _ in 0..KINDS {
         for _ in 0..ROUNDS {
             let grown = reached(field, &fit.shape, open, window)?;
@@ -47,11 +58,11 @@ pub(crate) fn grow(field: &Field<'_>, open: &[bool], window: &[usize]) -> Option
             if is_settled {
                 break;
             }
-            fit = fit.again(&field.samples(&nodes, FAR, SOME), field.area())?;
+            fit = fit.again(&field.samples(&nodes, far, SOME), field.area())?;
         }
         // More nodes may tell of another kind.
         let kind = fit.shape.family();
-        fit = field.fit(&nodes, FAR, MANY)?;
+        fit = field.fit(&nodes, far, MANY)?;
         if fit.shape.family() == kind {
             break;
         }
@@ -78,4 +89,28 @@ fn reached(field: &Field<'_>, shape: &Shape, open: &[bool], window: &[usize]) ->
         }
     }
     (count(&reached) >= FEWEST).then_some(reached)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Scan;
+
+    /// A cylinder's strip, six nodes wide.
+    #[test]
+    fn what_is_left_of_a_fillet_is_a_piece() {
+        const RADIUS_MM: f64 = 9.3;
+        let scan = Scan::of((6, 200), 0.45, 0.05, |x, _| {
+            libm::sqrt(RADIUS_MM * RADIUS_MM - (x - 1.1) * (x - 1.1))
+        });
+        let left: Vec<usize> = (0..1200).collect();
+        let field = Field::new(&scan.image, &scan.observations, &left).unwrap();
+        let piece = grow_left(&field, &field.all(), &left).unwrap();
+        assert!(count(&piece.nodes) > 1000, "{}", count(&piece.nodes));
+        let shape = piece.fit.unwrap().shape;
+        assert!(
+            matches!(shape, Shape::Cylinder(c) if (c.radius_mm - RADIUS_MM).abs() < 2.0),
+            "{shape:?}"
+        );
+    }
 }

@@ -21,6 +21,8 @@ mod join;
 mod observations;
 mod split;
 mod strain;
+#[cfg(test)]
+mod testing;
 
 pub use divide::{Divided, divide};
 pub use observations::Observations;

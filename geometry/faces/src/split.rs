@@ -6,7 +6,7 @@ use shapes::{Family, Fit, Shape, fit, is_smooth, spread};
 
 use crate::compete::{NONE, Pieces};
 use crate::field::{Field, Set, count, places};
-use crate::grow::{FEWEST, Piece, grow};
+use crate::grow::{FEWEST, Piece, grow, grow_left};
 use crate::strain::is_strained;
 
 /// Half-widths of the windows that pieces are grown from, in nodes, one after the other.
@@ -59,7 +59,7 @@ pub(crate) fn split(
             None => {
                 let left = field.parts(&field.opened(&open)).into_iter();
                 let left = left.filter(|part| count(part) >= FEWEST);
-                left.filter_map(|part| grow(field, &open, &places(&part)))
+                left.filter_map(|part| grow_left(field, &open, &places(&part)))
                     .collect()
             }
         };
