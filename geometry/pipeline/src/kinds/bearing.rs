@@ -13,6 +13,8 @@ use crate::neighbourhood::{DEEPEST, depth};
 /// Samples that are enough to decide by; where there are fewer away from the border, those
 /// nearer to it are taken, too.
 const ENOUGH: usize = 200;
+/// Share of a region's samples that are enough: the middle of a strip does not tell how that bends.
+const SHARE: f64 = 0.5;
 /// Standard errors by which the samples beside a neighbour may be off the surface in their mean.
 const AGREE: f64 = 2.0;
 /// Samples farther off than so many deviations are strays, and tell nothing of the mean.
@@ -112,6 +114,8 @@ pub(super) fn of_samples(
         }
     }
     let bearing = |by_depth: Vec<Vec<&OnRegion>>| {
+        let all: usize = by_depth.iter().map(Vec::len).sum();
+        let enough = ENOUGH.max((SHARE * all as f64) as usize);
         let mut bearing = Bearing {
             area: 1.0,
             ..Bearing::default()
@@ -119,7 +123,7 @@ pub(super) fn of_samples(
         let mut beside: BTreeMap<(usize, u16), Vec<Sample>> = BTreeMap::new();
         // From the innermost on.
         for (depth, ring) in by_depth.into_iter().enumerate().rev() {
-            let is_within = bearing.samples.len() < ENOUGH;
+            let is_within = bearing.samples.len() < enough;
             for on in ring {
                 let [column, row] = on.nearest(image);
                 match way(regions, column, row) {
@@ -193,4 +197,49 @@ fn neighbour(regions: &RegionMap, column: usize, row: usize) -> u16 {
         }
     }
     own
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+    use range_image::Lattice;
+
+    use super::*;
+
+    /// How many columns of cells the samples span that a strip of so many columns is decided by.
+    fn width_told(columns: usize) -> usize {
+        const ROWS: usize = 100;
+        let mut image = RangeImage::masked(Lattice { pitch_mm: 1.0 }, 0, 0, columns + 2, ROWS);
+        for node in 0..(columns + 2) * ROWS {
+            image.set_z_mm(node / ROWS, node % ROWS, Some(0.0));
+        }
+        let label = |node: usize| u16::from((1..=columns).contains(&(node / ROWS)));
+        let labels = (0..(columns + 2) * ROWS).map(label).collect();
+        let regions = RegionMap::new(&image, labels);
+        let sample = |column: usize, row: usize| OnRegion {
+            cell: [column as u32, row as u32],
+            sample: Sample {
+                point_mm: Vector3::new(column as f64 + 0.4, row as f64 + 0.4, 0.0),
+                ray: Vector3::z(),
+                sigma_mm: 0.05,
+            },
+        };
+        let cells = (1..columns).flat_map(|column| (0..ROWS - 1).map(move |row| (column, row)));
+        let samples: Vec<OnRegion> = cells.map(|(column, row)| sample(column, row)).collect();
+        let bearing = of_samples(&image, &regions, &samples).remove(0);
+        let column = |sample: &Sample| sample.point_mm.x as usize;
+        let mut told: Vec<usize> = bearing.samples.iter().map(column).collect();
+        told.sort_unstable();
+        told.dedup();
+        told.len()
+    }
+
+    #[test]
+    fn a_strip_is_told_by_more_than_its_middle() {
+        // Of 8 columns of cells the 4 in the middle have more samples than are enough, and less
+        // than half of all.
+        assert_eq!(width_told(9), 6);
+        // Of 23 those away from the border have most.
+        assert_eq!(width_told(24), 19);
+    }
 }
