@@ -23,8 +23,10 @@ const RESOLUTION_QUANTILE: f64 = 0.05;
 /// Standard deviation of the rounding to a resolution of 1, of which second differences
 /// show half steps.
 const ROUNDING: f64 = 0.58;
-/// Share of the differences next to nothing from which on depths do come in steps.
+/// Share of the differences next to nothing from which on depths do come in steps, if those
+/// next to nothing are so small a part of a step: in steps nothing lies between.
 const IN_STEPS: f64 = 0.08;
+const GAP: f64 = 0.25;
 /// Fewest differences that tell something.
 const LEAST: usize = 24;
 
@@ -89,10 +91,10 @@ pub(crate) fn noise<'a>(
     }
     let zeros = scratch.partition_point(|d| *d <= zero_mm);
     let step = (zeros as f64 + RESOLUTION_QUANTILE * (number - zeros) as f64) as usize;
-    let resolution_mm = ROUNDING * scratch.get(step).copied().unwrap_or(0.0);
-    let deviation_mm = deviation_mm.max(resolution_mm);
-    let in_steps = zeros as f64 >= IN_STEPS * number as f64;
-    let rounding_mm = if in_steps { resolution_mm } else { 0.0 };
+    let step_mm = scratch.get(step).copied().unwrap_or(0.0);
+    let deviation_mm = deviation_mm.max(ROUNDING * step_mm);
+    let in_steps = zeros as f64 >= IN_STEPS * number as f64 && zero_mm <= GAP * step_mm;
+    let rounding_mm = if in_steps { ROUNDING * step_mm } else { 0.0 };
     let clean = scratch.partition_point(|d| *d <= WIDTH * deviation_mm) as f64 / WITHIN;
     let clean_share = libm::cbrt(clean / number as f64).min(1.0);
     Some(Noise {
@@ -240,6 +242,21 @@ mod tests {
             let rounding = found.rounding_mm / (0.35 / 12_f64.sqrt());
             assert!((0.7..1.5).contains(&rounding), "{outliers}: {found:?}");
         }
+    }
+
+    /// On something crumpled differences of all sizes come close together, like one step or many.
+    #[test]
+    fn what_is_crumpled_is_not_in_steps() {
+        let mut strips = strips(0.001, 0.0, 0.0);
+        for (k, strip) in strips.iter_mut().enumerate() {
+            for (row, sample) in strip.samples.iter_mut().enumerate() {
+                let turned = ((k * 200 + row) as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+                let stray = (turned >> 40) as f64 / f64::from(1 << 24);
+                sample.1 += libm::pow(10.0, 5.0 * stray - 4.5);
+            }
+        }
+        let found = noise(strips.iter(), &mut Vec::new()).unwrap();
+        assert!(found.rounding_mm < 0.05, "{found:?}");
     }
 
     #[test]
