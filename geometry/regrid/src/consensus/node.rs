@@ -109,7 +109,7 @@ impl Consensus {
             // Here outliers have the better of the window; farther away they do not.
             let wide = self.surfaces.find(&self.wide, noise_mm, &thorough, draws);
             if !wide.is_empty() {
-                replace(&mut self.found, wide, conditions.clean, window);
+                replace(&mut self.found, wide, window);
             }
         } else if self.found.len() == 1 {
             // Outliers may leave too little of a second one.
@@ -118,7 +118,7 @@ impl Consensus {
                 .surfaces
                 .find(&self.wide[..number], noise_mm, &thorough, draws);
             if wide.len() > 1 {
-                replace(&mut self.found, wide, conditions.clean, window);
+                replace(&mut self.found, wide, window);
             }
         }
         for surface in &mut self.found {
@@ -289,14 +289,10 @@ impl Consensus {
     }
 }
 
-/// Puts the surfaces of a wider window in the place of those of the node's own. With hardly any
-/// outliers around those stay that are others: a strip between two faces has few of the wider
-/// window's samples, and either face has more, but most of those next to the node are the
-/// strip's. Among outliers they are runs more often than strips.
-fn replace(found: &mut Vec<Surface>, wide: &[Surface], clean: bool, window: &[Neighbour]) {
-    if !clean {
-        found.clear();
-    }
+/// Puts the surfaces of a wider window in the place of those of the node's own. Those stay that
+/// are others: a strip between two faces has few of the wider window's samples, and either face has
+/// more, but most of those next to the node are the strip's; and so it is at the end of a face.
+fn replace(found: &mut Vec<Surface>, wide: &[Surface], window: &[Neighbour]) {
     found.retain(|surface| {
         let (mut held, mut alone) = (0, 0);
         for n in window.iter().filter(|n| surface.holds(n)) {
@@ -435,18 +431,9 @@ mod tests {
     fn a_flank_stays_beside_the_faces_of_a_wider_window() {
         let wide = [surface(0.0, -2.0), surface(0.0, 2.0)];
         let mut found = vec![surface(2.0, 0.0)];
-        replace(&mut found, &wide, true, &flank());
+        replace(&mut found, &wide, &flank());
         let planes: Vec<_> = found.iter().map(|s| (s.plane.a, s.plane.c)).collect();
         assert_eq!(planes, [(0.0, -2.0), (0.0, 2.0), (2.0, 0.0)]);
-    }
-
-    #[test]
-    fn among_outliers_the_surfaces_of_a_wider_window_stand_alone() {
-        let wide = [surface(0.0, -2.0), surface(0.0, 2.0)];
-        let mut found = vec![surface(2.0, 0.0)];
-        replace(&mut found, &wide, false, &flank());
-        let planes: Vec<_> = found.iter().map(|s| (s.plane.a, s.plane.c)).collect();
-        assert_eq!(planes, [(0.0, -2.0), (0.0, 2.0)]);
     }
 
     #[test]
@@ -454,7 +441,7 @@ mod tests {
         let wide = [surface(0.0, -2.0), surface(0.0, 2.0)];
         // Nearly the upper face, and a plane that joins few samples.
         let mut found = vec![surface(0.02, 1.95), surface(0.0, 0.8)];
-        replace(&mut found, &wide, true, &flank()[..20]);
+        replace(&mut found, &wide, &flank()[..20]);
         assert_eq!(found.len(), 2);
     }
 }
