@@ -27,6 +27,9 @@ const ROUNDING: f64 = 0.58;
 /// next to nothing are so small a part of a step: in steps nothing lies between.
 const IN_STEPS: f64 = 0.08;
 const GAP: f64 = 0.25;
+/// Share of the differences of a step or more, below which they are those of edges, as in a scan
+/// that was computed and has no noise.
+const STEPS: f64 = 0.2;
 /// Fewest differences that tell something.
 const LEAST: usize = 24;
 
@@ -93,7 +96,9 @@ pub(crate) fn noise<'a>(
     let step = (zeros as f64 + RESOLUTION_QUANTILE * (number - zeros) as f64) as usize;
     let step_mm = scratch.get(step).copied().unwrap_or(0.0);
     let deviation_mm = deviation_mm.max(ROUNDING * step_mm);
-    let in_steps = zeros as f64 >= IN_STEPS * number as f64 && zero_mm <= GAP * step_mm;
+    let share = |count: usize| count as f64 / number as f64;
+    let often = share(zeros) >= IN_STEPS && share(number - zeros) >= STEPS;
+    let in_steps = often && zero_mm <= GAP * step_mm;
     let rounding_mm = if in_steps { ROUNDING * step_mm } else { 0.0 };
     let clean = scratch.partition_point(|d| *d <= WIDTH * deviation_mm) as f64 / WITHIN;
     let clean_share = libm::cbrt(clean / number as f64).min(1.0);
@@ -257,6 +262,17 @@ mod tests {
         }
         let found = noise(strips.iter(), &mut Vec::new()).unwrap();
         assert!(found.rounding_mm < 0.05, "{found:?}");
+    }
+
+    /// Without noise nothing but the edges differs.
+    #[test]
+    fn edges_are_not_steps_of_depth() {
+        let mut strips = strips(0.0, 0.0, 0.0);
+        for sample in strips.iter_mut().flat_map(|strip| &mut strip.samples) {
+            sample.1 = if sample.0 < 40.0 { 0.0 } else { 12.0 };
+        }
+        let found = noise(strips.iter(), &mut Vec::new()).unwrap();
+        assert!(found.rounding_mm <= 0.0, "{found:?}");
     }
 
     #[test]
