@@ -175,7 +175,9 @@ impl GridWorker {
                 most_noise_mm: allowed_mm.max(4.0 * noise_mm),
                 // A window that is not full may be of lone ones.
                 strays: !dense || node.noise.is_none_or(|noise| noise.clean_share < 1.0),
-                clean: node.noise.is_some_and(|noise| noise.clean_share >= CLEAN),
+                clean: node
+                    .noise
+                    .is_some_and(|noise| noise.ordinary_share >= CLEAN),
                 spacing,
                 effort: Effort {
                     most_planes: PLANES_PER_DRAW * settings.draws,
@@ -306,8 +308,8 @@ const BESIDE: f64 = 0.7;
 /// there is a sample wherever one should be: runs of outliers lie in the surface's stead, they
 /// do not end it.
 const STREWN: f64 = 2.0;
-/// Share of clean samples from which on what lies on no surface tells of another one. Edges cost
-/// some, since the differences that tell are those of three samples.
+/// Share of samples that are no outliers from which on what lies on no surface tells of another one.
+/// Edges cost some, since the differences that tell are those of three samples.
 const CLEAN: f64 = 0.95;
 /// Columns on either side that tell of the noise.
 const NOISE_COLUMNS: usize = 8;

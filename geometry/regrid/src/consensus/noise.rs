@@ -33,6 +33,10 @@ const STEPS: f64 = 0.2;
 /// Fewest differences that tell something.
 const LEAST: usize = 24;
 
+/// Standard deviations beyond which a difference is one of outliers or of the edge of a face: where
+/// samples are sparse, what bends differs by more than noise, but hardly by so much.
+const FAR: f64 = 10.0;
+
 /// Share of clean samples below which no estimate is believed.
 const LEAST_CLEAN: f64 = 0.5;
 
@@ -46,6 +50,8 @@ pub(crate) struct Noise {
     /// About which share of the samples is free of outliers: the cube root of the share of
     /// differences that are, each made of three samples.
     pub(crate) clean_share: f64,
+    /// The same, but with what is not far off counted as clean, whether noise or not.
+    pub(crate) ordinary_share: f64,
 }
 
 /// Standard deviation of z within these columns, millimetres; `None` where there are too
@@ -100,12 +106,16 @@ pub(crate) fn noise<'a>(
     let often = share(zeros) >= IN_STEPS && share(number - zeros) >= STEPS;
     let in_steps = often && zero_mm <= GAP * step_mm;
     let rounding_mm = if in_steps { ROUNDING * step_mm } else { 0.0 };
-    let clean = scratch.partition_point(|d| *d <= WIDTH * deviation_mm) as f64 / WITHIN;
-    let clean_share = libm::cbrt(clean / number as f64).min(1.0);
+    // Three samples make each difference.
+    let share_within = |width: f64, held: f64| {
+        let within = scratch.partition_point(|d| *d <= width * deviation_mm);
+        libm::cbrt(share(within) / held).clamp(LEAST_CLEAN, 1.0)
+    };
     Some(Noise {
         deviation_mm,
         rounding_mm,
-        clean_share: clean_share.max(LEAST_CLEAN),
+        clean_share: share_within(WIDTH, WITHIN),
+        ordinary_share: share_within(FAR, 1.0),
     })
 }
 
@@ -262,6 +272,23 @@ mod tests {
         }
         let found = noise(strips.iter(), &mut Vec::new()).unwrap();
         assert!(found.rounding_mm < 0.05, "{found:?}");
+    }
+
+    /// What bends between sparse samples is off the noise, but not far, as outliers are.
+    #[test]
+    fn bends_are_ordinary_and_outliers_are_not() {
+        let mut bent = strips(0.05, 0.0, 0.0);
+        for (row, sample) in bent
+            .iter_mut()
+            .flat_map(|s| s.samples.iter_mut().enumerate())
+        {
+            sample.1 += if row % 10 == 0 { 0.5 } else { 0.0 };
+        }
+        let bent = noise(bent.iter(), &mut Vec::new()).unwrap();
+        assert!(bent.clean_share < 0.95, "{bent:?}");
+        assert!(bent.ordinary_share > 0.99, "{bent:?}");
+        let among = noise(strips(0.05, 0.0, 0.1).iter(), &mut Vec::new()).unwrap();
+        assert!((among.ordinary_share - 0.9).abs() < 0.02, "{among:?}");
     }
 
     /// Without noise nothing but the edges differs.
