@@ -25,18 +25,22 @@ pub enum View {
     HalfPitch,
     /// Other noise, and other draws of the regridder.
     OtherSeed,
-    /// On a table, before a plane behind it; more of the surroundings in view.
+    /// A tenth more around the part in view, where there is nothing.
+    Alone,
+    /// The same sweep with the part on a table, before a plane behind it: it differs from
+    /// [`Self::Alone`] in nothing else, its noise included.
     Cluttered,
 }
 
 impl View {
     /// All of them.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Plain,
         Self::Outliers,
         Self::Mirrored,
         Self::HalfPitch,
         Self::OtherSeed,
+        Self::Alone,
         Self::Cluttered,
     ];
 
@@ -49,6 +53,7 @@ impl View {
             Self::Mirrored => "mirrored",
             Self::HalfPitch => "half-pitch",
             Self::OtherSeed => "other-seed",
+            Self::Alone => "alone",
             Self::Cluttered => "cluttered",
         }
     }
@@ -120,7 +125,7 @@ fn set_up(drawn: &Drawn, view: View) -> Result<(Scanner, Sweep)> {
     let mut seed = drawn.seed;
     let mut scene = drawn.scene.clone();
     match view {
-        View::Plain | View::Mirrored => {}
+        View::Plain | View::Mirrored | View::Alone => {}
         View::Outliers => {
             overrides.outliers = Some(0.25);
             overrides.noise_mm = Some(0.1);
@@ -134,7 +139,7 @@ fn set_up(drawn: &Drawn, view: View) -> Result<(Scanner, Sweep)> {
         View::Cluttered => scene = cluttered(scene),
     }
     let (scanner, mut sweep) = Preset::Paper.set_up(scene, &overrides, seed)?;
-    if view == View::Cluttered {
+    if matches!(view, View::Alone | View::Cluttered) {
         // A tenth more on every side.
         let (columns, samples) = (sweep.columns / 10, sweep.samples / 10);
         sweep.first_table_counts -= sweep.pitch_counts * columns as i32;

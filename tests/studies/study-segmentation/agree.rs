@@ -7,7 +7,7 @@ use relief_tests::score::{Agreement, adjusted_rand_index};
 
 use crate::material::Store;
 use crate::methods::{Method, ours};
-use crate::tally::{BAR, Finding, judge};
+use crate::tally::{BAR, Failure, Finding, judge};
 use crate::{methods, tally};
 
 /// The bar of the mean index.
@@ -66,25 +66,26 @@ pub(crate) fn views(store: &Store, set: Set, seeds: &[u64], view: View) -> Resul
     Ok(Agreed { view, scenes })
 }
 
-/// The part's faces with a table and a plane behind, against those without.
+/// The part's faces with a table and a plane behind, against those of the same sweep without.
 #[derive(Debug, Default)]
 pub(crate) struct Cluttered {
     /// Faces that are correct without.
     pub(crate) without: usize,
     /// Those of them that are correct with.
     pub(crate) with: usize,
-    /// Regions that are none of the part's.
+    /// Regions that are none of the part's, without and with.
+    pub(crate) noise_without: usize,
     pub(crate) noise: usize,
     pub(crate) scenes: usize,
-    /// Scenes with a face lost or a region too many.
-    pub(crate) failed: Vec<u64>,
+    /// Scenes with a face lost or a region too many, and what is wrong with them.
+    pub(crate) failed: Vec<Finding>,
 }
 
 pub(crate) fn clutter(store: &Store, set: Set, seeds: &[u64]) -> Result<Cluttered> {
-    let scenes: Vec<(u64, usize, usize, usize)> = seeds
+    let scenes: Vec<(Finding, usize, usize, [usize; 2])> = seeds
         .par_iter()
         .map(|&seed| {
-            let views = [View::Plain, View::Cluttered];
+            let views = [View::Alone, View::Cluttered];
             let (subject, images) = store.get(set, seed, &views)?;
             let mut found = Vec::new();
             for (image, view) in images.iter().zip(views) {
@@ -95,7 +96,7 @@ pub(crate) fn clutter(store: &Store, set: Set, seeds: &[u64]) -> Result<Cluttere
                 };
                 found.push(judge(&subject, image, view, &labelled));
             }
-            let [without, with] = &found[..] else {
+            let (Some(mut with), Some(without)) = (found.pop(), found.pop()) else {
                 anyhow::bail!("two views");
             };
             let wrong = |finding: &Finding, label: u16| {
@@ -105,22 +106,28 @@ pub(crate) fn clutter(store: &Store, set: Set, seeds: &[u64]) -> Result<Cluttere
             let faces = subject.truth.regions.iter().filter(|r| r.counts());
             let good: Vec<u16> = faces
                 .map(|r| r.label)
-                .filter(|label| !wrong(without, *label))
+                .filter(|label| !wrong(&without, *label))
                 .collect();
-            let kept = good.iter().filter(|label| !wrong(with, **label)).count();
+            let kept = good.iter().filter(|label| !wrong(&with, **label)).count();
             let at = tally::TOLERANCES.iter().position(|t| *t == BAR);
-            let noise = at.and_then(|k| with.at.get(k)).map_or(0, |c| c.noise);
-            Ok((seed, good.len(), kept, noise))
+            let noise = [&without, &with].map(|finding| {
+                let counts = at.and_then(|k| finding.at.get(k));
+                counts.map_or(0, |counts| counts.noise)
+            });
+            let is_own = |f: &Failure| f.what == "noise" || good.contains(&f.label);
+            with.failures.retain(is_own);
+            Ok((with, good.len(), kept, noise))
         })
         .collect::<Result<_>>()?;
     let mut sum = Cluttered::default();
-    for (seed, good, kept, noise) in scenes {
+    for (finding, good, kept, noise) in scenes {
         sum.without += good;
         sum.with += kept;
-        sum.noise += noise;
+        sum.noise_without += noise[0];
+        sum.noise += noise[1];
         sum.scenes += 1;
-        if kept < good || noise > 0 {
-            sum.failed.push(seed);
+        if kept < good || noise[1] > noise[0] {
+            sum.failed.push(finding);
         }
     }
     Ok(sum)

@@ -43,6 +43,10 @@ struct Options {
     /// One scene only, by its seed
     #[arg(long, value_name = "SEED")]
     scene: Option<u64>,
+    /// So many scenes of each set, on from the first: rare failures show in many only
+    #[arg(long, value_name = "SCENES", value_parser = clap::value_parser!(u64).range(1..=1000))]
+    #[arg(conflicts_with_all = ["short", "scene", "write", "check"])]
+    count: Option<u64>,
     /// How the scenes are scanned
     #[arg(long, value_enum, default_value = "plain")]
     view: ViewName,
@@ -107,6 +111,7 @@ enum ViewName {
     Mirrored,
     HalfPitch,
     OtherSeed,
+    Alone,
     Cluttered,
 }
 
@@ -131,6 +136,9 @@ impl Options {
             PurposeName::Judge => Purpose::Judge,
             PurposeName::Confirm => Purpose::Confirm,
         };
+        if let (Some(count), Some(first)) = (self.count, set.seeds(purpose).next()) {
+            return (first..first + count).collect();
+        }
         let seeds = set.seeds(purpose);
         match self.scene {
             Some(seed) => vec![seed],
@@ -154,6 +162,7 @@ impl Options {
             ViewName::Mirrored => View::Mirrored,
             ViewName::HalfPitch => View::HalfPitch,
             ViewName::OtherSeed => View::OtherSeed,
+            ViewName::Alone => View::Alone,
             ViewName::Cluttered => View::Cluttered,
         }
     }
@@ -217,6 +226,9 @@ fn run(options: &Options) -> Result<bool> {
         let seeds = options.seeds(set);
         let view = options.view();
         bars.extend(one_view(options, &store, set, view, &peers, &mut account)?);
+        if view == View::Cluttered {
+            clutter(&store, set, &seeds, &mut bars)?;
+        }
         if !options.full {
             continue;
         }
@@ -237,8 +249,7 @@ fn run(options: &Options) -> Result<bool> {
             told(&mut bars, report::agreement(set, &agreed));
         }
         if set != Set::Abw {
-            let found = agree::clutter(&store, set, &seeds)?;
-            told(&mut bars, report::clutter(set, &found));
+            clutter(&store, set, &seeds, &mut bars)?;
         }
     }
     account.say(&report::verdicts(&bars));
@@ -249,6 +260,14 @@ fn run(options: &Options) -> Result<bool> {
         std::fs::write(&file, text).with_context(|| format!("cannot write {}", file.display()))?;
     }
     Ok(!options.check || bars.iter().all(|bar| bar.holds))
+}
+
+/// Whether a table and a plane behind change the faces.
+fn clutter(store: &Store, set: Set, seeds: &[u64], bars: &mut Vec<Bar>) -> Result<()> {
+    let found = agree::clutter(store, set, seeds)?;
+    print!("{}", report::failures(&found.failed));
+    told(bars, report::clutter(set, &found));
+    Ok(())
 }
 
 /// Keeps a bar, and tells of it at once: the others take minutes.

@@ -164,23 +164,24 @@ pub(crate) fn agreement(set: Set, agreed: &Agreed) -> Bar {
 }
 
 pub(crate) fn clutter(set: Set, found: &Cluttered) -> Bar {
-    let seeds: Vec<String> = found.failed.iter().map(u64::to_string).collect();
+    let seeds: Vec<String> = found.failed.iter().map(|f| f.seed.to_string()).collect();
     Bar {
         set,
         what: format!(
             "cluttered: {} of the {} faces correct without table and back plane, of all; {} \
-             regions too many in {} scenes, of none; scenes that fail: {}",
+             regions too many in {} scenes, {} without; scenes that fail: {}",
             found.with,
             found.without,
             found.noise,
             found.scenes,
+            found.noise_without,
             if seeds.is_empty() {
                 "none".into()
             } else {
                 seeds.join(", ")
             }
         ),
-        holds: found.with == found.without && found.noise == 0,
+        holds: found.failed.is_empty(),
     }
 }
 
