@@ -209,6 +209,7 @@ impl GridWorker {
             let around = Around {
                 window,
                 surfaces,
+                before: None,
                 spacing,
                 y_mm,
             };
@@ -233,10 +234,22 @@ impl GridWorker {
                             Place::Beside { distance } => distance.max(outside),
                             _ => outside,
                         };
-                        let side = self.silhouette.side(&around, |wide, windows| {
-                            let number = windows * neighbours;
-                            wide.extend_from_slice(self.search.wider(window, x_mm, y_mm, number));
-                        });
+                        let mut side = |around: &Around<'_>| {
+                            self.silhouette.side(around, |wide, windows| {
+                                let number = windows * neighbours;
+                                let wider = self.search.wider(window, x_mm, y_mm, number);
+                                wide.extend_from_slice(wider);
+                            })
+                        };
+                        // What shows far behind fills the places where its samples are missing.
+                        let alone = || Around {
+                            before: Some(*surface),
+                            ..around
+                        };
+                        let side = match side(&around) {
+                            Side::Unknown => side(&alone()),
+                            known => known,
+                        };
                         match side {
                             Side::Inside => distance <= BESIDE,
                             Side::Outside => false,

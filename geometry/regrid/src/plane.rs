@@ -41,7 +41,12 @@ impl Plane {
 
     /// Height of a sample above the plane.
     pub(crate) fn residual(&self, n: &Neighbour) -> f64 {
-        n.z - (self.a * n.dx + self.b * n.dy + self.c)
+        n.z - self.at(n.dx, n.dy)
+    }
+
+    /// Its height at an offset from the node.
+    pub(crate) fn at(&self, dx: f64, dy: f64) -> f64 {
+        self.a * dx + self.b * dy + self.c
     }
 }
 

@@ -27,6 +27,10 @@ const EMPTY_BESIDE: f64 = 1.25;
 /// Share of samples lost, if so few are known that it cannot be told from them.
 const DROPPED: f64 = 0.05;
 
+/// Slope away from the node at which a sample lies so far behind a surface that this cannot lead
+/// there.
+const BEHIND: f64 = 2.0;
+
 /// Logarithm of the odds against a sample from a spot whose middle misses the surface.
 const GRAZED: f64 = 3.0;
 
@@ -36,8 +40,21 @@ pub(crate) struct Around<'a> {
     pub(crate) window: &'a Window<'a>,
     /// The surfaces at the node.
     pub(crate) surfaces: &'a [Surface],
+    /// The surface that hides what lies far behind it: it alone is asked for where it ends.
+    pub(crate) before: Option<Surface>,
     pub(crate) spacing: Spacing,
     pub(crate) y_mm: f64,
+}
+
+impl Around<'_> {
+    /// Whether a sample, seen from the node, lies far behind the surface that hides such.
+    fn hides(&self, dx: f64, dy: f64, z: f64) -> bool {
+        self.before.is_some_and(|surface| {
+            let far_mm = surface.width_mm + BEHIND * (dx * dx + dy * dy).sqrt();
+            // A steep surface's plane soon lies far before the faces on its other side.
+            z < surface.plane.at(dx, dy).min(surface.plane.c) - far_mm
+        })
+    }
 }
 
 /// Places of samples around a node; keeps its buffers from one node to the next.
@@ -63,13 +80,16 @@ impl Places {
             surfaces,
             spacing,
             y_mm,
+            ..
         } = *around;
         let known = (KNOWN * spacing.mean_mm).powi(2);
         let held = |n: &&Neighbour| {
             // Farther away it is not known as well where the surface is.
             let wider = 1.0 + n.distance2 / known;
             let off = |surface: &Surface| surface.plane.residual(n).abs() / surface.width_mm;
-            surfaces.iter().any(|surface| off(surface) <= wider) || is_continued(n, window, spacing)
+            !around.hides(n.dx, n.dy, n.z)
+                && (surfaces.iter().any(|surface| off(surface) <= wider)
+                    || is_continued(n, window, spacing))
         };
         self.present.clear();
         self.present
@@ -88,10 +108,10 @@ impl Places {
         let within = samples.last()?.distance2.sqrt() - gap;
         let empty = |place: &Place| {
             place.dx * place.dx + place.dy * place.dy <= within * within
-                && window
-                    .strips
-                    .get(place.strip)
-                    .is_some_and(|strip| is_clear(strip, y_mm + place.dy, EMPTY * gap))
+                && window.strips.get(place.strip).is_some_and(|strip| {
+                    let counts = |(y, z): (f64, f64)| !around.hides(place.dx, y - y_mm, z);
+                    is_clear(strip, y_mm + place.dy, EMPTY * gap, counts)
+                })
         };
         self.missing.clear();
         self.lost.clear();
@@ -292,11 +312,11 @@ fn is_continued(n: &Neighbour, window: &Window<'_>, spacing: Spacing) -> bool {
     agree >= AROUND && 2 * agree > all
 }
 
-/// Whether no sample of the strip lies as near to this height.
-fn is_clear(strip: &Strip, y_mm: f64, within_mm: f64) -> bool {
+/// Whether no sample of the strip that counts lies as near to this height.
+fn is_clear(strip: &Strip, y_mm: f64, within_mm: f64, counts: impl Fn((f64, f64)) -> bool) -> bool {
     let first = strip.samples.partition_point(|s| s.0 < y_mm - within_mm);
-    strip
-        .samples
-        .get(first)
-        .is_none_or(|s| s.0 > y_mm + within_mm)
+    let near = strip.samples.get(first..).unwrap_or_default().iter();
+    !near
+        .take_while(|s| s.0 <= y_mm + within_mm)
+        .any(|s| counts(*s))
 }

@@ -10,6 +10,7 @@
 
 mod arc;
 mod bend;
+mod covered;
 mod logistic;
 mod missing;
 mod node;
