@@ -62,7 +62,7 @@ fn ascending(
     let mut strips: Vec<Strip> = Vec::new();
     let mut travel = None;
     for (index, column) in columns.into_iter().enumerate() {
-        let strip = Strip::new(&column, &settings.roi, index)?;
+        let strip = Strip::new(&column, settings, index)?;
         if let Some(previous) = strips.last() {
             travel = Some(Travel::check(travel, previous.x_mm, strip.x_mm, index)?);
         }

@@ -97,7 +97,7 @@ impl Regridder {
     /// Columns must come in strictly ascending or strictly descending x, with coordinates
     /// within 25 m. After an error the regridder is as it was before the call.
     pub fn push(&mut self, column: Column) -> Result<Vec<GridColumn>, RegridError> {
-        let strip = Strip::new(&column, &self.settings.roi, self.taken)?;
+        let strip = Strip::new(&column, &self.settings, self.taken)?;
         if let Some(previous) = self.strips.back() {
             let travel = Travel::check(self.travel, previous.x_mm, strip.x_mm, self.taken)?;
             self.travel = Some(travel);

@@ -1,9 +1,11 @@
 //! A column as the regridder keeps it.
 
+mod hidden;
+
 use range_image::Column;
 
 use crate::error::RegridError;
-use crate::settings::Roi;
+use crate::settings::{Estimator, RegridSettings};
 
 /// Greatest coordinate accepted, millimetres. Scanners do not reach so far; a stray number
 /// beyond would only make a grid that nobody wants to pay for.
@@ -18,8 +20,14 @@ pub(crate) struct Strip {
 }
 
 impl Strip {
-    /// The column cut to the region of interest; `index` is its place in the scan.
-    pub(crate) fn new(column: &Column, roi: &Roi, index: usize) -> Result<Self, RegridError> {
+    /// The column cut to the region of interest, for consensus without the samples that lie
+    /// beneath others; `index` is its place in the scan.
+    pub(crate) fn new(
+        column: &Column,
+        settings: &RegridSettings,
+        index: usize,
+    ) -> Result<Self, RegridError> {
+        let roi = &settings.roi;
         let within = |value: f64, (low, high): (f64, f64)| low <= value && value <= high;
         let reachable = |value_mm: f64| {
             if value_mm.abs() <= COORDINATE_LIMIT_MM {
@@ -43,6 +51,9 @@ impl Strip {
                     samples.push((sample.y_mm, sample.z_mm));
                 }
             }
+        }
+        if settings.estimator == Estimator::Consensus {
+            hidden::take_out(&mut samples);
         }
         Ok(Self { x_mm, samples })
     }
@@ -84,6 +95,7 @@ pub(crate) fn typical(distances: &mut [f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Roi;
     use range_image::Sample;
 
     #[test]
@@ -101,19 +113,22 @@ mod tests {
             intensity: 9,
         });
         let column = Column::new(5.0, samples.collect());
-        let roi = Roi {
+        let mut settings = RegridSettings::with_pitch(1.0);
+        settings.roi = Roi {
             x_mm: (5.0, 6.0),
             y_mm: (2.0, 8.0),
             z_mm: (30.0, 65.0),
         };
-        let strip = Strip::new(&column, &roi, 0).unwrap();
+        let strip = Strip::new(&column, &settings, 0).unwrap();
         let heights: Vec<f64> = strip.samples.iter().map(|s| s.0).collect();
         assert_eq!(heights, [3.0, 4.0, 5.0, 6.0]);
-        let aside = Roi {
-            x_mm: (5.5, 6.0),
-            ..roi
-        };
-        assert!(Strip::new(&column, &aside, 0).unwrap().samples.is_empty());
+        settings.roi.x_mm = (5.5, 6.0);
+        assert!(
+            Strip::new(&column, &settings, 0)
+                .unwrap()
+                .samples
+                .is_empty()
+        );
     }
 
     #[test]

@@ -10,7 +10,6 @@
 
 mod arc;
 mod bend;
-mod covered;
 mod logistic;
 mod missing;
 mod node;

@@ -1,7 +1,6 @@
 //! Which of the surfaces near a node is its own, and z there.
 
 use super::bend::lift_mm;
-use super::covered::Covered;
 use super::posterior::Posterior;
 use super::side::{Labelled, SEEN, lengthen, separate, separate_strip};
 use super::surfaces::{Effort, LEAST_INLIERS, Surface, Surfaces};
@@ -69,9 +68,6 @@ pub(crate) struct Consensus {
     /// Samples of a still wider window, where they were needed.
     far: Vec<Neighbour>,
     labelled: Vec<Labelled>,
-    /// Which of them lie behind the other surface.
-    behind: Vec<bool>,
-    covered: Covered,
     kept: Vec<Labelled>,
     posterior: Posterior,
     /// Numbers of samples, strip by strip.
@@ -250,15 +246,7 @@ impl Consensus {
         let Conditions { spacing, clean, .. } = *conditions;
         let (first, other) = (self.found[0], self.found[other]);
         let meet = (first.plane.c - other.plane.c).abs() <= first.width_mm;
-        label(
-            &self.wide,
-            &first,
-            &other,
-            spacing,
-            &mut self.labelled,
-            &mut self.behind,
-        );
-        self.covered.take_out(&mut self.labelled, &self.behind);
+        label(&self.wide, &first, &other, spacing, &mut self.labelled);
         let line = if clean {
             separate_strip(&mut self.labelled, &mut self.posterior)
         } else {
@@ -279,9 +267,7 @@ impl Consensus {
                     &other,
                     spacing,
                     &mut self.labelled,
-                    &mut self.behind,
                 );
-                self.covered.take_out(&mut self.labelled, &self.behind);
                 let longer = lengthen(
                     &line,
                     0.0,
@@ -358,18 +344,14 @@ fn label(
     other: &Surface,
     spacing: Spacing,
     labelled: &mut Vec<Labelled>,
-    behind: &mut Vec<bool>,
 ) {
     labelled.clear();
-    behind.clear();
-    let far_mm = first.width_mm + other.width_mm;
     for n in samples {
-        let (label, opposite) = match (first.holds(n), other.holds(n)) {
-            (true, false) => (1.0, other),
-            (false, true) => (-1.0, first),
+        let label = match (first.holds(n), other.holds(n)) {
+            (true, false) => 1.0,
+            (false, true) => -1.0,
             _ => continue,
         };
-        behind.push(opposite.plane.residual(n) < -far_mm);
         labelled.push(Labelled {
             u: n.dx / spacing.x_mm,
             v: n.dy / spacing.y_mm,
