@@ -1,17 +1,17 @@
 //! One column of grid nodes.
 
+mod by_consensus;
+
 use core::f64::consts::PI;
 
 use range_image::{GridColumn, Lattice, NodeQuality};
 
-use crate::consensus::{
-    Around, Conditions, Consensus, Effort, Noise, Side, Silhouette, Surface, WIDTH, noise,
-};
+use crate::consensus::{Consensus, Noise, Silhouette, noise};
 use crate::draws::Draws;
 use crate::exhaustive;
 use crate::neighbours::{Neighbour, Search};
-use crate::plane::{Fit, Plane, PlaneFinder};
-use crate::settings::{Estimator, LEAST_WINDOW, RegridSettings, SupportSettings};
+use crate::plane::{Plane, PlaneFinder};
+use crate::settings::{Estimator, LEAST_WINDOW, RegridSettings};
 use crate::strip::{Strip, typical};
 use crate::support::{Place, Surroundings};
 use crate::window::{Spacing, Window};
@@ -163,121 +163,16 @@ impl GridWorker {
         self.samples.extend_from_slice(nearest);
         let mut draws = Draws::new(settings.seed, node.i, node.j);
         if settings.estimator == Estimator::Consensus {
-            // Samples that support a node may be as far off. Where the columns seem noisier,
-            // as when no three samples in a row are free of outliers, the node itself tells;
-            // but depths in coarse steps are as far off everywhere.
-            let rounding_mm = node.noise.map_or(0.0, |noise| noise.rounding_mm);
-            let allowed_mm = (support.inlier_floor * spacing.mean_mm / WIDTH).max(rounding_mm);
-            let noise_mm = node.noise.map_or(allowed_mm, |noise| noise.deviation_mm);
-            let least_mm = LEAST_NOISE * spacing.mean_mm;
-            let conditions = Conditions {
-                noise_mm: noise_mm.min(allowed_mm).max(least_mm),
-                most_noise_mm: allowed_mm.max(4.0 * noise_mm),
-                // A window that is not full may be of lone ones.
-                strays: !dense || node.noise.is_none_or(|noise| noise.clean_share < 1.0),
-                clean: node
-                    .noise
-                    .is_some_and(|noise| noise.ordinary_share >= CLEAN),
-                spacing,
-                effort: Effort {
-                    most_planes: PLANES_PER_DRAW * settings.draws,
-                    neighbours: settings.neighbours,
-                    // The plane of the node before, as seen from here.
-                    guess: self
-                        .before
-                        .filter(|b| b.0 + 1 == node.j)
-                        .map(|(_, plane)| Plane {
-                            c: plane.c + plane.b * settings.pitch_mm,
-                            ..plane
-                        }),
-                },
-            };
-            let surfaces =
-                self.consensus
-                    .surfaces(&self.samples, &conditions, &mut draws, |wide, windows| {
-                        let number = windows * neighbours;
-                        wide.extend_from_slice(self.search.wider(window, x_mm, y_mm, number));
-                    });
-            // Between strays the samples that count are thinner than samples are.
-            let thinner = thinner(&self.samples, surfaces, spacing);
-            let support = SupportSettings {
-                radius: support.radius * thinner,
-                step_margin: SIDE_KNOWN * support.step_margin * thinner,
-                ..*support
-            };
-            self.before = surfaces.first().map(|surface| (node.j, surface.plane));
-            let around = Around {
+            let at = At {
                 window,
-                surfaces,
-                before: None,
+                node,
+                neighbours,
                 spacing,
-                y_mm,
+                dense,
+                outside,
+                settings,
             };
-            return surfaces.iter().enumerate().find_map(|(number, surface)| {
-                if number > 0 && !surface.spans_columns(&self.samples) {
-                    return None;
-                }
-                let fit = Fit {
-                    plane: surface.plane,
-                    tolerance: surface.width_mm,
-                };
-                let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm, dense);
-                // Outliers beyond a silhouette close nothing.
-                let closes = |n: &Neighbour| surfaces.iter().any(|other| other.holds(n));
-                let place =
-                    self.surroundings
-                        .place(&self.samples, spacing, &support, &agrees, closes);
-                let supported = match place {
-                    Place::Among if outside <= support.margin => true,
-                    Place::Among | Place::Beside { .. } => {
-                        let distance = match place {
-                            Place::Beside { distance } => distance.max(outside),
-                            _ => outside,
-                        };
-                        let mut side = |around: &Around<'_>| {
-                            self.silhouette.side(around, |wide, windows| {
-                                let number = windows * neighbours;
-                                let wider = self.search.wider(window, x_mm, y_mm, number);
-                                wide.extend_from_slice(wider);
-                            })
-                        };
-                        // What shows far behind fills the places where its samples are missing.
-                        let alone = || Around {
-                            before: Some(*surface),
-                            ..around
-                        };
-                        let side = match side(&around) {
-                            Side::Unknown => side(&alone()),
-                            known => known,
-                        };
-                        match side {
-                            Side::Inside => distance <= BESIDE,
-                            Side::Outside => false,
-                            Side::Unknown => distance <= support.margin,
-                            Side::Clear => {
-                                let strewn = SupportSettings {
-                                    radius: STREWN * settings.support.radius,
-                                    step_margin: STREWN * settings.support.radius,
-                                    ..support
-                                };
-                                distance <= support.margin
-                                    || number == 0
-                                        && outside == 0.0
-                                        && self.surroundings.place(
-                                            &self.samples,
-                                            spacing,
-                                            &strewn,
-                                            &agrees,
-                                            closes,
-                                        ) == Place::Among
-                            }
-                        }
-                    }
-                    Place::Alone => false,
-                };
-                let quality = || quality(&self.samples, &fit.plane, |n| surface.holds(n));
-                supported.then(|| (fit.plane.c + surface.lift_mm, quality()))
-            });
+            return self.by_consensus(&at, &mut draws);
         }
         while self.samples.len() >= LEAST_WINDOW {
             let fit = if settings.estimator == Estimator::ExhaustiveLeastMedian {
@@ -311,42 +206,11 @@ impl GridWorker {
     }
 }
 
-/// How many times farther from its surface's samples a node may lie where the line of the
-/// edge says on which side it is: half the diagonal of a square of samples.
-const SIDE_KNOWN: f64 = 1.18;
 /// How far outside of the hull of its surface's samples a node may lie, in local spacings,
 /// if the line of the silhouette has it inside.
 const BESIDE: f64 = 0.7;
-/// How many times the radius of support where outliers lie among a surface's samples, and
-/// there is a sample wherever one should be: runs of outliers lie in the surface's stead, they
-/// do not end it.
-const STREWN: f64 = 2.0;
-/// Share of samples that are no outliers from which on what lies on no surface tells of another one.
-/// Edges cost some, since the differences that tell are those of three samples.
-const CLEAN: f64 = 0.95;
 /// Columns on either side that tell of the noise.
 const NOISE_COLUMNS: usize = 8;
-/// Least noise believed, in spacings: scans without any are computed ones.
-const LEAST_NOISE: f64 = 1e-3;
-/// How far strays may widen the radius in which samples support a node.
-const THINNER_LIMIT: f64 = 1.6;
-/// Distance from the node, in spacings, within which strays are counted.
-const STRAY_RADIUS: f64 = 3.0;
-
-/// How many times farther apart the samples on surfaces are than all samples near the node.
-fn thinner(window: &[Neighbour], surfaces: &[Surface], spacing: Spacing) -> f64 {
-    let radius_mm = STRAY_RADIUS * spacing.mean_mm;
-    let near = window
-        .iter()
-        .take_while(|n| n.distance2 <= radius_mm * radius_mm);
-    let (mut all, mut held) = (0_u32, 0_u32);
-    for n in near {
-        all += 1;
-        held += u32::from(surfaces.iter().any(|surface| surface.holds(n)));
-    }
-    let share = f64::from(all) / f64::from(held.max(1));
-    share.sqrt().min(THINNER_LIMIT)
-}
 
 /// A node to estimate.
 #[derive(Debug, Clone, Copy)]
@@ -359,9 +223,19 @@ struct Node {
     noise: Option<Noise>,
 }
 
-/// [`Estimator::Consensus`] tries as few planes as will do, and at most this many times the
-/// draws that are set.
-const PLANES_PER_DRAW: usize = 16;
+/// A node, and what is known of its window.
+struct At<'a> {
+    window: &'a Window<'a>,
+    node: Node,
+    /// Samples that a window is to have.
+    neighbours: usize,
+    spacing: Spacing,
+    /// Whether it has them.
+    dense: bool,
+    /// How far outside of all samples the node lies, in local spacings.
+    outside: f64,
+    settings: &'a RegridSettings,
+}
 
 /// Share of the spacing that follows from the area of the window, as a circle around the
 /// node, that is believed: at a straight edge half of that circle is empty, which makes

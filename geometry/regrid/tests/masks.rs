@@ -238,6 +238,51 @@ fn a_corner_in_front_of_a_wall_is_not_punched_out() {
     }
 }
 
+/// Rays fan out, so of a wall far behind a plate some samples lie beneath it along one edge, and
+/// the other edge casts a shadow. Where the plate has nodes is its own affair.
+#[test]
+fn a_plate_ends_before_a_far_wall_as_it_does_before_nothing() {
+    let is_plate = |x: f64, y: f64| {
+        let y = y - 0.3 * x;
+        (5.13..24.67).contains(&x) && (60.21..79.68).contains(&y)
+    };
+    let seen = |wall: bool| {
+        let mut noise = Noise::new(7);
+        let scan = columns(steps(0.1, 0.4, 75), |x| {
+            // Slopes of rays from 400 mm before the plate.
+            let mut samples: Vec<(f64, f64)> = steps(0.11, 0.001, 140)
+                .filter_map(|slope| {
+                    let z = 0.02 * noise.normal();
+                    let y = 400.0 * slope;
+                    if is_plate(x, y) {
+                        Some((y, z))
+                    } else {
+                        wall.then_some((440.0 * slope, z - 40.0))
+                    }
+                })
+                .collect();
+            samples.sort_by(|s, t| s.0.total_cmp(&t.0));
+            samples
+        });
+        let nodes = nodes(&image(&scan, &RegridSettings::with_pitch(0.4)));
+        let between = nodes.iter().filter(|n| (-39.0..-1.0).contains(&n.2));
+        assert_eq!(between.count(), 0, "wall {wall}");
+        let of_plate = nodes.into_iter().filter(|n| n.2.abs() < 1.0);
+        of_plate.map(|n| (n.0, n.1)).collect::<Vec<_>>()
+    };
+    let wrong = |nodes: &[(f64, f64)]| {
+        let beyond = nodes.iter().filter(|n| !is_plate(n.0, n.1)).count();
+        let inside = |k: i32| f64::from(k) * 0.4;
+        let all = (0..75).flat_map(|i| (0..300).map(move |j| (inside(i), inside(j))));
+        let all = all.filter(|n| is_plate(n.0, n.1)).count();
+        (all - (nodes.len() - beyond), beyond)
+    };
+    let (alone, before_wall) = (wrong(&seen(false)), wrong(&seen(true)));
+    assert!(alone.0 + alone.1 <= 20, "{alone:?}");
+    // Of some 200 nodes along its outline.
+    assert!(before_wall.0 + before_wall.1 <= 22, "{before_wall:?}");
+}
+
 #[test]
 fn the_region_of_interest_limits_samples_and_nodes() {
     let columns = scan(30.0, (0.4, 0.4), (0.0, 0.0), |x, _| {

@@ -9,6 +9,7 @@ use super::arc::Arc;
 use super::missing::{Around, Places};
 use super::posterior::Posterior;
 use super::side::{Labelled, Line, lengthen, separate};
+use super::surfaces::Surface;
 use super::wedge::Wedge;
 use crate::neighbours::Neighbour;
 
@@ -46,12 +47,29 @@ pub(crate) struct Silhouette {
 }
 
 impl Silhouette {
-    /// Where the node lies to the outline that ends its surfaces. `wider` gives the samples of
-    /// so many windows, nearest first.
+    /// Where the node lies to the outline that ends its surfaces, or, where these do not tell,
+    /// this one of them: what shows far behind it fills the places where its samples are missing.
+    /// `wider` gives the samples of so many windows, nearest first.
     pub(crate) fn side(
         &mut self,
         around: &Around<'_>,
+        surface: &Surface,
         mut wider: impl FnMut(&mut Vec<Neighbour>, usize),
+    ) -> Side {
+        let alone = Around {
+            before: Some(*surface),
+            ..*around
+        };
+        match self.side_of(around, &mut wider) {
+            Side::Unknown => self.side_of(&alone, &mut wider),
+            known => known,
+        }
+    }
+
+    fn side_of(
+        &mut self,
+        around: &Around<'_>,
+        wider: &mut impl FnMut(&mut Vec<Neighbour>, usize),
     ) -> Side {
         self.samples.clear();
         wider(&mut self.samples, WINDOWS);

@@ -39,19 +39,18 @@ pub(super) fn take_out(samples: &mut Vec<(f64, f64)>) {
     };
     let mut covers = vec![false; samples.len()];
     let mut is_hidden = vec![false; samples.len()];
-    for k in 0..samples.len() {
-        if let Some(pair) = column.cover(k) {
-            is_hidden[k] = true;
-            covers[pair.0] = true;
-            covers[pair.1] = true;
+    for (k, is_hidden) in is_hidden.iter_mut().enumerate() {
+        if let Some((low, high)) = column.cover(k) {
+            *is_hidden = true;
+            (covers[low], covers[high]) = (true, true);
         }
     }
     if !is_hidden.contains(&true) {
         return;
     }
-    for k in 0..samples.len() {
+    for (k, is_hidden) in is_hidden.iter_mut().enumerate() {
         let mut before = column.before(k, BEYOND).chain(column.after(k, BEYOND));
-        is_hidden[k] |= before.any(|front| covers[front]);
+        *is_hidden |= before.any(|front| covers[front]);
     }
     let mut is_hidden = is_hidden.into_iter();
     samples.retain(|_| !is_hidden.next().unwrap_or(false));
