@@ -25,6 +25,7 @@ pub(crate) struct Field<'a> {
     observations: &'a Observations,
     rows: usize,
     columns: usize,
+    pitch_mm: f64,
     nodes: Vec<Option<Node>>,
 }
 
@@ -56,6 +57,7 @@ impl<'a> Field<'a> {
             observations,
             rows: height,
             columns,
+            pitch_mm: image.pitch_mm(),
             nodes: vec![None; columns * height],
         };
         for &index in nodes {
@@ -87,6 +89,11 @@ impl<'a> Field<'a> {
 
     pub(crate) fn columns(&self) -> usize {
         self.columns
+    }
+
+    /// Distance of neighbouring nodes, millimetres.
+    pub(crate) fn pitch_mm(&self) -> f64 {
+        self.pitch_mm
     }
 
     pub(crate) fn node(&self, place: usize) -> Option<&Node> {

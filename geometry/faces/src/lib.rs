@@ -16,6 +16,7 @@
 mod compete;
 mod divide;
 mod field;
+mod fillet;
 mod grow;
 mod join;
 mod observations;

@@ -6,6 +6,7 @@ use shapes::{Family, Fit, Shape, fit, is_smooth, spread};
 
 use crate::compete::{NONE, Pieces};
 use crate::field::{Field, Set, count, places};
+use crate::fillet::is_fillet;
 use crate::grow::{FEWEST, Piece, grow, grow_left};
 use crate::strain::is_strained;
 
@@ -158,7 +159,7 @@ fn apart(
     let mut is_free: Vec<bool> = pieces.iter().map(|piece| piece.fit.is_none()).collect();
     for &(a, b) in &touching {
         monitor.check()?;
-        if is_smooth_between(field, &pieces[a], &pieces[b]) {
+        if is_smooth_between(field, pieces, &touching, (a, b)) {
             (is_free[a], is_free[b]) = (true, true);
             unite(a, b);
         }
@@ -191,8 +192,36 @@ fn touching(field: &Field<'_>, pieces: &[Piece]) -> Vec<(usize, usize)> {
         .collect()
 }
 
+/// Whether two pieces that touch are parts of one smooth surface as well, and neither rounds off an
+/// edge of the other.
+fn is_smooth_between(
+    field: &Field<'_>,
+    pieces: &[Piece],
+    touching: &[(usize, usize)],
+    pair: (usize, usize),
+) -> bool {
+    let rounds_off = |fillet: usize, plane: usize| {
+        let beside = touching.iter().filter_map(|&(a, b)| match fillet {
+            f if f == a => Some(b),
+            f if f == b => Some(a),
+            _ => None,
+        });
+        let mut others = beside.filter(|other| *other != plane);
+        others.any(|other| {
+            is_fillet(
+                field,
+                &pieces[fillet].nodes,
+                [&pieces[plane], &pieces[other]],
+            )
+        })
+    };
+    are_of_one(field, &pieces[pair.0], &pieces[pair.1])
+        && !rounds_off(pair.0, pair.1)
+        && !rounds_off(pair.1, pair.0)
+}
+
 /// Whether two pieces are parts of one smooth surface as well.
-fn is_smooth_between(field: &Field<'_>, a: &Piece, b: &Piece) -> bool {
+fn are_of_one(field: &Field<'_>, a: &Piece, b: &Piece) -> bool {
     let (Some(fit_a), Some(fit_b)) = (&a.fit, &b.fit) else {
         return false;
     };
@@ -265,16 +294,25 @@ fn candidates(
     Ok(found)
 }
 
-/// Whether pieces are for the most part of one smooth surface.
+/// Whether pieces are for the most part of one smooth surface. A region that is mostly flat is none.
 fn is_free_form(field: &Field<'_>, pieces: &[Piece]) -> bool {
-    let greatest = pieces.iter().map(|piece| count(&piece.nodes)).max();
-    let least = LEAST_TELLING * greatest.unwrap_or(0) as f64;
+    let Some(greatest) = pieces.iter().max_by_key(|piece| count(&piece.nodes)) else {
+        return false;
+    };
+    let is_plane = |fit: &Fit| matches!(fit.shape, Shape::Plane(_));
+    if greatest.fit.as_ref().is_some_and(is_plane)
+        && 2 * count(&greatest.nodes) > count(&field.all())
+    {
+        return false;
+    }
+    let least = LEAST_TELLING * count(&greatest.nodes) as f64;
     let tells = |piece: usize| count(&pieces[piece].nodes) as f64 >= least;
-    let pairs = touching(field, pieces).into_iter();
-    let pairs: Vec<_> = pairs.filter(|(a, b)| tells(*a) && tells(*b)).collect();
+    let touching = touching(field, pieces);
+    let pairs = touching.iter().filter(|(a, b)| tells(*a) && tells(*b));
+    let pairs: Vec<_> = pairs.collect();
     let smooth = pairs
         .iter()
-        .filter(|(a, b)| is_smooth_between(field, &pieces[*a], &pieces[*b]));
+        .filter(|pair| is_smooth_between(field, pieces, &touching, ***pair));
     let smooth = smooth.count();
     smooth >= FEW_PAIRS && 2 * smooth > pairs.len()
 }

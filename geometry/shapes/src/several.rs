@@ -9,20 +9,26 @@ use crate::fit::{Fit, Sample};
 #[must_use]
 pub fn is_smooth(parts: &[(&Fit, Vec<Sample>)]) -> bool {
     let samples: Vec<Sample> = parts.iter().flat_map(|(_, own)| own.clone()).collect();
-    let mut surfaces = polynomials_of(&samples, samples.len() as f64);
-    let of_parts = parts
+    let off = parts
         .iter()
         .flat_map(|(fit, own)| fit.offs(own).collect::<Vec<_>>());
+    let freedom = parts.iter().map(|(fit, _)| fit.shape.family().freedom());
+    is_smoother(&samples, off.collect(), freedom.sum())
+}
+
+/// Whether one polynomial explains samples better than a surface of so many free numbers that they
+/// lie so far `off`, in their standard deviations.
+#[must_use]
+pub fn is_smoother(samples: &[Sample], off: Vec<f64>, freedom: usize) -> bool {
+    let independent = samples.len() as f64;
+    let mut surfaces = polynomials_of(samples, independent);
     surfaces.push(Surface {
-        off: of_parts.collect(),
-        freedom: parts
-            .iter()
-            .map(|(fit, _)| fit.shape.family().freedom())
-            .sum(),
+        off,
+        freedom,
         fit: None,
     });
     let scale = Scale {
-        independent: samples.len() as f64,
+        independent,
         surfaces,
     };
     let mut scores = scale
