@@ -9,17 +9,14 @@ use shapes::{Cylinder, Plane, Sample, Shape, is_smoother};
 
 use crate::field::{Field, Set, places};
 use crate::grow::Piece;
+use crate::split::{BESIDE, STRAY};
 
 /// Least turn from one plane to the other, radians: less is told by the planes themselves.
 const LEAST_TURN: f64 = 0.1;
-/// How far from the piece samples of the planes are looked at, in nodes.
-const BESIDE: usize = 8;
 /// Radii looked at, in pitches, how many of them, and halvings between the best two.
 const RADII: (f64, f64) = (0.25, 250.0);
 const FIRST: u32 = 31;
 const HALVINGS: u32 = 12;
-/// Samples lie off by so many of their deviations at most, as far as that counts.
-const STRAY: f64 = 4.0;
 
 /// Whether a piece is a fillet between two planes, and not one smooth surface with them.
 pub(crate) fn is_fillet(field: &Field<'_>, piece: &Set, planes: [&Piece; 2]) -> bool {
@@ -131,7 +128,7 @@ mod tests {
     use crate::testing::Scan;
     use shapes::Family;
 
-    /// A roof of slopes 0.4 with its ridge along y at x = 12 mm, rounded, or bent as a parabola.
+    /// A roof of slopes 0.4 with its ridge along y at x = 12 mm, rounded.
     fn roof(x: f64, radius_mm: f64) -> f64 {
         let x = x - 12.0;
         let edge = radius_mm * 0.4 / libm::sqrt(1.16);

@@ -21,14 +21,14 @@ const JOINED: usize = 5;
 /// Least share of a region that must be of shapes, once it is taken apart.
 const EXPLAINED: f64 = 0.5;
 /// How far to either side of a border between pieces samples tell whether it is one, in nodes.
-const BESIDE: usize = 8;
+pub(crate) const BESIDE: usize = 8;
 /// Nodes of a piece beside another that make them neighbours.
 const CONTACT: usize = 3;
 /// How much more variance a plane may leave of a piece than its shape does for the piece to be flat,
 /// samples that tell, and deviations up to which they count as off.
 const FLAT: f64 = 2.0;
 const SAMPLES: usize = 500;
-const STRAY: f64 = 4.0;
+pub(crate) const STRAY: f64 = 4.0;
 /// Cosine of the turn (0.1 rad) up to which flat pieces of one region meet in no crease.
 const NO_CREASE: f64 = 0.995;
 /// Windows of a size that are looked at in a region, at most, and how many at once.
@@ -323,4 +323,77 @@ fn free_parts(field: &Field<'_>, open: &[bool]) -> Vec<Set> {
         |part: &Set| count(part) >= FREE && !places(&field.within(part, FREE_DEPTH)).is_empty();
     let parts = field.parts(&field.opened(open)).into_iter();
     parts.filter(is_face).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Scan;
+
+    /// A plane of so many columns that goes over into a bend of 40, which was cut in four.
+    fn is_free(flat: usize) -> bool {
+        let edge_mm = 0.4 * flat as f64;
+        let scan = Scan::of((flat + 40, 40), 0.4, 0.05, |x, _| {
+            -0.03 * (x - edge_mm).max(0.0).powi(2)
+        });
+        let nodes: Vec<usize> = (0..scan.image.raw_z_mm().len()).collect();
+        let field = Field::new(&scan.image, &scan.observations, &nodes).unwrap();
+        let piece = |columns: core::ops::Range<usize>, family: Family| {
+            let is_in = |place: usize| columns.contains(&(place / field.rows()));
+            let nodes: Set = (0..field.len()).map(is_in).collect();
+            let fit = fit(family, &field.samples(&nodes, 0, 2000), 1.0);
+            assert!(fit.is_some(), "{columns:?}");
+            Piece { fit, nodes }
+        };
+        let bend = (0..4).map(|k| flat + 10 * k..flat + 10 * (k + 1));
+        let bend = bend.map(|columns| piece(columns, Family::Cylinder));
+        let plane = (flat > 0).then(|| piece(0..flat, Family::Plane));
+        let pieces: Vec<Piece> = plane.into_iter().chain(bend).collect();
+        is_free_form(&field, &pieces)
+    }
+
+    #[test]
+    fn a_region_that_is_mostly_flat_is_no_free_form() {
+        assert!(is_free(0));
+        assert!(!is_free(60));
+    }
+
+    /// Slopes of 0.2 up and down, and between them an edge of this radius.
+    #[test]
+    fn a_fillet_is_not_one_smooth_surface_with_its_planes() {
+        let mut told = 0;
+        for radius_mm in [4.0, 6.0, 8.0, 12.0, 16.0] {
+            let edge_mm = radius_mm * 0.2 / libm::sqrt(1.04);
+            let roof = |x: f64| {
+                let top_mm = radius_mm * libm::sqrt(1.04);
+                if x.abs() > edge_mm {
+                    -0.2 * x.abs()
+                } else {
+                    libm::sqrt(radius_mm * radius_mm - x * x) - top_mm
+                }
+            };
+            let scan = Scan::of((60, 8), 0.4, 0.1, |x, _| roof(x - 12.0));
+            let nodes: Vec<usize> = (0..scan.image.raw_z_mm().len()).collect();
+            let field = Field::new(&scan.image, &scan.observations, &nodes).unwrap();
+            let piece = |is_in: &dyn Fn(f64) -> bool, family: Family| {
+                let x_mm = |place: usize| scan.image.x_mm(place / field.rows()) - 12.0;
+                let nodes: Set = (0..field.len()).map(|p| is_in(x_mm(p))).collect();
+                let fit = fit(family, &field.samples(&nodes, 0, 2000), 1.0);
+                Piece { fit, nodes }
+            };
+            let pieces = [
+                piece(&|x| x < -edge_mm, Family::Plane),
+                piece(&|x| x.abs() <= edge_mm, Family::Cylinder),
+                piece(&|x| x > edge_mm, Family::Plane),
+            ];
+            let touching = touching(&field, &pieces);
+            assert_eq!(touching, [(0, 1), (1, 2)]);
+            for &(a, b) in &touching {
+                told += usize::from(are_of_one(&field, &pieces[a], &pieces[b]));
+                assert!(!is_smooth_between(&field, &pieces, &touching, (a, b)));
+            }
+        }
+        // Without the other plane beside them most would be.
+        assert!(told >= 8, "{told} of 10");
+    }
 }
