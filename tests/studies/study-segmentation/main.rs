@@ -226,7 +226,7 @@ fn run(options: &Options) -> Result<bool> {
         let seeds = options.seeds(set);
         let view = options.view();
         bars.extend(one_view(options, &store, set, view, &peers, &mut account)?);
-        if view == View::Cluttered {
+        if view == View::Cluttered && set != Set::Abw {
             clutter(&store, set, &seeds, &mut bars)?;
         }
         if !options.full {
