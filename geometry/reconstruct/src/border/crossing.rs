@@ -9,8 +9,12 @@ use crate::polygon::{cross, distance_of_segments, dot, minus, norm};
 /// Side of the cells in which segments are looked up.
 const CELL: f64 = 2.0;
 
-/// Chords by which a curved piece is replaced; it turns by less than a right angle.
-const CHORDS: usize = 24;
+/// Chords by which a curved piece is replaced at least; it turns by less than a right angle.
+const CHORDS: f64 = 24.0;
+
+/// Length of a curved piece, pitches, whose arcs rise as far above as many chords as a quarter of
+/// the clearance. Of longer ones the chords are more, by the square root.
+const CHORDED: f64 = 14.0;
 
 /// Strands that share no vertex keep at least this distance.
 const CLEARANCE: f64 = 0.02;
@@ -27,8 +31,10 @@ const BACK_COSINE: f64 = 0.5;
 #[derive(Debug, Clone)]
 pub(crate) struct Strand {
     /// Border it belongs to.
-    pub(crate) owner: usize,
+    owner: usize,
     pub(crate) points: Vec<[f64; 2]>,
+    /// In which directions, of any length, each of its chords is left for the other end.
+    inward: Vec<[[f64; 2]; 2]>,
 }
 
 impl Strand {
@@ -41,18 +47,47 @@ impl Strand {
         end: [f64; 2],
     ) -> Self {
         let mut points = vec![start];
-        for k in 0..path.pieces.len() {
+        // First chord of each piece, and the first beyond.
+        let mut chords = vec![0];
+        for (k, piece) in path.pieces.iter().enumerate() {
             let width = path.breaks[k + 1] - path.breaks[k];
-            let straight = path.pieces[k].iter().all(|c| c[2] == 0.0 && c[3] == 0.0);
-            let count = if straight { 1 } else { CHORDS };
-            for p in 1..=count {
-                points.push(path.piece_value(k, width * p as f64 / count as f64, 0));
-            }
+            let straight = piece.iter().all(|c| c[2] == 0.0 && c[3] == 0.0);
+            let count = if straight {
+                1.0
+            } else {
+                (CHORDS * (width / CHORDED).sqrt().max(1.0)).ceil()
+            };
+            let shares = (1..=count as usize).map(|p| p as f64 / count);
+            points.extend(shares.map(|share| path.piece_value(k, width * share, 0)));
+            chords.push(points.len() - 1);
         }
         if let Some(last) = points.last_mut() {
             *last = end;
         }
-        Self { owner, points }
+        let mut strand = Self::polyline(owner, points);
+        // Chords of a piece tell of its directions by as much as it bends along them; where two
+        // pieces or paths meet that may be more than they part.
+        for (k, chord) in chords.windows(2).enumerate() {
+            let width = path.breaks[k + 1] - path.breaks[k];
+            let first = path.piece_value(k, 0.0, 1);
+            let last = path.piece_value(k, width, 1).map(|c| -c);
+            for (chord, end, along) in [(chord[0], 0, first), (chord[1] - 1, 1, last)] {
+                if norm(along) > 0.0 {
+                    strand.inward[chord][end] = along;
+                }
+            }
+        }
+        strand
+    }
+
+    fn polyline(owner: usize, points: Vec<[f64; 2]>) -> Self {
+        let chords = points.windows(2);
+        let inward = chords.map(|pair| [minus(pair[1], pair[0]), minus(pair[0], pair[1])]);
+        Self {
+            owner,
+            inward: inward.collect(),
+            points,
+        }
     }
 
     /// Samples a path in another unit, `scale` of which make one here.
@@ -146,10 +181,9 @@ fn in_conflict(strands: &[Strand], a: (usize, usize), b: (usize, usize), clearan
     let (r, s) = (second.points[b.1], second.points[b.1 + 1]);
     let within = a.0 == b.0 && a.1.abs_diff(b.1) == 1;
     let least = if within { BACK_COSINE } else { FOLD_COSINE };
-    for (shared, away) in [(p, q), (q, p)] {
-        for (other, beyond) in [(r, s), (s, r)] {
+    for (shared, u) in [p, q].into_iter().zip(first.inward[a.1]) {
+        for (other, v) in [r, s].into_iter().zip(second.inward[b.1]) {
             if shared == other {
-                let (u, v) = (minus(away, shared), minus(beyond, shared));
                 return dot(u, v) > least * norm(u) * norm(v);
             }
         }
@@ -170,10 +204,7 @@ mod tests {
     use super::*;
 
     fn strand(owner: usize, points: &[[f64; 2]]) -> Strand {
-        Strand {
-            owner,
-            points: points.to_vec(),
-        }
+        Strand::polyline(owner, points.to_vec())
     }
 
     #[test]
@@ -193,6 +224,27 @@ mod tests {
         };
         assert!(found(leaving(2.0)), "hardly parts from it");
         assert!(!found(leaving(4.0)));
+    }
+
+    /// A path that leaves the origin along the first axis and bends away, most where it begins.
+    fn bending() -> PiecewiseCubic<2> {
+        PiecewiseCubic {
+            breaks: vec![0.0, 20.0],
+            pieces: vec![[[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.1, -1.0 / 300.0]]],
+        }
+    }
+
+    #[test]
+    fn paths_that_cross_before_their_first_chords_part_are_found() {
+        let path = bending();
+        let of = |slope: f64| {
+            let end = [20.0, 20.0 * slope];
+            let line = PiecewiseCubic::line([0.0; 2], end, 20.0).unwrap();
+            let bent = Strand::new(0, &path, [0.0; 2], path.evaluate(20.0));
+            !conflicts(&[bent, Strand::new(1, &line, [0.0; 2], end)]).is_empty()
+        };
+        assert!(of(0.01), "crosses a tenth of a pitch on");
+        assert!(!of(-0.2), "leaves to the other side");
     }
 
     #[test]
