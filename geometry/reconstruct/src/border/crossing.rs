@@ -181,10 +181,11 @@ fn in_conflict(strands: &[Strand], a: (usize, usize), b: (usize, usize), clearan
     let (r, s) = (second.points[b.1], second.points[b.1 + 1]);
     let within = a.0 == b.0 && a.1.abs_diff(b.1) == 1;
     let least = if within { BACK_COSINE } else { FOLD_COSINE };
-    for (shared, u) in [p, q].into_iter().zip(first.inward[a.1]) {
-        for (other, v) in [r, s].into_iter().zip(second.inward[b.1]) {
+    let is_fold = |u: [f64; 2], v: [f64; 2]| dot(u, v) > least * norm(u) * norm(v);
+    for (shared, away, u) in [(p, q, first.inward[a.1][0]), (q, p, first.inward[a.1][1])] {
+        for (other, beyond, v) in [(r, s, second.inward[b.1][0]), (s, r, second.inward[b.1][1])] {
             if shared == other {
-                return dot(u, v) > least * norm(u) * norm(v);
+                return is_fold(u, v) || is_fold(minus(away, shared), minus(beyond, shared));
             }
         }
     }
@@ -244,6 +245,7 @@ mod tests {
             !conflicts(&[bent, Strand::new(1, &line, [0.0; 2], end)]).is_empty()
         };
         assert!(of(0.01), "crosses a tenth of a pitch on");
+        assert!(of(0.067), "crosses where the first chord ends");
         assert!(!of(-0.2), "leaves to the other side");
     }
 
