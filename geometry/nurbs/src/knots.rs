@@ -1,7 +1,7 @@
 //! Knot vectors and the B-spline basis.
 
 /// Highest degree for which the basis is offered.
-pub const MAX_DEGREE: usize = 7;
+pub const MAX_DEGREE: usize = 9;
 
 /// Values of the basis functions that do not vanish at a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
