@@ -28,7 +28,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("faces", &["range-image", "shapes"]),
     ("regularize", &["shapes"]),
     ("reconstruct", &["nurbs", "range-image", "shapes"]),
-    ("cad-exchange", &["nurbs", "reconstruct", "shapes"]),
+    ("solids", &["nurbs"]),
+    (
+        "cad-exchange",
+        &["nurbs", "reconstruct", "shapes", "solids"],
+    ),
     (
         "tessellate",
         &["nurbs", "range-image", "reconstruct", "shapes"],
@@ -126,7 +130,7 @@ const DAEMON: [&str; 15] = [
     "storage",
 ];
 
-const COMMAND_LINE: [&str; 17] = [
+const COMMAND_LINE: [&str; 18] = [
     "cad-exchange",
     "compare",
     "deliverables",
@@ -143,6 +147,7 @@ const COMMAND_LINE: [&str; 17] = [
     "segment",
     "shapes",
     "sim-scanner",
+    "solids",
     "storage",
 ];
 

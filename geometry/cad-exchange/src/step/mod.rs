@@ -11,7 +11,7 @@ mod write;
 
 pub use read::{
     MAX_FILE_BYTES, ReadError, StepEdge, StepEdgeUse, StepFace, StepFrame, StepModel, StepSurface,
-    read_model,
+    read_body, read_model,
 };
 pub use write::{
     DEFAULT_PALETTE, FaceDefect, LengthUnit, Schema, Summary, WriteError, WriteOptions, write,

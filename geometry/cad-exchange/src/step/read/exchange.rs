@@ -21,6 +21,8 @@ struct Instance<'a> {
 #[derive(Debug)]
 pub(super) struct Exchange<'a> {
     bytes: &'a [u8],
+    /// What is told of entities that are not read.
+    advice: &'static str,
     header: Vec<Part<'a>>,
     instances: BTreeMap<u64, Instance<'a>>,
 }
@@ -51,13 +53,14 @@ fn place(bytes: &[u8], at: usize) -> (usize, usize) {
 impl<'a> Exchange<'a> {
     /// # Errors
     /// [`ReadError::Form`], [`ReadError::Syntax`].
-    pub(super) fn parse(bytes: &'a [u8]) -> Result<Self, ReadError> {
+    pub(super) fn parse(bytes: &'a [u8], advice: &'static str) -> Result<Self, ReadError> {
         let mut scanner = Scanner::new(bytes);
         if !matches!(scanner.takes("ISO-10303-21;"), Ok(true)) {
             return Err(ReadError::Form);
         }
         let mut exchange = Self {
             bytes,
+            advice,
             header: Vec::new(),
             instances: BTreeMap::new(),
         };
@@ -179,7 +182,7 @@ impl<'a> Exchange<'a> {
             at,
             id,
             part.keyword,
-            format!("expected {wanted} here; only files that Relief wrote are read as models"),
+            format!("expected {wanted} here; {}", self.advice),
         ))
     }
 
@@ -258,10 +261,12 @@ impl<'a, 'b> Fields<'a, 'b> {
         }
     }
 
-    /// A number under the name of its type.
+    /// A number under the name of its type, or under none where only that one may be, as some
+    /// programs write.
     pub(super) fn measure(&mut self, keyword: &str, what: &str) -> Result<f64, ReadError> {
         match self.next(what)? {
             Value::Typed(of, value) if *of == keyword => self.number(value, what),
+            value @ (Value::Real(_) | Value::Integer(_)) => self.number(value, what),
             _ => self.no(what, keyword),
         }
     }
@@ -302,6 +307,15 @@ impl<'a, 'b> Fields<'a, 'b> {
         }
     }
 
+    /// A reference that may be left out.
+    pub(super) fn id_or_none(&mut self, what: &str) -> Result<Option<u64>, ReadError> {
+        match self.next(what)? {
+            Value::Id(id) => Ok(Some(*id)),
+            Value::Unset => Ok(None),
+            _ => self.no(what, "a reference"),
+        }
+    }
+
     fn list(&mut self, what: &str) -> Result<&'b [Value<'a>], ReadError> {
         match self.next(what)? {
             Value::List(values) => Ok(values),
@@ -330,6 +344,20 @@ impl<'a, 'b> Fields<'a, 'b> {
         rows.iter()
             .map(|row| match row {
                 Value::List(values) => self.ids_of(values, what),
+                _ => self.no(what, "a list of lists"),
+            })
+            .collect()
+    }
+
+    /// Lists of numbers, in a list.
+    pub(super) fn rows_of_reals(&mut self, what: &str) -> Result<Vec<Vec<f64>>, ReadError> {
+        let rows = self.list(what)?;
+        rows.iter()
+            .map(|row| match row {
+                Value::List(values) => values
+                    .iter()
+                    .map(|value| self.number(value, what))
+                    .collect(),
                 _ => self.no(what, "a list of lists"),
             })
             .collect()

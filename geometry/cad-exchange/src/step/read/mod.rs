@@ -11,9 +11,11 @@ mod known;
 mod model;
 mod properties;
 mod shapes;
+mod solids;
 mod syntax;
 mod text;
 
+pub use self::solids::read_body;
 pub use error::ReadError;
 pub use model::{StepEdge, StepEdgeUse, StepFace, StepFrame, StepModel, StepSurface, read_model};
 

@@ -146,7 +146,7 @@ pub enum StepSurface {
 /// and this one does not; [`ReadError::Nothing`] when there are no shells.
 pub fn read_model(source: impl Read) -> Result<StepModel, ReadError> {
     let bytes = exchange::bytes(source)?;
-    let exchange = Exchange::parse(&bytes)?;
+    let exchange = Exchange::parse(&bytes, "only files that Relief wrote are read as models")?;
     let roots = exchange.all("MANIFOLD_SURFACE_SHAPE_REPRESENTATION");
     let &[root] = roots.as_slice() else {
         return Err(ReadError::Nothing {

@@ -40,7 +40,7 @@ pub(super) fn context(exchange: &Exchange<'_>, id: u64) -> Result<Context, ReadE
 }
 
 /// Millimetres of a unit of length.
-fn length_unit(exchange: &Exchange<'_>, id: u64) -> Result<f64, ReadError> {
+pub(super) fn length_unit(exchange: &Exchange<'_>, id: u64) -> Result<f64, ReadError> {
     let conversion = exchange.fields(id, &["CONVERSION_BASED_UNIT", "SI_UNIT"])?;
     if conversion.keyword() == "SI_UNIT" {
         return si_length(exchange, id);

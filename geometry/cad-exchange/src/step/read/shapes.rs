@@ -26,7 +26,12 @@ impl Shapes<'_, '_> {
         self.triple(id, "CARTESIAN_POINT", self.unit_mm)
     }
 
-    fn triple(&self, id: u64, keyword: &'static str, unit: f64) -> Result<[f64; 3], ReadError> {
+    pub(super) fn triple(
+        &self,
+        id: u64,
+        keyword: &'static str,
+        unit: f64,
+    ) -> Result<[f64; 3], ReadError> {
         let mut fields = self.exchange.fields(id, &[keyword])?;
         fields.skip("its name")?;
         let numbers = fields.reals("its coordinates")?;
@@ -108,7 +113,11 @@ impl Shapes<'_, '_> {
     }
 
     /// A length above zero.
-    fn length_mm(&self, fields: &mut Fields<'_, '_>, what: &'static str) -> Result<f64, ReadError> {
+    pub(super) fn length_mm(
+        &self,
+        fields: &mut Fields<'_, '_>,
+        what: &'static str,
+    ) -> Result<f64, ReadError> {
         let length_mm = fields.real(what)? * self.unit_mm;
         if length_mm > 0.0 && length_mm.is_finite() {
             Ok(length_mm)
@@ -155,8 +164,7 @@ fn half_angle_rad(fields: &mut Fields<'_, '_>) -> Result<f64, ReadError> {
     }
 }
 
-/// A knot vector for so many control points. Multiplicities are held against that number
-/// before any knot is repeated.
+/// A knot vector for so many control points.
 fn knots(
     fields: &Fields<'_, '_>,
     degree: usize,
@@ -164,6 +172,19 @@ fn knots(
     multiplicities: &[usize],
     breaks: &[f64],
 ) -> Result<KnotVector, ReadError> {
+    let repeated = repeated(fields, degree, points, multiplicities, breaks)?;
+    KnotVector::new(degree, repeated).map_err(|defect| fields.defect(defect.to_string()))
+}
+
+/// Knots for so many control points, each as often as it counts. Multiplicities are held against
+/// that number before any knot is repeated.
+pub(super) fn repeated(
+    fields: &Fields<'_, '_>,
+    degree: usize,
+    points: usize,
+    multiplicities: &[usize],
+    breaks: &[f64],
+) -> Result<Vec<f64>, ReadError> {
     if degree > MAX_DEGREE {
         return Err(fields.defect(format!("a degree of {degree} is not read")));
     }
@@ -182,10 +203,8 @@ fn knots(
             "its multiplicities do not suit {points} control points of degree {degree}"
         )));
     }
-    let repeated = breaks
-        .iter()
-        .zip(multiplicities)
+    let knots = breaks.iter().zip(multiplicities);
+    Ok(knots
         .flat_map(|(&b, &m)| std::iter::repeat_n(b, m))
-        .collect();
-    KnotVector::new(degree, repeated).map_err(|defect| fields.defect(defect.to_string()))
+        .collect())
 }
