@@ -198,10 +198,16 @@ fn what_is_wrong_is_told_in_one_line() {
         "{line}"
     );
     let (_, line) = refused(b"ISO-10303-21;\nHEADER;\n", &[]);
+    assert!(line.contains("part.stl: line 3, column 1: "), "{line}");
+    assert!(line.contains("it was cut off"), "{line}");
+    let (_, line) = refused(b"ply\nformat ascii 1.0\n", &[]);
     assert!(
-        line.contains("part.stl: is a STEP file, which is not read as a nominal"),
+        line.contains("part.stl: is a PLY file, which is not read as a nominal"),
         "{line}"
     );
+    let step = include_bytes!("../../../geometry/cad-exchange/tests/solids/bracket.step");
+    let (_, line) = refused(step, &["--nominal-units", "inch"]);
+    assert!(line.contains("leave out --nominal-units"), "{line}");
     let (_, line) = refused(&part, &["--nominal-units", "m"]);
     assert!(line.contains("probably not in millimetres"), "{line}");
     let (vertices, facets) = block(&[]);
@@ -232,4 +238,33 @@ fn what_is_wrong_is_told_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let missing = relief(folder.path(), &["compare", "a.xyz", "none.stl"]);
     assert!(told(&missing).1.contains("cannot read none.stl"));
+}
+
+#[test]
+fn a_step_file_serves_as_nominal() {
+    let step = include_bytes!("../../../geometry/cad-exchange/tests/solids/bracket-inch.step");
+    let body = cad_exchange::step::read_body(&step[..]).unwrap();
+    let settings = solids::FacetSettings {
+        tolerance_mm: 0.01,
+        most: 1_000_000,
+    };
+    let facets = solids::facets(&body, &settings).unwrap();
+    let points = facets.points_mm.iter().map(|p| [p.x, p.y, p.z]);
+    let part = (points.collect(), facets.triangles);
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("bracket.step"), step).unwrap();
+    let lifted = moved(&part, &Pose::new([0.0; 3], [0.0, 0.0, 0.2]));
+    write_scan(&folder.path().join("good.xyz"), &part, 5);
+    write_scan(&folder.path().join("lifted.xyz"), &lifted, 5);
+    let held = |scan: &str| {
+        let options = ["--align", "as-placed", "--tolerance-mm", "0.1", "--json"];
+        let words = [&["compare", scan, "bracket.step"], &options[..]].concat();
+        relief(folder.path(), &words)
+    };
+    let good = held("good.xyz");
+    assert_eq!(good.status.code(), Some(0), "{:?}", told(&good));
+    assert_eq!(json(&good)["passed"], true);
+    let lifted = held("lifted.xyz");
+    assert_eq!(lifted.status.code(), Some(1), "{:?}", told(&lifted));
+    assert_eq!(json(&lifted)["passed"], false);
 }

@@ -12,18 +12,18 @@ use crate::failure::Failure;
 
 /// Hold a scan against its nominal, without a service
 ///
-/// Reads a scan file as `convert` does, and the nominal from an STL file in millimetres. The scan
-/// is brought onto the nominal by best fit, from wherever it lies, or compared as placed; its
-/// deviations are distances along the nominal's normals, positive where there is more material.
-/// What lies significantly beyond the tolerance is told with place, size and depth. Exit code 0
-/// when there is nothing, 1 when there is, or when it did not succeed.
+/// Reads a scan file as `convert` does, and the nominal from a STEP file, or from an STL file in
+/// millimetres. The scan is brought onto the nominal by best fit, from wherever it lies, or compared
+/// as placed; its deviations are distances along the nominal's normals, positive where there is
+/// more material. What lies significantly beyond the tolerance is told with place, size and depth.
+/// Exit code 0 when there is nothing, 1 when there is, or when it did not succeed.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The scan file
     #[arg(value_name = "SCAN")]
     pub(super) scan: PathBuf,
-    /// The nominal: an STL file, seen from +z as the scan is
-    #[arg(value_name = "NOMINAL.stl")]
+    /// The nominal: a STEP or STL file of the part, seen from +z as the scan is
+    #[arg(value_name = "NOMINAL.step|NOMINAL.stl")]
     pub(super) nominal: PathBuf,
     /// Bring the scan onto the nominal by best fit, or compare both as placed
     #[arg(long, value_name = "HOW", value_enum, default_value_t = AlignName::BestFit)]
@@ -74,9 +74,10 @@ pub(crate) struct Args {
     /// Unit of the coordinates in the scan file; default: millimetres, or what the file says
     #[arg(long, value_name = "UNIT", value_enum)]
     units: Option<UnitName>,
-    /// Unit of the coordinates in the nominal's file, which does not say
-    #[arg(long, value_name = "UNIT", value_enum, default_value_t = UnitName::Mm)]
-    nominal_units: UnitName,
+    /// Unit of the coordinates in the nominal's file if that is STL, which does not say; default:
+    /// millimetres
+    #[arg(long, value_name = "UNIT", value_enum)]
+    nominal_units: Option<UnitName>,
     /// Ignore samples with x outside of these limits, millimetres; one may be left out, as
     /// in `-50,`
     #[arg(long, value_name = "MIN,MAX", value_parser = limits, allow_hyphen_values = true)]
@@ -117,13 +118,13 @@ impl Args {
         })
     }
 
-    /// Millimetres in a unit of the nominal's file.
-    pub(super) fn nominal_unit_mm(&self) -> f64 {
-        match self.nominal_units {
+    /// Millimetres in a unit of the nominal's file, where that is said.
+    pub(super) fn nominal_unit_mm(&self) -> Option<f64> {
+        self.nominal_units.map(|units| match units {
             UnitName::Mm => 1.0,
             UnitName::M => 1000.0,
             UnitName::Inch => 25.4,
-        }
+        })
     }
 
     /// How the scan is compared.

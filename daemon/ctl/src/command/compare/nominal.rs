@@ -5,22 +5,32 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
+use cad_exchange::step;
 use compare::{FACETS_MAX, Nominal, NominalError};
+use solids::FacetSettings;
 
 use crate::failure::Failure;
 
 /// Length of a binary file's header, its count of facets included, and of each facet.
 const HEADER_BYTES: u64 = 84;
 const FACET_BYTES: u64 = 50;
+/// How a STEP file begins, and how far triangles may lie from its surfaces: a hundredth of what the
+/// finest scanners tell.
+const STEP: &[u8] = b"ISO-10303-21";
+const CHORD_MM: f64 = 0.001;
+/// Coarsest that they may be where there would be too many, and how much coarser at a time.
+const COARSEST_MM: f64 = 0.02;
+const COARSER: f64 = 3.0;
 /// Longest file: twice as long as the longest text with the most facets.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// Reads an STL file, text or binary, with lengths of `unit_mm`.
-pub(super) fn read(path: &Path, unit_mm: f64) -> Result<Nominal, Failure> {
+/// Reads a STEP file, which has its own unit, or an STL file, text or binary, whose lengths are of
+/// `unit_mm`, millimetres where that is not said.
+pub(super) fn read(path: &Path, unit_mm: Option<f64>) -> Result<Nominal, Failure> {
     let name = path.display().to_string();
     let failed = |why: &str| Failure::Failed(format!("{name}: {why}"));
     if path.is_dir() {
-        return Err(failed("is a directory; name an STL file in it"));
+        return Err(failed("is a directory; name a STEP or STL file in it"));
     }
     let cannot = |error| Failure::at(format!("cannot read {name}"), &error);
     let file = File::open(path).map_err(cannot)?;
@@ -40,12 +50,22 @@ pub(super) fn read(path: &Path, unit_mm: f64) -> Result<Nominal, Failure> {
     if head.is_empty() {
         return Err(failed("is empty"));
     }
+    if head.trim_ascii_start().starts_with(STEP) {
+        if unit_mm.is_some() {
+            return Err(failed(
+                "is a STEP file, which says in what unit it is: leave out --nominal-units",
+            ));
+        }
+        source.rewind().map_err(cannot)?;
+        return of_solids(&mut source).map_err(|why| failed(&why));
+    }
     if let Some(format) = other_format(&head) {
         return Err(failed(&format!(
-            "is {format}, which is not read as a nominal; only STL is: export the model as STL, \
-             with a chord error well below the tolerance"
+            "is {format}, which is not read as a nominal; only STEP and STL are: export the model \
+             as STEP, or as STL with a chord error well below the tolerance"
         )));
     }
+    let unit_mm = unit_mm.unwrap_or(1.0);
     let is_text = head.trim_ascii_start().starts_with(b"solid") && !is_binary(&head, bytes);
     let mut solid = if is_text {
         source.rewind().map_err(cannot)?;
@@ -63,6 +83,26 @@ pub(super) fn read(path: &Path, unit_mm: f64) -> Result<Nominal, Failure> {
         NominalError::Empty => failed("holds no facet"),
         other => failed(&other.to_string()),
     })
+}
+
+/// The faces of a STEP file.
+fn of_solids(source: &mut impl Read) -> Result<Nominal, String> {
+    let body = step::read_body(source).map_err(|error| error.to_string())?;
+    let mut tolerance_mm = CHORD_MM;
+    let facets = loop {
+        let settings = FacetSettings {
+            tolerance_mm,
+            most: FACETS_MAX,
+        };
+        match solids::facets(&body, &settings) {
+            Err(solids::BodyError::TooMany { .. }) if tolerance_mm < COARSEST_MM => {
+                tolerance_mm *= COARSER;
+            }
+            done => break done.map_err(|error| error.to_string())?,
+        }
+    };
+    let points: Vec<[f64; 3]> = facets.points_mm.iter().map(|p| [p.x, p.y, p.z]).collect();
+    Nominal::new(&points, &facets.triangles).map_err(|error| error.to_string())
 }
 
 /// Whether the number of facets fits the file's length: some binary files begin with `solid`, too.
@@ -171,8 +211,7 @@ fn facets(source: &mut (impl Read + Seek), unit_mm: f64) -> Result<Indexed, Stri
 fn other_format(head: &[u8]) -> Option<&'static str> {
     let text = head.trim_ascii_start();
     let is_iges = head.get(72) == Some(&b'S') && head.get(73..80).is_some_and(is_number);
-    let known: [(&[u8], &str); 7] = [
-        (b"ISO-10303-21", "a STEP file"),
+    let known: [(&[u8], &str); 6] = [
         (b"ply", "a PLY file"),
         (b"PK\x03\x04", "a ZIP archive or 3MF file"),
         (b"\x1f\x8b", "compressed with gzip"),
@@ -200,7 +239,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("part.stl");
         std::fs::write(&path, content).unwrap();
-        match read(&path, 1.0) {
+        match read(&path, None) {
             Ok(nominal) => format!(
                 "{} facets; {}",
                 nominal.facets(),
@@ -263,7 +302,12 @@ mod tests {
         assert!(turned.contains("(0.500, 0.500, 0.000) mm"), "{turned}");
         let endless = told(&text(&[[a, b, [f64::INFINITY; 3]]]));
         assert!(endless.contains("facet 1"), "{endless}");
-        assert!(told(b"ISO-10303-21;\nHEADER;").contains("is a STEP file, which is not read"));
+        let cut = told(b"ISO-10303-21;\nHEADER;");
+        assert!(
+            cut.contains("line 2, column 8: the file ends") || cut.contains("cut off"),
+            "{cut}"
+        );
+        assert!(told(b"ply\nformat").contains("is a PLY file, which is not read as a nominal"));
         let mut binary = vec![0; 84];
         binary[80] = 3;
         assert!(told(&binary).contains("announces 3 facets, which take 234 bytes; there are 84"));
