@@ -56,6 +56,28 @@ pub fn iges(data: &[u8]) {
     }
 }
 
+/// A STEP file, of this writer's own or as a nominal of any program's.
+pub fn step(data: &[u8]) {
+    if let Err(error) = cad_exchange::step::read_model(data) {
+        told(&error.to_string());
+    }
+    let settings = solids::FacetSettings {
+        tolerance_mm: 0.5,
+        most: 2_000,
+    };
+    match cad_exchange::step::read_body(data) {
+        Ok(body) => match solids::facets(&body, &settings) {
+            Ok(facets) => {
+                let points = facets.points_mm.len();
+                assert!(facets.triangles.len() <= settings.most);
+                assert!(facets.triangles.iter().flatten().all(|k| *k < points));
+            }
+            Err(error) => told(&error.to_string()),
+        },
+        Err(error) => told(&error.to_string()),
+    }
+}
+
 fn read_iges(data: &[u8]) {
     match cad_exchange::iges::read_points(data) {
         Ok(points) => assert!(points.iter().flatten().all(|c| c.is_finite())),

@@ -8,7 +8,7 @@ mod files;
 mod http;
 mod line;
 
-pub use files::{config, iges, journal, laid_out, ply, scan_file};
+pub use files::{config, iges, journal, laid_out, ply, scan_file, step};
 pub use http::{http, reply};
 pub use line::{protocol, session};
 
@@ -16,7 +16,7 @@ pub use line::{protocol, session};
 pub type Target = fn(&[u8]);
 
 /// All targets, by the names of their folders in `seeds` and `finds`.
-pub const TARGETS: [(&str, Target); 8] = [
+pub const TARGETS: [(&str, Target); 9] = [
     ("config", config),
     ("http", http),
     ("iges", iges),
@@ -25,4 +25,5 @@ pub const TARGETS: [(&str, Target); 8] = [
     ("protocol", protocol),
     ("scan_file", scan_file),
     ("session", session),
+    ("step", step),
 ];

@@ -12,7 +12,7 @@ use clap::Args;
 use crate::{apt, shell};
 
 /// All of them, in the order of `fuzz/src/lib.rs`.
-const TARGETS: [&str; 8] = [
+const TARGETS: [&str; 9] = [
     "config",
     "http",
     "iges",
@@ -21,6 +21,7 @@ const TARGETS: [&str; 8] = [
     "protocol",
     "scan_file",
     "session",
+    "step",
 ];
 /// The longest input: enough for every format to show all it has, and for the limits of its
 /// parts.
