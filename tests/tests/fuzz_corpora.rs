@@ -66,6 +66,11 @@ fn seeds_lead_somewhere() {
         assert!(points.len() >= 8, "{name}: {}", points.len());
     }
     cad_exchange::iges::read_model(&*read("iges", "model-128")).unwrap();
+    for (name, faces) in [("drum-inch", 3), ("vase", 8)] {
+        let body = cad_exchange::step::read_body(&*read("step", name)).unwrap();
+        assert_eq!(body.faces.len(), faces, "{name}");
+    }
+    cad_exchange::step::read_model(&*read("step", "own")).unwrap();
     // Bare contents come to the same file.
     let bare = |name: &str| relief_fuzz::laid_out(&read("iges", name)[1..]);
     for kind in ["points-106", "points-116"] {
