@@ -9,6 +9,22 @@ use crate::{Body, Face};
 /// The body with such faces mended.
 pub(crate) fn oriented(body: &Body) -> Body {
     let mut body = body.clone();
+    // Each time the face that is wrong along the most edges: its neighbours may be right then.
+    for _ in 0..body.faces.len() {
+        let shared = shared(&body).into_iter().enumerate();
+        let wrong = shared.filter(|(_, [right, wrong])| *right == 0 && *wrong > 0);
+        let Some((face, _)) =
+            wrong.max_by_key(|(face, [_, wrong])| (*wrong, core::cmp::Reverse(*face)))
+        else {
+            break;
+        };
+        turn(&mut body.faces[face]);
+    }
+    body
+}
+
+/// Of each face how many of its edges another one runs along the other way, and the same way.
+fn shared(body: &Body) -> Vec<[usize; 2]> {
     let mut uses: Vec<Vec<(usize, bool)>> = vec![Vec::new(); body.edges.len()];
     for (k, face) in body.faces.iter().enumerate() {
         for use_ in face.loops.iter().flatten() {
@@ -17,7 +33,6 @@ pub(crate) fn oriented(body: &Body) -> Body {
             }
         }
     }
-    // Edges that two faces share, by whether they run along it the same way.
     let mut shared: Vec<[usize; 2]> = vec![[0; 2]; body.faces.len()];
     for of_edge in &uses {
         if let [(a, a_is_reversed), (b, b_is_reversed)] = of_edge.as_slice()
@@ -28,12 +43,7 @@ pub(crate) fn oriented(body: &Body) -> Body {
             shared[*b][is_wrong] += 1;
         }
     }
-    for (face, [right, wrong]) in body.faces.iter_mut().zip(shared) {
-        if right == 0 && wrong > 0 {
-            turn(face);
-        }
-    }
-    body
+    shared
 }
 
 fn turn(face: &mut Face) {

@@ -169,6 +169,24 @@ fn what_is_inside_out_is_turned_by_its_senses() {
 }
 
 #[test]
+fn a_face_that_runs_the_wrong_way_round_is_turned_by_its_neighbours() {
+    for wrong in [0, 1] {
+        let mut body = drum(true);
+        for border in &mut body.faces[wrong].loops {
+            border.reverse();
+            border
+                .iter_mut()
+                .for_each(|use_| use_.is_reversed = !use_.is_reversed);
+        }
+        if wrong == 1 {
+            body.faces[wrong].same_sense = true;
+        }
+        let (_, volume) = measured(&made(&body));
+        assert!(near(volume, PI * 25.0 * 8.0), "{wrong}: {volume}");
+    }
+}
+
+#[test]
 fn whole_spheres_and_tori_need_no_loop() {
     let sphere = Surface::Sphere {
         frame: frame(),
