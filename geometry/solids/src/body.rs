@@ -80,6 +80,14 @@ pub enum BodyError {
         /// What is wrong with them.
         reason: &'static str,
     },
+    /// Triangles do not come as near to a surface as they should.
+    #[error("{face}: its surface bends too sharply for triangles within {tolerance_mm} mm of it")]
+    Bends {
+        /// Name of the face.
+        face: String,
+        /// What was asked for.
+        tolerance_mm: f64,
+    },
     /// More than are wanted.
     #[error("more than {most} triangles: ask for a greater tolerance")]
     TooMany {

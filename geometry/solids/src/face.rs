@@ -1,6 +1,6 @@
 //! A face filled with triangles.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation, mitigate_underflow};
@@ -10,8 +10,6 @@ use crate::{BodyError, Face, Point};
 
 type Plane = ConstrainedDelaunayTriangulation<Point2<f64>>;
 
-/// Rounds in which points are put where the surface bends.
-const ROUNDS: usize = 48;
 /// Places along each parameter at which it is asked how much the surface bends, the share of its
 /// extent over which, and the chords that it is worth if it does not.
 const PROBES: usize = 4;
@@ -57,20 +55,30 @@ pub(crate) fn fill(
     most: usize,
 ) -> Result<Vec<[usize; 3]>, BodyError> {
     let mut filling = Filling::new(face, chart, tolerance_mm)?;
-    let mut triangles = filling.inside()?;
-    for _ in 0..ROUNDS {
-        let wanted = filling.bends(&triangles, tolerance_mm);
+    let mut unseen = filling.inside()?;
+    loop {
+        let wanted = filling.bends(&unseen, tolerance_mm);
         if wanted.is_empty() {
             break;
         }
+        let known = filling.spots.len();
         for place in wanted {
             filling.insert(place, None)?;
         }
         if filling.spots.len() > most {
             return Err(BodyError::TooMany { most });
         }
-        triangles = filling.inside()?;
+        if filling.spots.len() == known {
+            // So near to each other are points that no number lies between them.
+            return Err(BodyError::Bends {
+                face: face.name.clone(),
+                tolerance_mm,
+            });
+        }
+        // A point inside a face has made just the triangles around it.
+        unseen = filling.around(known);
     }
+    let triangles = filling.inside()?;
     Ok(filling.in_space(&triangles, points_mm))
 }
 
@@ -219,6 +227,23 @@ impl<'a> Filling<'a> {
         Ok(inside
             .map(|face| face.vertices().map(|v| v.fix().index()))
             .collect())
+    }
+
+    /// The triangles around the spots from this one on.
+    fn around(&self, first: usize) -> Vec<[usize; 3]> {
+        let mut around = BTreeSet::new();
+        for spot in first..self.spots.len() {
+            let handle = FixedVertexHandle::from_index(spot);
+            for edge in self.plane.vertex(handle).out_edges() {
+                if let Some(triangle) = edge.face().as_inner() {
+                    around.insert((
+                        triangle.fix().index(),
+                        triangle.vertices().map(|v| v.fix().index()),
+                    ));
+                }
+            }
+        }
+        around.into_iter().map(|(_, corners)| corners).collect()
     }
 
     /// Pairs of spots beside each other along a cut, with the pair at its other border.
