@@ -1,7 +1,8 @@
 //! STEP: clear text encoding (ISO 10303-21) of application protocols 242 and 214.
 //!
 //! [`write()`] turns a [`reconstruct::Model`] into shells of trimmed faces that share
-//! their edges and vertices; [`read_model`] reads back what [`write()`] writes.
+//! their edges and vertices; [`read_model`] reads back what [`write()`] writes, and [`read_body`] the
+//! faces of solids and shells that any program wrote.
 //!
 //! A scan sees a part from one side, so its faces never close: they become open shells
 //! (`SHELL_BASED_SURFACE_MODEL`, ISO 10303-42, 6.4.26), and no solid is written.

@@ -303,10 +303,8 @@ mod tests {
         let endless = told(&text(&[[a, b, [f64::INFINITY; 3]]]));
         assert!(endless.contains("facet 1"), "{endless}");
         let cut = told(b"ISO-10303-21;\nHEADER;");
-        assert!(
-            cut.contains("line 2, column 8: the file ends") || cut.contains("cut off"),
-            "{cut}"
-        );
+        assert!(cut.contains("line 2, column 8: "), "{cut}");
+        assert!(cut.contains("it was cut off"), "{cut}");
         assert!(told(b"ply\nformat").contains("is a PLY file, which is not read as a nominal"));
         let mut binary = vec![0; 84];
         binary[80] = 3;

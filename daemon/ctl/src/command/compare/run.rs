@@ -234,7 +234,10 @@ fn refused(args: &Args, error: &CompareError) -> Failure {
     let (scan, nominal) = (args.scan.display(), args.nominal.display());
     let hint = match error {
         CompareError::Cancelled(_) => return Failure::Interrupted,
-        CompareError::Units { .. } => "say so with --nominal-units, or with --units for the scan",
+        CompareError::Units { .. } => {
+            "say so with --units for the scan or, where the nominal is an STL file, with \
+             --nominal-units"
+        }
         CompareError::NoOverlap { .. } => {
             "both must be in one frame, x along the table, y up, z towards the camera; else leave \
              --align at best-fit"
