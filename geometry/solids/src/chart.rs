@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::division::Division;
 use crate::inverse::{Inverse, Place};
-use crate::{Body, BodyError, EdgeUse, Face};
+use crate::{Body, BodyError, EdgeUse, Face, wrapped};
 
 /// How far, millimetres, edges may leave their faces: files of coarse tolerances have 0.01.
 const OFF_MM: f64 = 0.05;
@@ -28,11 +28,7 @@ pub(crate) struct Cut {
 
 impl Cut {
     fn unrolled(&self, value: f64) -> f64 {
-        let turned = libm::fmod(
-            libm::fmod(value - self.at, self.period) + self.period,
-            self.period,
-        );
-        self.at + turned
+        wrapped(value, self.at, self.period)
     }
 
     fn is_on(&self, value: f64) -> bool {
@@ -137,9 +133,7 @@ impl<'a> Located<'a> {
         }
         Ok(Some([from, to]))
     }
-}
 
-impl Located<'_> {
     /// A parameter of both ends as each end has it alone, but for what is free there.
     fn own(&self, points: [usize; 2], axis: usize, ends: [f64; 2]) -> [f64; 2] {
         let of = |point: usize| {

@@ -3,7 +3,7 @@
 use core::f64::consts::TAU;
 
 use crate::spline::SplineCurve;
-use crate::{Frame, Point};
+use crate::{Frame, Point, wrapped};
 
 /// A curve in space.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,8 +49,7 @@ impl Curve {
                 if (first..=last).contains(&t) {
                     spline.at(t)
                 } else {
-                    let width = last - first;
-                    spline.at(first + libm::fmod(libm::fmod(t - first, width) + width, width))
+                    spline.at(wrapped(t, first, last - first))
                 }
             }
         }

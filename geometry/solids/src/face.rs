@@ -6,6 +6,7 @@ use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation, mitigate_underflow};
 
 use crate::chart::Chart;
+use crate::inverse::STILL;
 use crate::{BodyError, Face, Point};
 
 type Plane = ConstrainedDelaunayTriangulation<Point2<f64>>;
@@ -341,8 +342,9 @@ impl<'a> Filling<'a> {
     /// Triangles between points in space.
     fn in_space(&self, triangles: &[[usize; 3]], points_mm: &mut Vec<Point>) -> Vec<[usize; 3]> {
         let mut of_spots: Vec<Option<usize>> = self.spots.iter().map(|spot| spot.point).collect();
-        // Points of the face in one place, by that place.
-        let mut shared: Vec<(Point, usize)> = Vec::new();
+        // Points that several spots have, as at a pole: those of edges may be such.
+        let of_edges = self.chart.sides.iter().flat_map(|side| side.points);
+        let mut poles: Vec<usize> = of_edges.collect();
         let mut on_border: BTreeMap<[u64; 2], usize> = BTreeMap::new();
         let mut found = Vec::with_capacity(triangles.len());
         for triangle in triangles {
@@ -350,7 +352,7 @@ impl<'a> Filling<'a> {
                 if let Some(point) = of_spots[spot] {
                     return point;
                 }
-                let point = self.new_point(spot, points_mm, &mut shared, &mut on_border);
+                let point = self.new_point(spot, points_mm, &mut poles, &mut on_border);
                 of_spots[spot] = Some(point);
                 point
             });
@@ -370,32 +372,19 @@ impl<'a> Filling<'a> {
         &self,
         spot: usize,
         points_mm: &mut Vec<Point>,
-        shared: &mut Vec<(Point, usize)>,
+        poles: &mut Vec<usize>,
         on_border: &mut BTreeMap<[u64; 2], usize>,
     ) -> usize {
         let place = self.spots[spot].place;
         let (at_mm, along) = self.face.surface.at(place);
-        let mut add = || {
-            points_mm.push(at_mm);
-            points_mm.len() - 1
-        };
         let speed = along.map(|d| d.norm());
-        if speed[0].min(speed[1]) <= 1e-9 * speed[0].max(speed[1]) {
-            if shared.is_empty() {
-                let known = self.chart.sides.iter().flat_map(|side| side.points);
-                let known: Vec<usize> = known.collect();
-                shared.extend(known.into_iter().map(|point| (Point::zeros(), point)));
-            }
-            let near = shared.iter().find(|(_, point)| {
-                points_mm
-                    .get(*point)
-                    .is_some_and(|p| (p - at_mm).norm() <= POLE_MM)
-            });
-            if let Some((_, point)) = near {
+        if speed[0].min(speed[1]) <= STILL * speed[0].max(speed[1]) {
+            let near = |point: &&usize| (points_mm[**point] - at_mm).norm() <= POLE_MM;
+            if let Some(point) = poles.iter().find(near) {
                 return *point;
             }
             points_mm.push(at_mm);
-            shared.push((at_mm, points_mm.len() - 1));
+            poles.push(points_mm.len() - 1);
             return points_mm.len() - 1;
         }
         let mut folded = place;
@@ -408,6 +397,10 @@ impl<'a> Filling<'a> {
                 }
             }
         }
+        let mut add = || {
+            points_mm.push(at_mm);
+            points_mm.len() - 1
+        };
         if is_on_border {
             *on_border
                 .entry(folded.map(f64::to_bits))

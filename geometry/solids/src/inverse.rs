@@ -2,7 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use crate::{Curve, Frame, Point, Surface};
+use crate::{Curve, Frame, Point, Surface, wrapped};
 
 /// Rounds of Newton's method, and halvings of a step that leads away.
 const ROUNDS: usize = 30;
@@ -15,7 +15,7 @@ const BEGINNINGS: usize = 5;
 /// How near, millimetres, is near enough.
 const NEAR_MM: f64 = 1e-6;
 /// Derivative, as a share of the other one, at which a parameter tells nothing.
-const STILL: f64 = 1e-6;
+pub(crate) const STILL: f64 = 1e-6;
 
 /// A point's parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -200,9 +200,7 @@ impl<'a> Inverse<'a> {
                 [0, 1].map(|axis| {
                     let next = at[axis] + share * step[axis];
                     match (domain[axis], periods[axis]) {
-                        (Some((first, _)), Some(period)) => {
-                            first + libm::fmod(libm::fmod(next - first, period) + period, period)
-                        }
+                        (Some((first, _)), Some(period)) => wrapped(next, first, period),
                         (Some((first, last)), None) => next.clamp(first, last),
                         (None, _) => next,
                     }

@@ -27,5 +27,10 @@ pub use facets::{FacetSettings, Facets, facets};
 pub use spline::{Knots, SplineCurve, SplineSurface};
 pub use surface::{Frame, Surface};
 
+/// What a value that comes again after a period is from `first` on.
+fn wrapped(value: f64, first: f64, period: f64) -> f64 {
+    first + libm::fmod(libm::fmod(value - first, period) + period, period)
+}
+
 /// A point or direction in space, millimetres.
 pub type Point = nalgebra::Vector3<f64>;
