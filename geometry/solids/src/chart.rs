@@ -213,7 +213,8 @@ pub(crate) fn prepare(
     Ok(cuts)
 }
 
-/// Where loops leave the widest gap, else where one of them begins.
+/// Amid the widest gap that loops leave, so that none needs a point there; else where some chord
+/// begins.
 fn choose(
     located: &mut Located<'_>,
     division: &Division,
@@ -250,37 +251,9 @@ fn choose(
     let at = if widest.0 > GAP * period {
         widest.1
     } else {
-        seam(located, division, axis)?.unwrap_or(first)
+        first
     };
     Ok(Cut { at, period })
-}
-
-/// Where an edge that a loop runs along both ways lies, if it is such a cut itself.
-fn seam(
-    located: &mut Located<'_>,
-    division: &Division,
-    axis: usize,
-) -> Result<Option<f64>, BodyError> {
-    let uses: Vec<EdgeUse> = located.face.loops.iter().flatten().copied().collect();
-    for (k, use_) in uses.iter().enumerate() {
-        let is_twice = uses[..k].iter().any(|other| other.edge == use_.edge);
-        if !is_twice {
-            continue;
-        }
-        let count = division.chains[use_.edge].len();
-        let mut lies = Vec::new();
-        for chord in (0..count - 1).map(|k| (*use_, k)) {
-            if let Some([a, b]) = located.ends(division, links(division, chord))? {
-                lies.extend([a[axis], b[axis]]);
-            }
-        }
-        if let Some(&first) = lies.first()
-            && lies.iter().all(|at| (at - first).abs() < 1e-6)
-        {
-            return Ok(Some(first));
-        }
-    }
-    Ok(None)
 }
 
 /// Puts points where edges cross a cut.

@@ -181,7 +181,6 @@ impl<'a> Filling<'a> {
                 }
             }
         }
-        let across = self.across_cuts();
         // A surface without a border is a face as a whole.
         if waiting.is_empty() {
             let triangles = self.plane.inner_faces();
@@ -202,22 +201,11 @@ impl<'a> Filling<'a> {
                 if self.sides.get(&key).is_some_and(|net| *net != 0) {
                     continue;
                 }
-                let beyond = match edge.rev().face().as_inner() {
-                    Some(triangle) => Some(triangle.fix()),
-                    None => across.get(&key).and_then(|other| {
-                        let other = other.map(FixedVertexHandle::from_index);
-                        let edge = self.plane.get_edge_from_neighbors(other[0], other[1])?;
-                        let sides = [edge.face(), edge.rev().face()];
-                        sides
-                            .iter()
-                            .find_map(|face| face.as_inner())
-                            .map(|t| t.fix())
-                    }),
-                };
-                if let Some(beyond) = beyond
-                    && known[beyond.index()] != side
+                // Whatever lies at the other border of a cut has sides of its own that tell.
+                if let Some(beyond) = edge.rev().face().as_inner()
+                    && known[beyond.fix().index()] != side
                 {
-                    waiting.push((beyond, side));
+                    waiting.push((beyond.fix(), side));
                 }
             }
         }
@@ -245,31 +233,6 @@ impl<'a> Filling<'a> {
             }
         }
         around.into_iter().map(|(_, corners)| corners).collect()
-    }
-
-    /// Pairs of spots beside each other along a cut, with the pair at its other border.
-    fn across_cuts(&self) -> BTreeMap<[usize; 2], [usize; 2]> {
-        let mut across = BTreeMap::new();
-        for axis in 0..2 {
-            let Some(cut) = self.chart.cuts[axis] else {
-                continue;
-            };
-            let borders = [cut.at, cut.at + cut.period].map(|border| {
-                let on = self.spots.iter().enumerate();
-                let on = on.filter(|(_, spot)| spot.place[axis] == border);
-                let mut on: Vec<(f64, usize)> =
-                    on.map(|(k, spot)| (spot.place[1 - axis], k)).collect();
-                on.sort_by(|a, b| a.0.total_cmp(&b.0));
-                on
-            });
-            for (a, b) in borders[0].windows(2).zip(borders[1].windows(2)) {
-                let pair =
-                    |ends: &[(f64, usize)]| [ends[0].1.min(ends[1].1), ends[0].1.max(ends[1].1)];
-                across.insert(pair(a), pair(b));
-                across.insert(pair(b), pair(a));
-            }
-        }
-        across
     }
 
     /// Places at which triangles are farther from the surface than allowed.
