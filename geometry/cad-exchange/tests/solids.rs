@@ -74,6 +74,31 @@ fn turned_and_swept_splines_close() {
 }
 
 #[test]
+fn angles_in_degrees_are_taken_as_such() {
+    let radians = "( NAMED_UNIT(*) PLANE_ANGLE_UNIT() SI_UNIT($,.RADIAN.) );";
+    let degrees = "( CONVERSION_BASED_UNIT('DEGREE',#99998) NAMED_UNIT(*) PLANE_ANGLE_UNIT() );
+#99998 = PLANE_ANGLE_MEASURE_WITH_UNIT(PLANE_ANGLE_MEASURE(1.745329251994E-02),#99999);
+#99999 = ( NAMED_UNIT(*) PLANE_ANGLE_UNIT() SI_UNIT($,.RADIAN.) );";
+    let text = text("bracket");
+    let text = text
+        .replace("2.,0.404891786285", "2.,23.19859051365")
+        .replace(radians, degrees);
+    assert!(text.contains("DEGREE") && text.contains("23.19"));
+    let (volume, area) = measured(&made(&text));
+    assert!((volume - BRACKET.0).abs() < 0.5 && (area - BRACKET.1).abs() < 0.5);
+}
+
+#[test]
+fn a_shell_turned_inside_out_is_a_void() {
+    let text = text("bracket").replace(
+        "MANIFOLD_SOLID_BREP('',#16);",
+        "MANIFOLD_SOLID_BREP('',#99999);\n#99999 = ORIENTED_CLOSED_SHELL('',*,#16,.F.);",
+    );
+    let (volume, _) = measured(&made(&text));
+    assert!((volume + BRACKET.0).abs() < 0.5, "{volume}");
+}
+
+#[test]
 fn shells_of_this_writer_are_read_as_well() {
     let path = format!("{}/tests/golden", env!("CARGO_MANIFEST_DIR"));
     let mut read = 0;

@@ -28,8 +28,6 @@ pub enum Curve {
 
 /// Rounds of Newton's method for the parameter of a point.
 const ROUNDS: usize = 20;
-/// Parameters looked at in each span of a spline before that.
-const PER_SPAN: usize = 8;
 
 impl Curve {
     /// The point at a parameter, and the derivative there.
@@ -120,13 +118,11 @@ impl Curve {
                 self.improved(angle, point_mm)
             }
             Self::Spline(spline) => {
-                let breaks = spline.breaks();
-                let places = breaks.windows(2).flat_map(|pair| {
-                    let step = (pair[1] - pair[0]) / PER_SPAN as f64;
-                    (0..=PER_SPAN).map(move |k| pair[0] + step * k as f64)
-                });
                 let off = |t: &f64| (self.at(*t).0 - point_mm).norm_squared();
-                let nearest = places.min_by(|a, b| off(a).total_cmp(&off(b)));
+                let nearest = spline
+                    .places()
+                    .into_iter()
+                    .min_by(|a, b| off(a).total_cmp(&off(b)));
                 self.improved(nearest.unwrap_or(spline.domain().0), point_mm)
             }
         }

@@ -6,6 +6,8 @@ use crate::{Body, BodyError, Edge, Point};
 const HALVINGS: u32 = 16;
 /// Places between two points of a chain at which the chord's distance from the curve is taken.
 const PROBES: [f64; 3] = [0.25, 0.5, 0.75];
+/// Where, between two points, directions are taken.
+const WITHIN: [f64; 2] = [1e-3, 1.0 - 1e-3];
 /// Cosine of the most that neighbouring chords turn (20 degrees).
 const TURN_COSINE: f64 = 0.94;
 
@@ -118,7 +120,7 @@ fn halve(
     parameters: &mut Vec<f64>,
 ) {
     let at = |share: f64| edge.curve.at(from + (to - from) * share);
-    let ((a, along_a), (b, along_b)) = (at(0.0), at(1.0));
+    let (a, b) = (at(0.0).0, at(1.0).0);
     let chord = b - a;
     let off = |share: &f64| {
         let p = at(*share).0 - a;
@@ -128,6 +130,8 @@ fn halve(
         }
     };
     let is_near = PROBES.iter().map(off).all(|off_mm| off_mm <= tolerance_mm);
+    // At a corner itself the direction is that beyond it.
+    let [along_a, along_b] = WITHIN.map(|share| at(share).1);
     let turns = along_a.dot(&along_b) < TURN_COSINE * along_a.norm() * along_b.norm();
     if left == 0 || (is_near && !turns) {
         parameters.push(to);

@@ -2,13 +2,15 @@
 
 use core::f64::consts::TAU;
 
+use crate::spline::{spread, spread_in_spans};
 use crate::{Curve, Frame, Point, Surface, wrapped};
 
 /// Rounds of Newton's method, and halvings of a step that leads away.
 const ROUNDS: usize = 30;
 const SHORTER: usize = 12;
-/// Places looked at before it in each span of a spline for each degree, along other curves, and
-/// from how many of them it begins at most: the nearest one may lie on another bend.
+/// Places looked at before it in each span of a spline surface for each degree, along curves that
+/// are no splines, and from how many of them it begins at most: the nearest one may lie on another
+/// bend.
 const PER_DEGREE: usize = 3;
 const ALONG: usize = 32;
 const BEGINNINGS: usize = 5;
@@ -29,26 +31,17 @@ pub(crate) struct Place {
 #[derive(Debug)]
 pub(crate) struct Inverse<'a> {
     surface: &'a Surface,
-    /// Of a spline some points with their parameters; of what is made by a curve, its parameters.
+    /// Of a spline some points with their parameters; of what is made by a curve, points of that.
     known: Vec<([f64; 2], Point)>,
-}
-
-fn spread(low: f64, high: f64, count: usize) -> impl Iterator<Item = f64> {
-    (0..=count).map(move |k| low + (high - low) * k as f64 / count as f64)
-}
-
-fn spread_in_spans(breaks: &[f64], degree: usize) -> Vec<f64> {
-    let spans = breaks.windows(2);
-    spans
-        .flat_map(|pair| spread(pair[0], pair[1], PER_DEGREE * degree))
-        .collect()
+    /// So many of them are beside each other along the second parameter.
+    width: usize,
 }
 
 fn spread_along(curve: &Curve) -> Vec<f64> {
     match curve {
         Curve::Line { .. } => vec![0.0],
         Curve::Ellipse { .. } => spread(0.0, TAU, ALONG).collect(),
-        Curve::Spline(spline) => spread_in_spans(&spline.breaks(), spline.degree()),
+        Curve::Spline(spline) => spline.places(),
     }
 }
 
@@ -60,10 +53,13 @@ fn around(frame: &Frame, point_mm: &Point) -> (f64, f64, f64) {
 
 impl<'a> Inverse<'a> {
     pub(crate) fn new(surface: &'a Surface) -> Self {
+        let mut width = 1;
         let known = match surface {
             Surface::Spline(spline) => {
-                let [us, vs] =
-                    [0, 1].map(|axis| spread_in_spans(&spline.breaks(axis), spline.degree(axis)));
+                let [us, vs] = [0, 1].map(|axis| {
+                    spread_in_spans(&spline.breaks(axis), PER_DEGREE * spline.degree(axis))
+                });
+                width = vs.len();
                 let places = us.iter().flat_map(|u| vs.iter().map(move |v| [*u, *v]));
                 places.map(|at| (at, spline.at(at).0)).collect()
             }
@@ -77,7 +73,11 @@ impl<'a> Inverse<'a> {
             }
             _ => Vec::new(),
         };
-        Self { surface, known }
+        Self {
+            surface,
+            known,
+            width,
+        }
     }
 
     /// The parameters of a point on the surface, or near to it.
@@ -144,24 +144,34 @@ impl<'a> Inverse<'a> {
         Place { at, is_free }
     }
 
-    /// The place nearest to a point that the known ones that are the least off lead to.
+    /// The place nearest to a point that known ones lead to, from the least off of those that are
+    /// less off than all beside them.
     fn best(
         &self,
         off: impl Fn(&Point) -> f64,
         point_mm: &Point,
         begin: impl Fn([f64; 2], &Point) -> [f64; 2],
     ) -> [f64; 2] {
-        let mut known: Vec<(f64, [f64; 2], Point)> = Vec::with_capacity(BEGINNINGS + 1);
-        for (at, p) in &self.known {
-            let off = off(p);
-            let rank = known.partition_point(|other| other.0 <= off);
-            if rank < BEGINNINGS {
-                known.insert(rank, (off, *at, *p));
-                known.truncate(BEGINNINGS);
-            }
-        }
+        let offs: Vec<f64> = self.known.iter().map(|(_, p)| off(p)).collect();
+        let is_least = |k: &usize| {
+            let column = k % self.width;
+            let before = (column > 0).then(|| k - 1);
+            let after = (column + 1 < self.width).then(|| k + 1);
+            let beside = [
+                before,
+                after,
+                k.checked_sub(self.width),
+                Some(k + self.width),
+            ];
+            let mut beside = beside.into_iter().flatten().filter_map(|j| offs.get(j));
+            beside.all(|other| offs[*k] <= *other)
+        };
+        let mut least: Vec<usize> = (0..offs.len()).filter(is_least).collect();
+        least.sort_by(|a, b| offs[*a].total_cmp(&offs[*b]));
+        least.truncate(BEGINNINGS);
         let mut best = (f64::INFINITY, [0.0; 2]);
-        for (_, at, p) in known {
+        for k in least {
+            let (at, p) = self.known[k];
             let at = self.improved(begin(at, &p), point_mm);
             let off_mm = (self.surface.at(at).0 - point_mm).norm();
             if off_mm < best.0 {
@@ -306,6 +316,28 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_point_on_a_sharp_bend_is_found() {
+        let points: Vec<Point> = (0..12)
+            .map(|k| Point::new(f64::from(k), 40.0 * f64::from(k % 2), 0.0))
+            .collect();
+        let mut values = vec![0.0; 4];
+        values.extend((1..9).map(f64::from));
+        values.extend([9.0; 4]);
+        let knots = Knots { degree: 3, values };
+        let curve = Curve::Spline(SplineCurve::new(&knots, &points, &[1.0; 12]).unwrap());
+        let surface = Surface::Swept {
+            curve,
+            along: Point::z(),
+        };
+        let inverse = Inverse::new(&surface);
+        for k in 0..400 {
+            let at = [0.01 + 0.0224 * f64::from(k), 3.0];
+            let found = inverse.place(&surface.at(at).0);
+            assert!((found.at[0] - at[0]).abs() < 1e-7, "{at:?} {found:?}");
         }
     }
 

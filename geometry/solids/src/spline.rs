@@ -5,6 +5,9 @@ use nurbs::KnotVector;
 
 use crate::Point;
 
+/// Places of a curve in each span for each degree, where it is asked which one is near.
+const PER_DEGREE: usize = 8;
+
 /// A rational B-spline curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SplineCurve {
@@ -103,6 +106,21 @@ fn clamped(
     Some((KnotVector::new(p, inner).ok()?, rows))
 }
 
+/// Values from one to another in equal steps.
+pub(crate) fn spread(low: f64, high: f64, count: usize) -> impl Iterator<Item = f64> {
+    (0..=count).map(move |k| low + (high - low) * k as f64 / count as f64)
+}
+
+/// Each break, and so many equal steps from it to the next.
+pub(crate) fn spread_in_spans(breaks: &[f64], count: usize) -> Vec<f64> {
+    let spans = breaks.windows(2);
+    let mut all: Vec<f64> = spans
+        .flat_map(|pair| spread(pair[0], pair[1], count).take(count))
+        .collect();
+    all.extend(breaks.last());
+    all
+}
+
 impl SplineCurve {
     /// `None` where numbers of knots, points and weights do not match, the knots make no spline, or
     /// a weight is not above zero.
@@ -117,8 +135,9 @@ impl SplineCurve {
         self.knots.domain()
     }
 
-    pub(crate) fn degree(&self) -> usize {
-        self.knots.degree()
+    /// Parameters that every bend has some of.
+    pub(crate) fn places(&self) -> Vec<f64> {
+        spread_in_spans(&self.knots.breaks(), PER_DEGREE * self.knots.degree())
     }
 
     pub(crate) fn breaks(&self) -> Vec<f64> {

@@ -250,6 +250,24 @@ mod tests {
     }
 
     #[test]
+    fn what_touches_a_long_arc_between_its_chords_is_found() {
+        // An arc of 400 that rises by 50: of 24 chords the middle ones lie 0.09 below it.
+        let arc = PiecewiseCubic {
+            breaks: vec![0.0, 400.0],
+            pieces: vec![[[0.0, 1.0, 0.0, 0.0], [0.0, 0.5, -0.5 / 400.0, 0.0]]],
+        };
+        let tip = |above: f64| {
+            let x = 400.0 * 11.5 / 24.0;
+            let y = arc.evaluate(x)[1] + above;
+            let spike = strand(1, &[[x, y + 3.0], [x, y]]);
+            let arc = Strand::new(0, &arc, [0.0; 2], arc.evaluate(400.0));
+            !conflicts(&[arc, spike]).is_empty()
+        };
+        assert!(tip(-0.03));
+        assert!(!tip(0.05));
+    }
+
+    #[test]
     fn a_strand_that_turns_back_is_found_and_one_that_turns_away_is_not() {
         let turning = |to: [f64; 2]| strand(2, &[[0.0, 0.0], [1.0, 0.0], to]);
         let found = |strand: Strand| !conflicts(&[strand]).is_empty();
