@@ -60,17 +60,23 @@ fn attempt(body: &Body, settings: &FacetSettings, edges_mm: f64) -> Result<Facet
     for (k, (face, cuts)) in body.faces.iter().zip(cuts).enumerate() {
         let chart = Chart::new(&division, face, cuts)?;
         let left = settings.most.saturating_sub(all.triangles.len());
-        let triangles = fill(
+        let too_many = BodyError::TooMany {
+            most: settings.most,
+        };
+        let filled = fill(
             face,
             &chart,
             &mut all.points_mm,
             settings.tolerance_mm,
             left,
-        )?;
+        );
+        let triangles = match filled {
+            // A face is told what is left for it; who asked knows the whole.
+            Err(BodyError::TooMany { .. }) => return Err(too_many),
+            filled => filled?,
+        };
         if triangles.len() > left {
-            return Err(BodyError::TooMany {
-                most: settings.most,
-            });
+            return Err(too_many);
         }
         all.faces.extend(core::iter::repeat_n(k, triangles.len()));
         all.triangles.extend(triangles);

@@ -96,7 +96,7 @@ fn of_solids(source: &mut impl Read) -> Result<Nominal, String> {
         };
         match solids::facets(&body, &settings) {
             Err(solids::BodyError::TooMany { .. }) if tolerance_mm < COARSEST_MM => {
-                tolerance_mm *= COARSER;
+                tolerance_mm = (COARSER * tolerance_mm).min(COARSEST_MM);
             }
             done => break done.map_err(|error| error.to_string())?,
         }
