@@ -145,22 +145,33 @@ impl Scale {
         self.independent * libm::log(left) + freedom as f64 * price
     }
 
-    /// Whether a shape with so many free numbers could yet be the best: with more of them,
-    /// it costs what it costs, and it will hardly leave less than the surfaces there are do
-    /// for all their freedom.
+    /// Whether a shape with so many free numbers could yet be the best: with more of them, it costs
+    /// what it costs, and it will hardly leave less than polynomials do for all their freedom. Where
+    /// these leave more than a shape does, as they do of what turns far away, they tell nothing.
     fn leaves_room(&self, freedom: usize) -> bool {
         let most = self.most();
         if self.surfaces.is_empty() {
             return true;
         }
+        let least = |is_shape: bool| {
+            let own = self.surfaces.iter();
+            let own = own.filter(|surface| surface.fit.is_some() == is_shape);
+            let left = own.map(|surface| surface.left(most));
+            left.reduce(f64::min)
+        };
+        if least(false) > least(true) && least(true).is_some() {
+            return true;
+        }
         let shapes = self.surfaces.iter().filter(|surface| surface.fit.is_some());
         let scores = shapes.map(|shape| self.score(shape.left(most), shape.freedom));
-        scores.fold(f64::INFINITY, f64::min) > self.score(self.floor(most), freedom)
+        let spared = |freedom| 1.0 - freedom as f64 / self.independent;
+        let floor = self.floor(most, spared) * spared(freedom);
+        scores.fold(f64::INFINITY, f64::min) > self.score(floor, freedom)
     }
 
-    /// The least that any of the surfaces leaves, were it not for its freedom.
-    fn floor(&self, most: f64) -> f64 {
-        let spared = |freedom| 1.0 - freedom as f64 / self.independent;
+    /// The least that any of the surfaces leaves, were it not for its freedom, which spares a share
+    /// of the noise.
+    fn floor(&self, most: f64, spared: impl Fn(usize) -> f64) -> f64 {
         let surfaces = self.surfaces.iter();
         let left = surfaces.map(|surface| surface.left(most) / spared(surface.freedom));
         left.fold(f64::INFINITY, f64::min)
@@ -292,4 +303,48 @@ fn chebyshev(x: f64) -> ([f64; 7], [f64; 7]) {
         slopes[k] = 2.0 * (values[k - 1] + x * slopes[k - 1]) - slopes[k - 2];
     }
     (values, slopes)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    /// Surfaces that 1000 samples lie so far off, and whether they are shapes.
+    fn scale(surfaces: &[(f64, usize, bool)]) -> Scale {
+        let plane: Vec<Sample> = (0..20)
+            .map(|k| Sample {
+                point_mm: Vector3::new(f64::from(k % 5), f64::from(k / 5), 0.1 * f64::from(k % 3)),
+                ray: Vector3::z(),
+                sigma_mm: 0.1,
+            })
+            .collect();
+        let fit = crate::fit(Family::Plane, &plane, 1.0);
+        assert!(fit.is_some());
+        let surface = |&(off, freedom, is_shape): &(f64, usize, bool)| Surface {
+            off: vec![off; 1000],
+            freedom,
+            fit: fit.clone().filter(|_| is_shape),
+        };
+        Scale {
+            independent: 1000.0,
+            surfaces: surfaces.iter().map(surface).collect(),
+        }
+    }
+
+    #[test]
+    fn polynomials_tell_how_little_a_shape_can_leave_where_they_leave_no_more() {
+        let sphere = (1.05, 4, true);
+        // With 15 numbers they leave no less: 6 will do no better.
+        assert!(!scale(&[(1.049, 15, false), sphere]).leaves_room(6));
+        assert!(scale(&[(1.0, 15, false), sphere]).leaves_room(6));
+        // They leave more, for want of terms.
+        assert!(scale(&[(1.2, 15, false), sphere]).leaves_room(6));
+        // What they spare of the noise by their own freedom is not held against others.
+        assert!(scale(&[(1.0, 6, false), (1.012, 4, true)]).leaves_room(6));
+        // There are too few samples for any.
+        assert!(!scale(&[sphere]).leaves_room(6));
+        assert!(scale(&[]).leaves_room(6));
+    }
 }

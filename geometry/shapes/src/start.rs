@@ -7,6 +7,7 @@ use crate::local::Local;
 use crate::robust;
 use crate::rotation;
 use crate::shape::Family;
+use crate::spread::spread;
 
 /// Angles that a cone's generator may have with its axis.
 const HALF_ANGLES_RAD: [f64; 4] = [-0.6, -0.15, 0.15, 0.6];
@@ -16,6 +17,11 @@ const TUBE_ANGLES_RAD: [f64; 5] = [-1.2, -0.6, 0.1, 0.6, 1.2];
 const NO_PART: f64 = 0.02;
 /// Samples are flat whose variance across is less than this share of that in width.
 const FLAT: f64 = 0.1;
+/// Places besides the middle of all samples that tori begin at, and the share of the samples around
+/// one, in numbers no less and no more than so: the middle of a ring is nowhere on it.
+const PLACES: usize = 3;
+const PATCH: f64 = 0.1;
+const PATCH_OF: [usize; 2] = [60, 400];
 /// Curvature taken for none, times the samples' extent.
 const STRAIGHT: f64 = 1e-3;
 
@@ -191,17 +197,49 @@ pub(crate) fn starts(family: Family, samples: &[Sample]) -> Option<Vec<Local>> {
         Family::Torus => {
             let mut all = Vec::new();
             all.extend(rotation::torus(&middle.near, &middle.frame));
-            for (along, about, tube) in ways {
-                let (about, tube) = (middle.bent(about), middle.bent(tube));
-                for angle in TUBE_ANGLES_RAD {
-                    // Meusnier: the circle about the axis bends by the cosine less than the
-                    // surface does along it.
-                    let radius = libm::cos(angle) * (1.0 / about - 1.0 / tube);
-                    let number = middle.bent(1.0 / radius);
-                    all.push(middle.local(family, along, [number, angle, tube]));
-                }
+            all.extend(tori(&middle));
+            for patch in patches(samples) {
+                all.extend(Middle::of(&patch).iter().flat_map(tori));
             }
             all
         }
     })
+}
+
+/// Tori with the curvatures that samples have in their middle.
+fn tori(middle: &Middle) -> Vec<Local> {
+    let [(most, most_curvature), (least, least_curvature)] = middle.principal;
+    let ways = [
+        (least, most_curvature, least_curvature),
+        (most, least_curvature, most_curvature),
+    ];
+    let mut all = Vec::new();
+    for (along, about, tube) in ways {
+        let (about, tube) = (middle.bent(about), middle.bent(tube));
+        for angle in TUBE_ANGLES_RAD {
+            // Meusnier: the circle about the axis bends by the cosine less than the surface does
+            // along it.
+            let radius = libm::cos(angle) * (1.0 / about - 1.0 / tube);
+            let number = middle.bent(1.0 / radius);
+            all.push(middle.local(Family::Torus, along, [number, angle, tube]));
+        }
+    }
+    all
+}
+
+/// Samples around some places.
+fn patches(samples: &[Sample]) -> Vec<Vec<Sample>> {
+    let few = ((PATCH * samples.len() as f64) as usize).clamp(PATCH_OF[0], PATCH_OF[1]);
+    if few >= samples.len() {
+        return Vec::new();
+    }
+    let around = |place: usize| {
+        let middle = samples[place].point_mm;
+        let mut patch = samples.to_vec();
+        let far2 = |sample: &Sample| (sample.point_mm - middle).norm_squared();
+        patch.select_nth_unstable_by(few, |a, b| far2(a).total_cmp(&far2(b)));
+        patch.truncate(few);
+        patch
+    };
+    spread(samples.len(), PLACES).map(around).collect()
 }

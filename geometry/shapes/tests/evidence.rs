@@ -3,7 +3,7 @@
 mod known;
 
 use nalgebra::Vector3;
-use shapes::{Evidence, Family, Sample, Verdict, decide};
+use shapes::{Evidence, Family, Sample, Torus, Verdict, decide};
 
 use known::{NOISE_MM, Random, cases, samples};
 
@@ -153,6 +153,83 @@ fn a_short_shaft_seen_half_around_is_a_cylinder() {
                         seed,
                         evidence.candidates,
                     ));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{} {wrong:#?}", wrong.len());
+}
+
+/// The fillet around a boss or a hole, seen from above along a tilted axis: evenly in x and y, noise
+/// along the normal.
+fn fillet(
+    (radius_mm, tube_mm): (f64, f64),
+    (is_hollow, share, from): (bool, f64, f64),
+    seed: u64,
+) -> Vec<Sample> {
+    const PITCH_MM: f64 = 0.4;
+    let axis = Vector3::new(0.08, -0.1, 1.0).normalize();
+    let shape = Torus {
+        centre_mm: Vector3::new(20.0, -10.0, 5.0),
+        axis,
+        radius_mm,
+        tube_mm,
+        is_hollow,
+    };
+    let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(3));
+    let reach = ((radius_mm + tube_mm) / PITCH_MM) as i32;
+    let at = |k: i32, middle: f64| middle + PITCH_MM * f64::from(k);
+    let places = (-reach..=reach).flat_map(|i| (-reach..=reach).map(move |j| (i, j)));
+    let aside = axis.cross(&Vector3::y()).normalize();
+    let ahead = aside.cross(&axis);
+    places
+        .filter_map(|(i, j)| {
+            let (u, v) = (at(i, 0.13), at(j, 0.31));
+            let out = (u * u + v * v).sqrt();
+            // To where a face that it touches has turned by 70 degrees; of a hollow one the inner
+            // half is seen, of the other the outer half.
+            let beyond = if is_hollow {
+                radius_mm - out
+            } else {
+                out - radius_mm
+            };
+            let is_on = (from * tube_mm..0.94 * tube_mm).contains(&beyond);
+            if !is_on || libm::atan2(v, u).abs() > share * core::f64::consts::PI {
+                return None;
+            }
+            let up = (tube_mm * tube_mm - beyond * beyond).sqrt();
+            let up = if is_hollow { -up } else { up };
+            let point = shape.centre_mm + aside * u + ahead * v + axis * up;
+            let from_tube = aside * (u - u / out * radius_mm) + ahead * (v - v / out * radius_mm);
+            let normal = (from_tube + axis * up).normalize();
+            Some(Sample {
+                point_mm: point + normal * (NOISE_MM * random.normal()),
+                ray: Vector3::z(),
+                sigma_mm: NOISE_MM / normal.z.abs(),
+            })
+        })
+        .collect()
+}
+
+#[test]
+fn a_fillet_around_a_boss_is_a_torus() {
+    let mut wrong = Vec::new();
+    for sizes in [
+        (11.6, 2.6),
+        (12.2, 2.8),
+        (13.7, 4.0),
+        (8.0, 3.0),
+        (14.8, 4.3),
+    ] {
+        for is_hollow in [false, true] {
+            for (share, from) in [(1.0, 0.0), (1.0, 0.3), (0.6, 0.0), (0.6, 0.3), (0.4, 0.3)] {
+                for seed in 0..3 {
+                    let samples = fillet(sizes, (is_hollow, share, from), seed);
+                    let evidence = decide(&samples, 1.0);
+                    if family(&evidence) != Some(Family::Torus) {
+                        let which = (sizes, is_hollow, share, from, seed);
+                        wrong.push(format!("{which:?}: {:?}", evidence.candidates));
+                    }
                 }
             }
         }

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use relief_tests::score::TruthClass;
+use shapes::Family;
 
 use crate::measure::Measured;
 use crate::part::Kind;
@@ -31,6 +32,12 @@ pub(crate) fn list(parts: &[Measured]) -> String {
                     face.class,
                     shares.join(", "),
                 );
+                if let Some(real) = part.true_of_face.get(face.face).copied().flatten() {
+                    let _ = writeln!(out, "    truly {real:.4?}");
+                }
+                for (region, _) in &face.shares {
+                    let _ = writeln!(out, "    {}", told_of(part, *region));
+                }
             }
             for number in found.iter().flat_map(|found| &found.numbers) {
                 if number.error.abs() > 3.0 * number.bound {
@@ -88,4 +95,35 @@ pub(crate) fn list(parts: &[Measured]) -> String {
         );
     }
     out
+}
+
+/// What the samples of a region speak for, and how much more loudly than for anything else.
+fn told_of(part: &Measured, region: u16) -> String {
+    let mut kinds = part.outcome.kinds.iter();
+    let Some(own) = kinds.find(|kind| kind.label.get() == region) else {
+        return format!("region {region} is not of the part");
+    };
+    let name = |family: Option<Family>| family.map_or("polynomial", Family::as_str);
+    let candidates = &own.evidence.candidates;
+    let best = candidates.first().map_or(0.0, |candidate| candidate.score);
+    let scores = candidates.iter().map(|candidate| {
+        let (family, freedom) = (name(candidate.family), candidate.freedom);
+        format!("{family} of {freedom} {:.1}", candidate.score - best)
+    });
+    let scores: Vec<String> = scores.collect();
+    let shape = own.evidence.fit().map(|fit| {
+        let (shape, rms_mm, held) = (fit.shape, fit.rms_mm, fit.held);
+        format!("; {held} samples {rms_mm:.4} mm about {shape:.4?}")
+    });
+    let shares = part.faces.iter().flat_map(|face| {
+        let own = face.shares.iter().filter(|(other, _)| *other == region);
+        own.map(|(_, nodes)| format!("{} of face {}", nodes, face.face))
+    });
+    let shares: Vec<String> = shares.collect();
+    format!(
+        "region {region}, {}: {}{}",
+        shares.join(" and "),
+        scores.join(", "),
+        shape.unwrap_or_default()
+    )
 }

@@ -40,6 +40,8 @@ pub(crate) struct Measured {
     pub(crate) scan_s: f64,
     pub(crate) process_s: f64,
     pub(crate) outcome: Outcome,
+    /// Of each true face, where it is of one of the families.
+    pub(crate) true_of_face: Vec<Option<TrueSurface>>,
     /// Of each region, the true face that it stands for, where that is of one of the families.
     pub(crate) true_of_region: BTreeMap<u16, TrueSurface>,
 }
@@ -166,6 +168,7 @@ pub(crate) fn measure(part: &Part, change: impl Fn(&mut Settings)) -> Result<Mea
         scan_s,
         process_s,
         outcome,
+        true_of_face: part.faces.clone(),
         true_of_region,
     })
 }
