@@ -229,6 +229,12 @@ fn held(local: &Local, samples: &[Sample]) -> Vec<f64> {
 fn told(local: Local, samples: &[Sample], area: f64) -> Option<Fit> {
     let extent_mm = extent_mm(samples);
     let shape = local.shape().filter(|shape| is_sound(shape, extent_mm))?;
+    let (local, shape) = if is_seen(&shape, samples) {
+        (local, shape)
+    } else {
+        let turned = local.turned();
+        (turned, turned.shape()?)
+    };
     let held = held(&local, samples);
     let (mut squares, mut squares_mm2, mut count) = (0.0, 0.0, 0_usize);
     let distances = local.distances::<f64>();
@@ -250,6 +256,16 @@ fn told(local: Local, samples: &[Sample], area: f64) -> Option<Fit> {
         joint: joint(&local, &covariance)?,
         local,
     })
+}
+
+/// Whether a shape's normals point upwards where samples lie, for the most part: to the side that was
+/// seen. What a descent comes to does not depend on it, and of a steep ring where it begins, neither.
+fn is_seen(shape: &Shape, samples: &[Sample]) -> bool {
+    let up = samples
+        .iter()
+        .map(|sample| shape.normal(&sample.point_mm).z);
+    let seen = up.filter(|up| *up > 0.0).count();
+    2 * seen >= samples.len()
 }
 
 /// Radii that say nothing are none.

@@ -113,6 +113,15 @@ impl Local {
         }
     }
 
+    /// The same surface, seen from its other side.
+    pub(crate) fn turned(&self) -> Self {
+        Self {
+            normal: -self.normal,
+            numbers: self.numbers.map(|number| -number),
+            ..*self
+        }
+    }
+
     /// The shape by its usual numbers; `None` where it is so flat that it has none.
     pub(crate) fn shape(&self) -> Option<Shape> {
         let centre = |curvature: f64| {
@@ -337,6 +346,18 @@ mod tests {
                 );
                 assert!((near - far).abs() < 1e-9, "{shape:?}: {near} {far}");
             }
+        }
+    }
+
+    #[test]
+    fn from_its_other_side_a_surface_is_the_same() {
+        for local in all() {
+            let turned = local.turned();
+            for point in points() {
+                let [one, other] = [&local, &turned].map(|l| l.distances::<f64>().distance(&point));
+                assert!((one + other).abs() < 1e-9, "{local:?}: {one} {other}");
+            }
+            assert_eq!(turned.turned().numbers, local.numbers);
         }
     }
 
