@@ -6,7 +6,7 @@ use nalgebra::Vector2;
 use range_image::{RangeImage, RegionMap};
 use shapes::{Evidence, Fit, Sample, Shape, decide};
 
-use super::joins::Joining;
+use super::joins::{Joining, LEAST_JOINING};
 use super::samples::OnRegion;
 use crate::neighbourhood::{DEEPEST, depth};
 
@@ -49,24 +49,34 @@ impl Bearing {
         decide(&self.samples, self.area)
     }
 
-    /// The samples beside neighbours that are of a shape as well, where they agree with it: beside
-    /// what is of no region, and beside shapes that they are off; and the neighbours whose shape
-    /// goes on from this one, so that no distance tells which of both a sample is of. `shapes` are
-    /// those of all regions, in the order of their labels.
-    pub(super) fn besides(&self, fit: &Fit, shapes: &[Option<Shape>]) -> (Vec<Sample>, Vec<u16>) {
+    /// The samples near the border that are of the shape as well: beside what is of no region, beside
+    /// shapes that they are off, and beside free forms whose samples are off the shape; and the
+    /// neighbours whose shape goes on from this one, so that no distance tells which of both a sample
+    /// is of. `all` are what the regions are decided by, and their shapes, in the order of their
+    /// labels.
+    pub(super) fn besides(
+        &self,
+        label: u16,
+        fit: &Fit,
+        (bearings, shapes): (&[Self], &[Option<Shape>]),
+    ) -> (Vec<Sample>, Vec<u16>) {
         let (mut samples, mut smooth) = (Vec::new(), Vec::new());
         for (neighbour, beside) in &self.beside {
-            let shape = usize::from(*neighbour)
-                .checked_sub(1)
-                .map(|k| shapes.get(k));
-            let is_apart = match shape {
+            let index = usize::from(*neighbour).checked_sub(1);
+            let other = index.map(|k| bearings.get(k).zip(shapes.get(k)));
+            let is_apart = match other {
                 None => true,
-                Some(Some(Some(shape))) if !is_off(shape, beside) => {
+                Some(Some((_, Some(shape)))) if !is_off(shape, beside) => {
                     smooth.push(*neighbour);
                     false
                 }
-                Some(Some(Some(_))) => true,
-                _ => false,
+                Some(Some((_, Some(_)))) => true,
+                Some(Some((bearing, None))) => {
+                    let towards = bearing.joining.iter().filter(|j| j.neighbour == label);
+                    let near: Vec<Sample> = towards.map(|joining| joining.sample).collect();
+                    near.len() >= LEAST_JOINING && is_off(&fit.shape, &near)
+                }
+                Some(None) => false,
             };
             if is_apart && agree(fit, beside) {
                 samples.extend(beside);
@@ -206,6 +216,51 @@ mod tests {
 
     use super::*;
 
+    fn sample(x: f64, y: f64, z: f64) -> Sample {
+        Sample {
+            point_mm: Vector3::new(x, y, z),
+            ray: Vector3::z(),
+            sigma_mm: 0.05,
+        }
+    }
+
+    /// Whether samples of a level plane beside a free form of this rise are taken for the plane's.
+    fn are_taken(rise: f64) -> bool {
+        let noise = |k: usize| 0.01 * ((k * 7 % 11) as f64 - 5.0);
+        let own = |k: usize| sample(-0.4 * (k % 20) as f64, 0.4 * (k / 20) as f64, noise(k));
+        let samples: Vec<Sample> = (0..400).map(own).collect();
+        let fit = shapes::fit(shapes::Family::Plane, &samples, 1.0).unwrap();
+        let beyond = (0..60).map(|k| {
+            let x = 0.4 * (1 + k % 3) as f64;
+            Joining {
+                sample: sample(x, 0.4 * (k / 3) as f64, rise * x + noise(k)),
+                neighbour: 1,
+                across: -Vector2::x(),
+                is_within: false,
+            }
+        });
+        let free_form = Bearing {
+            joining: beyond.collect(),
+            ..Bearing::default()
+        };
+        let plane = Bearing {
+            beside: vec![(2, samples[..100].to_vec())],
+            ..Bearing::default()
+        };
+        let shapes = [Some(fit.shape), None];
+        let bearings = [plane, free_form];
+        let (taken, smooth) = bearings[0].besides(1, &fit, (&bearings, &shapes));
+        assert!(smooth.is_empty());
+        !taken.is_empty()
+    }
+
+    #[test]
+    fn a_free_form_is_another_surface_where_its_samples_are_off() {
+        assert!(are_taken(1.0));
+        // It may go on from the plane.
+        assert!(!are_taken(0.05));
+    }
+
     /// How many columns of cells the samples span that a strip of so many columns is decided by.
     fn width_told(columns: usize) -> usize {
         const ROWS: usize = 100;
@@ -218,11 +273,7 @@ mod tests {
         let regions = RegionMap::new(&image, labels);
         let sample = |column: usize, row: usize| OnRegion {
             cell: [column as u32, row as u32],
-            sample: Sample {
-                point_mm: Vector3::new(column as f64 + 0.4, row as f64 + 0.4, 0.0),
-                ray: Vector3::z(),
-                sigma_mm: 0.05,
-            },
+            sample: sample(column as f64 + 0.4, row as f64 + 0.4, 0.0),
         };
         let cells = (1..columns).flat_map(|column| (0..ROWS - 1).map(move |row| (column, row)));
         let samples: Vec<OnRegion> = cells.map(|(column, row)| sample(column, row)).collect();

@@ -16,8 +16,8 @@ use super::bearing::Bearing;
 /// A region must hold this share of its samples near a join, and this share of those that it is
 /// fitted to, for the two surfaces to touch there at all.
 const LEAST_KEPT: f64 = 0.4;
-/// Samples that regions must have near each other to touch along a line.
-const LEAST_JOINING: usize = 20;
+/// Samples that regions must have near each other to touch along a line, or to be told apart there.
+pub(super) const LEAST_JOINING: usize = 20;
 /// By how much samples may lie farther from a surface that is fitted to others.
 const LOOSER: f64 = 1.1;
 

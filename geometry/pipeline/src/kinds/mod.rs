@@ -140,7 +140,7 @@ fn refined(
     bearing: &Bearing,
     all: (&[Bearing], &[Option<Shape>]),
 ) -> Option<Fit> {
-    let (besides, smooth) = bearing.besides(fit, all.1);
+    let (besides, smooth) = bearing.besides(label.get(), fit, all);
     let joined = joins::refine(label.get(), fit, all, &smooth, &besides);
     if joined.is_some() || besides.is_empty() {
         return joined;
