@@ -101,8 +101,9 @@ fn changed(before: &[u16], after: &[u16]) -> Vec<bool> {
     changed
 }
 
-/// Gives nodes at the borders of changed regions to those whose shape explains them best. Other
-/// borders are where the nodes on either side have them, at steps, too.
+/// Gives nodes at the borders of changed regions to those whose shape explains them best, and rounds
+/// off edges that are round. Other borders are where the nodes on either side have them, at steps,
+/// too.
 fn place_borders(
     image: &RangeImage,
     labels: &mut [u16],
@@ -113,9 +114,6 @@ fn place_borders(
     let labelled: Vec<usize> = (0..labels.len())
         .filter(|node| labels[*node] != 0)
         .collect();
-    if !changed.contains(&true) {
-        return Ok(());
-    }
     let Some(field) = Field::new(image, observations, &labelled) else {
         return Ok(());
     };
@@ -137,18 +135,24 @@ fn place_borders(
     let fits: Vec<Result<Option<Fit>, Cancelled>> = fits.collect();
     let mut pieces = Pieces {
         field: &field,
-        labels: of_field,
+        labels: of_field.clone(),
         fits: fits.into_iter().collect::<Result<_, _>>()?,
     };
-    pieces.compete(monitor)?;
+    if changed.contains(&true) {
+        pieces.compete(monitor)?;
+        let is_changed = |label: usize| label != NONE && changed[label + 1];
+        for (new, old) in pieces.labels.iter_mut().zip(&of_field) {
+            if !is_changed(*new) && !is_changed(*old) {
+                *new = *old;
+            }
+        }
+    }
+    pieces.blend(monitor)?;
     for (place, label) in pieces.labels.iter().enumerate() {
         if let Some(node) = field.node(place)
-            && *label != NONE
+            && let Some(label) = label.checked_add(1).and_then(|l| u16::try_from(l).ok())
         {
-            let (old, new) = (&mut labels[node.index], *label as u16 + 1);
-            if changed[usize::from(*old)] || changed[usize::from(new)] {
-                *old = new;
-            }
+            labels[node.index] = label;
         }
     }
     Ok(())

@@ -100,6 +100,11 @@ impl<'a> Field<'a> {
         self.nodes[place].as_ref()
     }
 
+    /// The node at a place, if there is one.
+    pub(crate) fn point_mm(&self, place: usize) -> Option<Vector3<f64>> {
+        self.nodes[place].as_ref().map(|node| node.point_mm)
+    }
+
     /// The set of all nodes.
     pub(crate) fn all(&self) -> Set {
         self.nodes.iter().map(Option::is_some).collect()

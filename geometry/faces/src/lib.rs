@@ -13,6 +13,7 @@
 //! What a window is of is decided by [`shapes::decide`], never by a distance; a region that is
 //! not for the most part of shapes stays as it is.
 
+mod blend;
 mod compete;
 mod divide;
 mod field;
@@ -20,6 +21,7 @@ mod fillet;
 mod grow;
 mod join;
 mod observations;
+mod rounding;
 mod split;
 mod strain;
 #[cfg(test)]
