@@ -25,7 +25,7 @@ mod uncertainty;
 
 pub use evidence::{Candidate, Evidence, Verdict, decide};
 pub use fit::{Fit, Sample, fit};
-pub use several::{is_smooth, is_smoother};
+pub use several::{is_part_of_free_form, is_smooth, is_smoother};
 pub use shape::{Cone, Cylinder, Family, Plane, Shape, Sphere, Torus};
 pub use spread::{is_in_share, spread};
 pub use uncertainty::{Joint, Measured, Numbers, Spread};

@@ -38,3 +38,19 @@ pub fn is_smoother(samples: &[Sample], off: Vec<f64>, freedom: usize) -> bool {
     let apart = scores.next_back().unwrap_or(f64::INFINITY);
     scores.fold(f64::INFINITY, f64::min) < apart
 }
+
+/// Whether samples that seem to be of a shape lie on the free form around them instead: one polynomial
+/// explains both better than the shape and another polynomial do.
+#[must_use]
+pub fn is_part_of_free_form((fit, own): (&Fit, &[Sample]), around: &[Sample]) -> bool {
+    let scale = Scale {
+        independent: around.len() as f64,
+        surfaces: polynomials_of(around, around.len() as f64),
+    };
+    let scored = scale.scored().into_iter().zip(&scale.surfaces);
+    let best = scored.min_by(|a, b| a.0.0.score.total_cmp(&b.0.0.score));
+    let Some((_, best)) = best else { return false };
+    let samples: Vec<Sample> = own.iter().chain(around).copied().collect();
+    let off = fit.offs(own).chain(best.off.iter().copied()).collect();
+    is_smoother(&samples, off, fit.shape.family().freedom() + best.freedom)
+}

@@ -1,6 +1,7 @@
 //! What kind of surface each region is.
 
 pub(crate) mod bearing;
+mod islands;
 mod joins;
 mod nodes;
 mod policy;
@@ -102,6 +103,9 @@ pub(crate) fn kinds(
     });
     let decided: Vec<Result<RegionKind, Cancelled>> = decided.collect();
     let mut decided = decided.into_iter().collect::<Result<Vec<_>, _>>()?;
+    for island in islands::islands(&decided, &bearings) {
+        decided[island].evidence.verdict = Verdict::FreeForm;
+    }
     if smooth_joins == SmoothJoins::Keep {
         // What lies beside a border may be of a surface that joins this one.
         return Ok(Decided {
