@@ -111,7 +111,7 @@ impl Regions<'_> {
 }
 
 /// Whether one shape costs no more than two surfaces do.
-fn are_one(a: &(Vec<Sample>, Evidence), b: &(Vec<Sample>, Evidence), area: f64) -> bool {
+pub(crate) fn are_one(a: &(Vec<Sample>, Evidence), b: &(Vec<Sample>, Evidence), area: f64) -> bool {
     let (Some(fit_a), Some(fit_b)) = (a.1.fit(), b.1.fit()) else {
         return false;
     };

@@ -26,6 +26,7 @@ mod split;
 mod strain;
 #[cfg(test)]
 mod testing;
+mod unite;
 
 pub use divide::{Divided, divide};
 pub use observations::Observations;

@@ -9,6 +9,7 @@ use crate::field::{Field, Set, count, places};
 use crate::fillet::is_fillet;
 use crate::grow::{FEWEST, Piece, grow, grow_left};
 use crate::strain::is_strained;
+use crate::unite::unite;
 
 /// Half-widths of the windows that pieces are grown from, in nodes, one after the other.
 const WINDOWS: [usize; 3] = [8, 5, 3];
@@ -86,6 +87,7 @@ pub(crate) fn split(
             }
             pieces.push(Piece { nodes, ..piece });
         }
+        unite(field, &mut open, &mut pieces, monitor)?;
         if is_free_form(field, &pieces) {
             return Ok(None);
         }
@@ -106,7 +108,7 @@ pub(crate) fn split(
 
 /// Whether what has grown is of one surface, and not of several that some shape is near to. What
 /// joins it smoothly may be of it as far as noise tells, so nodes near its border are not asked.
-fn is_of_one(field: &Field<'_>, piece: &Piece) -> bool {
+pub(crate) fn is_of_one(field: &Field<'_>, piece: &Piece) -> bool {
     let inner = field.within(&piece.nodes, JOINED);
     let fit = piece.fit.as_ref();
     fit.is_none_or(|fit| !is_strained(field, fit, &inner))
@@ -184,7 +186,7 @@ fn apart(
 }
 
 /// Pairs of pieces that touch each other.
-fn touching(field: &Field<'_>, pieces: &[Piece]) -> Vec<(usize, usize)> {
+pub(crate) fn touching(field: &Field<'_>, pieces: &[Piece]) -> Vec<(usize, usize)> {
     let touch = |a: &Piece, b: &Piece| count(&field.near(&a.nodes, &b.nodes, 1)) >= CONTACT;
     let pairs = (0..pieces.len()).flat_map(|a| (a + 1..pieces.len()).map(move |b| (a, b)));
     pairs

@@ -1,0 +1,125 @@
+//! Pieces of one surface that were grown apart.
+//!
+//! From a small window a cone is a cylinder that leans, and grows as far as that goes: what tells it
+//! from a cone are the pieces beside it.
+
+use range_image::{Cancelled, Monitor};
+use shapes::{Evidence, Sample, decide};
+
+use crate::field::{Field, Set, places};
+use crate::grow::{Piece, grow};
+use crate::join::are_one;
+use crate::split::{is_of_one, touching};
+
+/// Samples that are looked at of each piece.
+const SAMPLES: usize = 1500;
+
+/// Makes one of pieces that touch and are of one shape, which then grows on over what is open.
+pub(crate) fn unite(
+    field: &Field<'_>,
+    open: &mut [bool],
+    pieces: &mut Vec<Piece>,
+    monitor: &dyn Monitor,
+) -> Result<(), Cancelled> {
+    let told = |piece: &Piece| -> (Vec<Sample>, Evidence) {
+        let samples = field.samples(&piece.nodes, 1, SAMPLES);
+        let evidence = decide(&samples, field.area());
+        (samples, evidence)
+    };
+    let mut each: Vec<_> = pieces.iter().map(told).collect();
+    let mut apart: Vec<(usize, usize)> = Vec::new();
+    'united: loop {
+        for (a, b) in touching(field, pieces) {
+            monitor.check()?;
+            if apart.contains(&(a, b)) {
+                continue;
+            }
+            if are_one(&each[a], &each[b], field.area())
+                && let Some(both) = grown(field, open, [&pieces[a], &pieces[b]])
+            {
+                for (place, is_in) in both.nodes.iter().enumerate() {
+                    let was_in = pieces[a].nodes[place] || pieces[b].nodes[place];
+                    open[place] = (open[place] || was_in) && !is_in;
+                }
+                each[a] = told(&both);
+                each.remove(b);
+                pieces[a] = both;
+                pieces.remove(b);
+                apart.clear();
+                continue 'united;
+            }
+            apart.push((a, b));
+        }
+        return Ok(());
+    }
+}
+
+/// What two pieces grow to together, where that is one surface that holds them both.
+fn grown(field: &Field<'_>, open: &[bool], pair: [&Piece; 2]) -> Option<Piece> {
+    let [a, b] = pair;
+    let both: Set = a.nodes.iter().zip(&b.nodes).map(|(a, b)| a | b).collect();
+    let free: Set = open
+        .iter()
+        .zip(&both)
+        .map(|(open, own)| open | own)
+        .collect();
+    let piece = grow(field, &free, &places(&both))?;
+    is_of_one(field, &piece).then_some(piece)
+}
+
+#[cfg(test)]
+mod tests {
+    use range_image::Unmonitored;
+    use shapes::{Family, Shape, fit};
+
+    use super::*;
+    use crate::testing::Scan;
+
+    /// Wedges of what falls from the middle of the image as told, each taken for a cylinder.
+    fn wedges(z_mm: impl Fn(f64, f64) -> f64) -> Vec<Piece> {
+        let scan = Scan::of((70, 70), 0.4, 0.05, |x, y| z_mm(x - 14.0, y - 14.0));
+        let nodes: Vec<usize> = (0..4900).collect();
+        let field = Field::new(&scan.image, &scan.observations, &nodes).unwrap();
+        let place = |place: usize| {
+            let (column, row) = (place / field.rows(), place % field.rows());
+            (scan.image.x_mm(column) - 14.0, scan.image.y_mm(row) - 14.0)
+        };
+        let is_on = |at: usize| {
+            let (x, y) = place(at);
+            (7.0..13.0).contains(&libm::sqrt(x * x + y * y))
+        };
+        let wedge = |k: i32| {
+            let is_in = |at: usize| {
+                let (x, y) = place(at);
+                let turn = libm::atan2(y, x) * 4.0 / core::f64::consts::PI;
+                is_on(at) && (libm::floor(turn) as i32).rem_euclid(8) == k
+            };
+            let nodes: Set = (0..field.len()).map(is_in).collect();
+            let fit = fit(Family::Cylinder, &field.samples(&nodes, 0, SAMPLES), 1.0);
+            assert!(fit.is_some());
+            Piece { fit, nodes }
+        };
+        let mut pieces: Vec<Piece> = (0..8).map(wedge).collect();
+        let mut open = vec![false; field.len()];
+        unite(&field, &mut open, &mut pieces, &Unmonitored).unwrap();
+        pieces
+    }
+
+    #[test]
+    fn wedges_of_a_cone_are_one() {
+        let pieces = wedges(|x, y| -1.1 * libm::sqrt(x * x + y * y));
+        assert_eq!(pieces.len(), 1);
+        let shape = pieces[0].fit.as_ref().unwrap().shape;
+        assert!(
+            matches!(shape, Shape::Cone(c) if (libm::tan(c.half_angle_rad) * 1.1 - 1.0).abs() < 0.05),
+            "{shape:?}"
+        );
+    }
+
+    #[test]
+    fn the_faces_of_a_pyramid_stay_apart() {
+        let pieces = wedges(|x, y| -1.1 * (x.abs().max(y.abs())));
+        // Each face was cut in two.
+        assert_eq!(pieces.len(), 4);
+    }
+}
