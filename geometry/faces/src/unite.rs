@@ -6,13 +6,16 @@
 use range_image::{Cancelled, Monitor};
 use shapes::{Evidence, Sample, decide};
 
-use crate::field::{Field, Set, places};
+use crate::field::{Field, Set, count, places};
 use crate::grow::{Piece, grow};
 use crate::join::are_one;
 use crate::split::{is_of_one, touching};
 
 /// Samples that are looked at of each piece.
 const SAMPLES: usize = 1500;
+/// Share of the nodes of both that what they grow to must hold: a piece that has ended on another
+/// surface would spoil one that has not.
+const HELD: f64 = 0.9;
 
 /// Makes one of pieces that touch and are of one shape, which then grows on over what is open.
 pub(crate) fn unite(
@@ -54,7 +57,7 @@ pub(crate) fn unite(
     }
 }
 
-/// What two pieces grow to together, where that is one surface that holds them both.
+/// What two pieces grow to together, where that is one surface, and all but scraps of both.
 fn grown(field: &Field<'_>, open: &[bool], pair: [&Piece; 2]) -> Option<Piece> {
     let [a, b] = pair;
     let both: Set = a.nodes.iter().zip(&b.nodes).map(|(a, b)| a | b).collect();
@@ -64,7 +67,8 @@ fn grown(field: &Field<'_>, open: &[bool], pair: [&Piece; 2]) -> Option<Piece> {
         .map(|(open, own)| open | own)
         .collect();
     let piece = grow(field, &free, &places(&both))?;
-    is_of_one(field, &piece).then_some(piece)
+    let is_all = count(&piece.nodes) as f64 >= HELD * count(&both) as f64;
+    (is_all && is_of_one(field, &piece)).then_some(piece)
 }
 
 #[cfg(test)]
