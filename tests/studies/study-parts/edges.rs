@@ -101,6 +101,47 @@ fn nearest(creases: &[Vec<CreasePoint>], point: &Vector3<f64>) -> Option<(f64, f
     each.min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
+/// Edges between two faces on which these do not meet, for who looks for the cause.
+pub(crate) fn apart(model: &Model) -> Vec<String> {
+    let mut found = Vec::new();
+    for (index, edge) in model.edges.iter().enumerate() {
+        let users = model.faces.iter().filter(|face| {
+            let loops = core::iter::once(&face.outer).chain(&face.inner);
+            let mut coedges = loops.flat_map(|l| &l.coedges);
+            coedges.any(|coedge| coedge.edge.0 == index)
+        });
+        let [first, second] = users.collect::<Vec<_>>()[..] else {
+            continue;
+        };
+        let points = edge.path.sampled(PER_PIECE);
+        let gaps = points.iter().map(|&[x, y]| {
+            let z = [first, second].map(|face| {
+                let Surface::Patches(surface) = &face.surface;
+                surface.z(x, y)
+            });
+            (z[0] - z[1]).abs()
+        });
+        let gaps: Vec<f64> = gaps.collect();
+        let apart = gaps.iter().filter(|gap| **gap > MEETS_MM).count();
+        if 10 * apart > gaps.len() {
+            let [x, y] = points[points.len() / 2];
+            let (from, to) = edge.path.domain();
+            found.push(format!(
+                "edge of regions {} and {}, {:.1} mm about ({x:.1}, {y:.1}): {:?}, {:?}, {:.3} mm apart \
+                 in the mean, {:.3} mm at most",
+                first.region,
+                second.region,
+                to - from,
+                edge.kind,
+                edge.origin,
+                gaps.iter().sum::<f64>() / gaps.len() as f64,
+                gaps.iter().copied().fold(0.0, f64::max),
+            ));
+        }
+    }
+    found
+}
+
 /// The creases of a model by the true faces that their regions stand for.
 fn creases(model: &Model, matched: &Matched) -> BTreeMap<[usize; 2], Vec<Vec<CreasePoint>>> {
     let mut users: Vec<Vec<usize>> = vec![Vec::new(); model.edges.len()];

@@ -80,6 +80,9 @@ pub(crate) fn list(parts: &[Measured]) -> String {
                 edges.rms_mm(),
             );
         }
+        for apart in crate::edges::apart(&part.outcome.reconstruction.model) {
+            let _ = writeln!(out, "  {apart}");
+        }
         let grid = &part.on_grid;
         let _ = writeln!(
             out,

@@ -164,7 +164,7 @@ pub(crate) fn measure(part: &Part, change: impl Fn(&mut Settings)) -> Result<Mea
         on_grid,
         sharp_edges,
         smooth_edges,
-        mask: on_grid_truth.mask(),
+        mask: on_grid_truth.mask(&part.edges),
         scan_s,
         process_s,
         outcome,

@@ -62,6 +62,15 @@ pub(crate) struct TrueEdge {
     pub(crate) points_mm: Vec<[f64; 3]>,
 }
 
+impl TrueEdge {
+    /// Whether it is of these two faces and passes so near to a place.
+    pub(crate) fn joins(&self, faces: [usize; 2], place: &Vector3<f64>, near_mm: f64) -> bool {
+        let is_of = self.faces == faces || self.faces == [faces[1], faces[0]];
+        let mut points = self.points_mm.iter().map(|p| Vector3::from(*p));
+        is_of && points.any(|point| (point - place).norm() <= near_mm)
+    }
+}
+
 impl Part {
     pub(crate) fn kind(&self, face: usize) -> Kind {
         let surface = self.faces.get(face).copied().flatten();

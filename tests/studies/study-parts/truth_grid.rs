@@ -4,7 +4,7 @@ use serde::Serialize;
 use sim_scanner::scanner::Scanner;
 use sim_scanner::truth::{GraphNode, graph_node};
 
-use crate::part::Part;
+use crate::part::{Part, TrueEdge};
 use crate::surface::vector;
 
 /// The grid over the part.
@@ -16,6 +16,10 @@ const AWAY: usize = 2;
 const BESIDE: usize = 2;
 /// Neighbours that are so far off each other's tangent planes have a step between them.
 const STEP_MM: f64 = 0.5;
+/// So have those of two faces that share no edge so near by, from four times the noise on: what
+/// stands between them is not seen.
+const LOW_STEP_MM: f64 = 0.2;
+const SHARED_MM: f64 = 1.0;
 
 /// What stands at each node.
 pub(crate) struct TruthGrid {
@@ -111,19 +115,29 @@ impl TruthGrid {
         faces.iter().all(|face| near().any(|own| own == *face))
     }
 
-    /// Whether there is a step between two nodes: the surfaces are apart where they meet.
-    fn is_step(&self, one: (usize, usize), other: (usize, usize)) -> bool {
+    /// Whether there is a step between two nodes: the surfaces are apart where they meet, or do not
+    /// meet there in the part itself.
+    fn is_step(&self, edges: &[TrueEdge], one: (usize, usize), other: (usize, usize)) -> bool {
         let (Some(a), Some(b)) = (self.seen(one.0, one.1), self.seen(other.0, other.1)) else {
             return true;
         };
         let ([ax, ay], [bx, by]) = (self.place_mm(one.0, one.1), self.place_mm(other.0, other.1));
         let across = nalgebra::Vector3::new(bx - ax, by - ay, b.z_mm - a.z_mm);
         let off = |node: &GraphNode| across.dot(&vector(node.normal)).abs();
-        off(a).min(off(b)) > STEP_MM
+        let off_mm = off(a).min(off(b));
+        let meet = || {
+            let faces = [a.face.face, b.face.face];
+            let middle = nalgebra::Vector3::new(ax, ay, a.z_mm) + across / 2.0;
+            faces[0] == faces[1]
+                || edges
+                    .iter()
+                    .any(|edge| edge.joins(faces, &middle, SHARED_MM))
+        };
+        off_mm > STEP_MM || off_mm > LOW_STEP_MM && !meet()
     }
 
     /// Where edges of one face belong: near what is not seen, near steps, and at the grid's rim.
-    pub(crate) fn mask(&self) -> Mask {
+    pub(crate) fn mask(&self, edges: &[TrueEdge]) -> Mask {
         let mut is_border = vec![false; COLUMNS * ROWS];
         for (column, row) in Self::all() {
             let is_rim = column == 0 || row == 0 || column + 1 == COLUMNS || row + 1 == ROWS;
@@ -133,7 +147,7 @@ impl TruthGrid {
                 .filter(|(c, r)| *c < COLUMNS && *r < ROWS);
             is_border[column * ROWS + row] = is_rim
                 || self.seen(column, row).is_none()
-                || inner.any(|other| self.is_step((column, row), other));
+                || inner.any(|other| self.is_step(edges, (column, row), other));
         }
         let cell = |(column, row)| {
             let mut near = Self::around(column, row, BESIDE);
@@ -200,16 +214,25 @@ pub(crate) mod tests {
 
     #[test]
     fn edges_of_one_face_belong_to_steps_and_rims_only() {
-        let cell = |height_mm: f64, column: usize| {
-            let mask = step(height_mm).1.mask();
+        let shared = TrueEdge {
+            faces: [0, 1],
+            is_smooth: false,
+            points_mm: (-20..=20).map(|k| [0.0, f64::from(k) * 0.5, 0.0]).collect(),
+        };
+        let cell_of = |height_mm: f64, column: usize, edges: &[TrueEdge]| {
+            let mask = step(height_mm).1.mask(edges);
             mask.cells.as_bytes()[column * ROWS + ROWS / 2]
         };
+        let cell = |height_mm: f64, column: usize| cell_of(height_mm, column, &[]);
         let half = COLUMNS / 2;
         assert_eq!(cell(2.0, half), b'1');
         assert_eq!(cell(2.0, half - 10), b'0');
         assert_eq!(cell(2.0, 1), b'1');
         // What is too low for a step is none.
         assert_eq!(cell(0.1, half), b'0');
+        // A low one is one where the faces do not meet in the part.
+        assert_eq!(cell(0.3, half), b'1');
+        assert_eq!(cell_of(0.3, half, core::slice::from_ref(&shared)), b'0');
     }
 
     #[test]
