@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 use nurbs::PatchSurface;
 use range_image::RangeImage;
 
-use crate::account::residuals;
 use crate::run::Node;
 
 /// A shape may leave its nodes so much more than a free-form surface, which follows the noise;
@@ -29,6 +28,10 @@ const FEWEST: usize = 48;
 /// its nodes share samples, so it is known not much better than one of them.
 const TOGETHER: f64 = 6.0;
 
+/// Share of the nodes that may be of something else, as of a wall beside a fillet, and are left out
+/// where surfaces are held against each other as a whole.
+const STRAYS: f64 = 0.03;
+
 /// Whether a surface does for its nodes as well as the free-form one, on the whole and in every
 /// place.
 pub(crate) fn is_as_good(
@@ -37,7 +40,7 @@ pub(crate) fn is_as_good(
     surface: &PatchSurface,
     free: &PatchSurface,
 ) -> bool {
-    let rms_mm = [surface, free].map(|s| residuals(image, nodes, s).0);
+    let rms_mm = [surface, free].map(|s| most_of(image, nodes, s));
     let blunted_mm = BLUNTED * image.pitch_mm();
     if rms_mm[0] > AS_WELL * rms_mm[1] + blunted_mm {
         return false;
@@ -60,4 +63,18 @@ pub(crate) fn is_as_good(
         let allowed_mm = TOGETHER * rms_mm[1] + blunted_mm * steepness;
         (off_mm / count as f64).abs() <= allowed_mm
     })
+}
+
+/// Root mean square distance of the nodes from a surface along its normals, millimetres, but for the
+/// few that are the farthest off.
+fn most_of(image: &RangeImage, nodes: &[Node], surface: &PatchSurface) -> f64 {
+    let off_mm2 = |node: &Node| {
+        let (x, y) = (image.x_mm(node.column), image.y_mm(node.row));
+        let [p, q] = [(1, 0), (0, 1)].map(|(u, v)| surface.z_partial(x, y, u, v));
+        (node.z_mm - surface.z(x, y)).powi(2) / (1.0 + p * p + q * q)
+    };
+    let mut squares_mm2: Vec<f64> = nodes.iter().map(off_mm2).collect();
+    squares_mm2.sort_by(f64::total_cmp);
+    squares_mm2.truncate(nodes.len() - (STRAYS * nodes.len() as f64) as usize);
+    (squares_mm2.iter().sum::<f64>() / squares_mm2.len().max(1) as f64).sqrt()
 }

@@ -30,9 +30,12 @@ const MET: f64 = 0.98;
 /// least squarely that it does at a node: what is steeper needs many patches and bounds nothing.
 const LEAST_FACING: f64 = 0.75;
 
-/// Narrowest span, pitches; half of that of a fit to nodes, since nothing is made up between
-/// them.
+/// Narrowest span, in the distance of the places that the shape is fitted at; half of that of a fit to
+/// nodes, since nothing is made up between them.
 const LEAST_SPAN: f64 = 1.0;
+
+/// Places to a pitch, tried one after the other: narrow rings that end steeply need many.
+const FINENESS: [usize; 3] = [1, 2, 4];
 
 /// How far a node may lie off the shape along its normal, pitches: what is found farther away is
 /// another sheet of it.
@@ -47,31 +50,37 @@ pub(crate) fn patches(
     domain: &Domain,
     most_spans: usize,
 ) -> Option<PatchSurface> {
-    let observations = match shape {
-        Shape::Plane(_) => over(shape, domain)?,
-        _ => around(shape, image, nodes, domain)?,
+    let patches = |fineness: usize| {
+        let observations = match shape {
+            Shape::Plane(_) => over(shape, domain)?,
+            _ => around(shape, image, nodes, (domain, fineness))?,
+        };
+        let demand = Demand {
+            tolerance_mm: AIM * SHAPE_TOLERANCE_MM,
+            noise_density_mm2: NO_NOISE_MM2,
+            least_span_mm: LEAST_SPAN * image.pitch_mm() / fineness as f64,
+            most_spans,
+        };
+        let (spline, _) = refine::fit(&observations, domain, &demand).ok()?;
+        let surface = spline.to_patches().ok()?;
+        is_that(shape, &surface, image, nodes).then_some(surface)
     };
-    let demand = Demand {
-        tolerance_mm: AIM * SHAPE_TOLERANCE_MM,
-        noise_density_mm2: NO_NOISE_MM2,
-        least_span_mm: LEAST_SPAN * image.pitch_mm(),
-        most_spans,
-    };
-    let (spline, _) = refine::fit(&observations, domain, &demand).ok()?;
-    let surface = spline.to_patches().ok()?;
-    is_that(shape, &surface, image, nodes).then_some(surface)
+    FINENESS.into_iter().find_map(patches)
 }
 
-/// Whether a surface is a shape at the nodes, to its tolerance.
+/// Whether a surface is a shape at the nodes at which that is, to its tolerance. Of the few at which it
+/// is not, which are of a wall beside it, nothing is asked.
 fn is_that(shape: &Shape, surface: &PatchSurface, image: &RangeImage, nodes: &[Node]) -> bool {
-    let squares = nodes.iter().map(|node| {
+    let (mut squares_mm2, mut count) = (0.0, 0.0_f64);
+    for node in nodes {
         let (x, y) = (image.x_mm(node.column), image.y_mm(node.row));
-        shape
-            .distance_mm(&Vector3::new(x, y, surface.z(x, y)))
-            .powi(2)
-    });
-    let rms_mm = (squares.sum::<f64>() / nodes.len() as f64).sqrt();
-    rms_mm <= SHAPE_TOLERANCE_MM
+        if met(shape, (x, y), node.z_mm, image.pitch_mm()).is_some() {
+            let off_mm = shape.distance_mm(&Vector3::new(x, y, surface.z(x, y)));
+            squares_mm2 += off_mm * off_mm;
+            count += 1.0;
+        }
+    }
+    count > 0.0 && (squares_mm2 / count).sqrt() <= SHAPE_TOLERANCE_MM
 }
 
 /// z of a shape over a place, and the cosine between z and its normal there; `None` where it is
@@ -101,13 +110,13 @@ fn over(shape: &Shape, domain: &Domain) -> Option<Vec<Observation>> {
         .collect()
 }
 
-/// A shape at the nodes of a region, and around them as far as borders may run. Distances count
-/// along the normal.
+/// A shape at the nodes of a region, around them as far as borders may run, and between them, at so
+/// many places to a pitch. Distances count along the normal.
 fn around(
     shape: &Shape,
     image: &RangeImage,
     nodes: &[Node],
-    domain: &Domain,
+    (domain, fineness): (&Domain, usize),
 ) -> Option<Vec<Observation>> {
     let margin = SURFACE_MARGIN.ceil() as usize;
     let extent = |of: fn(&Node) -> usize| {
@@ -158,9 +167,17 @@ fn around(
         }
     }
     let is_within = |(low, high): (f64, f64), at: f64| (low..=high).contains(&at);
-    let observation = |(i, j): (usize, usize)| {
-        let (value, facing) = known[i * height + j]?;
-        let (u, v) = (x_mm(i), y_mm(j));
+    let observation = |(i, j): (usize, usize), (k, l): (usize, usize)| {
+        let (mut value, mut facing) = known[i * height + j]?;
+        let part = |k: usize| k as f64 * pitch_mm / fineness as f64;
+        let (u, v) = (x_mm(i) + part(k), y_mm(j) + part(l));
+        if (k, l) != (0, 0) {
+            // Only between places at which the shape is.
+            let beyond = (i + k.min(1), j + l.min(1));
+            let is_inside = beyond.0 < width && beyond.1 < height;
+            let (there, _) = is_inside.then(|| known[beyond.0 * height + beyond.1])??;
+            (value, facing) = met(shape, (u, v), value.min(there), pitch_mm)?;
+        }
         (is_within(domain.x_mm, u) && is_within(domain.y_mm, v)).then_some(Observation {
             u,
             v,
@@ -169,7 +186,10 @@ fn around(
         })
     };
     let places = (0..width).flat_map(|i| (0..height).map(move |j| (i, j)));
-    Some(places.filter_map(observation).collect())
+    let between = || (0..fineness).flat_map(|k| (0..fineness).map(move |l| (k, l)));
+    let all = places.flat_map(|place| between().map(move |part| (place, part)));
+    let all = all.filter_map(|(place, part)| observation(place, part));
+    Some(all.collect())
 }
 
 #[cfg(test)]
@@ -282,11 +302,57 @@ mod tests {
         };
         let nodes: Vec<Node> = places.filter_map(node).collect();
         assert!(nodes.len() > 1_000, "{}", nodes.len());
-        let found = around(&shape, &image, &nodes, &whole()).unwrap();
+        let found = around(&shape, &image, &nodes, (&whole(), 1)).unwrap();
         assert!(found.len() > nodes.len(), "it goes on a little");
         for o in &found {
             let off = o.value - exact(o.u, o.v);
             assert!(off.abs() < 1e-6, "{}, {}: {}", o.u, o.v, o.value);
+        }
+    }
+
+    /// A fillet around a boss, and some nodes of the wall that it has become.
+    #[test]
+    fn a_few_nodes_of_a_wall_do_not_keep_a_fillet_from_being_one() {
+        let (radius_mm, tube_mm) = (11.6, 2.6);
+        let shape = Shape::Torus(Torus {
+            centre_mm: Vector3::zeros(),
+            axis: Vector3::z(),
+            radius_mm,
+            tube_mm,
+            is_hollow: true,
+        });
+        let image = RangeImage::masked(Lattice { pitch_mm: 0.42 }, -60, -60, 120, 120);
+        let places = (0..120).flat_map(|column| (0..120).map(move |row| (column, row)));
+        let mut of_wall = 0;
+        let node = |(column, row)| {
+            let (x, y) = (image.x_mm(column), image.y_mm(row));
+            let beyond = radius_mm - libm::sqrt(x * x + y * y);
+            let z_mm = -libm::sqrt((tube_mm * tube_mm - beyond * beyond).max(0.0));
+            let is_wall = (2.55..2.75).contains(&beyond) && y > 7.5;
+            of_wall += usize::from(is_wall);
+            ((0.0..2.5).contains(&beyond) || is_wall).then_some(Node {
+                column,
+                row,
+                z_mm: if is_wall { z_mm + 0.9 } else { z_mm },
+            })
+        };
+        let nodes: Vec<Node> = places.filter_map(node).collect();
+        assert!(
+            (5..nodes.len() / 50).contains(&of_wall),
+            "{of_wall} of {}",
+            nodes.len()
+        );
+        let domain = Domain {
+            x_mm: (-14.0, 14.0),
+            y_mm: (-14.0, 14.0),
+        };
+        let surface = patches(&shape, &image, &nodes, &domain, 256).unwrap();
+        for node in nodes.iter().filter(|node| node.z_mm < -0.9) {
+            let (x, y) = (image.x_mm(node.column), image.y_mm(node.row));
+            let off_mm = shape
+                .distance_mm(&Vector3::new(x, y, surface.z(x, y)))
+                .abs();
+            assert!(off_mm < 0.02, "{x} {y}: {off_mm}");
         }
     }
 

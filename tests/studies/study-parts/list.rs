@@ -80,6 +80,13 @@ pub(crate) fn list(parts: &[Measured]) -> String {
                 edges.rms_mm(),
             );
         }
+        for own in &part.outcome.tangent.accepted {
+            let _ = writeln!(out, "  regions {:?} touch", own.labels);
+        }
+        for own in &part.outcome.tangent.refused {
+            let (labels, why) = (&own.labels, own.reason);
+            let _ = writeln!(out, "  regions {labels:?} seem to touch: {why:?}");
+        }
         for apart in crate::edges::apart(&part.outcome.reconstruction.model) {
             let _ = writeln!(out, "  {apart}");
         }
