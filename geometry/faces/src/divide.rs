@@ -8,6 +8,7 @@ use crate::compete::{NONE, Pieces};
 use crate::field::{Field, Set, places};
 use crate::join::join;
 use crate::observations::Observations;
+use crate::profile::{Kept, split_profile};
 use crate::split::split;
 use crate::strain::is_strained;
 
@@ -44,39 +45,60 @@ pub fn divide(
     let split = nodes.par_iter().map(|nodes| {
         monitor.check()?;
         let Some(field) = Field::new(image, observations, nodes) else {
-            return Ok(Vec::new());
+            return Ok(Apart::default());
         };
         if is_one(&field) {
-            return Ok(Vec::new());
+            return Ok(Apart::default());
         }
-        let pieces = split(&field, monitor)?.unwrap_or_default();
+        let swept = split_profile(&field, monitor)?;
+        let is_swept = swept.is_some();
+        let pieces = match swept {
+            Some(pieces) => pieces,
+            None => split(&field, monitor)?.unwrap_or_default(),
+        };
         let of_image = |set: &Set| {
             let nodes = places(set)
                 .into_iter()
                 .filter_map(|place| field.node(place));
             nodes.map(|node| node.index).collect::<Vec<_>>()
         };
-        Ok(pieces.iter().map(of_image).collect())
+        Ok(Apart {
+            pieces: pieces.iter().map(of_image).collect(),
+            is_swept,
+        })
     });
-    let split: Vec<Result<Vec<Vec<usize>>, Cancelled>> = split.collect();
+    let split: Vec<Result<Apart, Cancelled>> = split.collect();
     let split = split.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut labels = regions.raw_labels().to_vec();
-    let unlabelled = relabel(&mut labels, regions.regions(), &split);
-    join(image, &mut labels, observations, monitor)?;
+    let (unlabelled, mut kept) = relabel(&mut labels, regions.regions(), &split);
+    join(image, &mut labels, &mut kept, observations, monitor)?;
     let changed = changed(regions.raw_labels(), &labels);
-    place_borders(image, &mut labels, &changed, observations, monitor)?;
+    let borders = Borders {
+        changed: &changed,
+        kept: &kept,
+    };
+    place_borders(image, &mut labels, &borders, observations, monitor)?;
     Ok(Divided {
         regions: RegionMap::new(image, labels),
         unlabelled,
     })
 }
 
+/// The pieces of a region, as nodes of the image; none where it stays whole.
+#[derive(Debug, Clone, Default)]
+struct Apart {
+    pieces: Vec<Vec<usize>>,
+    /// Whether they are of one swept profile.
+    is_swept: bool,
+}
+
 /// Labels the pieces of each region, the first of which keeps the label. Gives how many regions
-/// stay whole since there are no labels left for their pieces.
-fn relabel(labels: &mut [u16], regions: u16, split: &[Vec<Vec<usize>>]) -> usize {
+/// stay whole since there are no labels left for their pieces, and the borders that are kept.
+fn relabel(labels: &mut [u16], regions: u16, split: &[Apart]) -> (usize, Kept) {
     let mut next = regions;
     let mut whole = 0;
-    for pieces in split {
+    let mut kept = Kept::default();
+    for (region, Apart { pieces, is_swept }) in split.iter().enumerate() {
         let more = pieces.len().saturating_sub(1);
         let Some(last) = u16::try_from(more).ok().and_then(|m| next.checked_add(m)) else {
             whole += 1;
@@ -86,8 +108,13 @@ fn relabel(labels: &mut [u16], regions: u16, split: &[Vec<Vec<usize>>]) -> usize
             piece.iter().for_each(|node| labels[*node] = label);
         }
         next = last;
+        for node in pieces.iter().filter_map(|piece| piece.first()) {
+            if *is_swept {
+                kept.add(labels[*node], region);
+            }
+        }
     }
-    whole
+    (whole, kept)
 }
 
 /// Which labels, as indices, have lost or gained nodes.
@@ -101,19 +128,33 @@ fn changed(before: &[u16], after: &[u16]) -> Vec<bool> {
     changed
 }
 
-/// Gives nodes at the borders of changed regions to those whose shape explains them best. Other
-/// borders are where the nodes on either side have them, at steps, too.
+/// Which borders may move.
+struct Borders<'a> {
+    /// Labels, as indices, that have lost or gained nodes. Other borders are where the nodes on
+    /// either side have them, at steps, too.
+    changed: &'a [bool],
+    kept: &'a Kept,
+}
+
+impl Borders<'_> {
+    fn may_pass(&self, old: u16, new: u16) -> bool {
+        let is_changed = self.changed[usize::from(old)] || self.changed[usize::from(new)];
+        is_changed && !self.kept.are_apart(old, new)
+    }
+}
+
+/// Gives nodes at borders that may move to those whose shape explains them best.
 fn place_borders(
     image: &RangeImage,
     labels: &mut [u16],
-    changed: &[bool],
+    borders: &Borders<'_>,
     observations: &Observations,
     monitor: &dyn Monitor,
 ) -> Result<(), Cancelled> {
     let labelled: Vec<usize> = (0..labels.len())
         .filter(|node| labels[*node] != 0)
         .collect();
-    if !changed.contains(&true) {
+    if !borders.changed.contains(&true) {
         return Ok(());
     }
     let Some(field) = Field::new(image, observations, &labelled) else {
@@ -146,7 +187,7 @@ fn place_borders(
             && *label != NONE
         {
             let (old, new) = (&mut labels[node.index], *label as u16 + 1);
-            if changed[usize::from(*old)] || changed[usize::from(new)] {
+            if borders.may_pass(*old, new) {
                 *old = new;
             }
         }
@@ -189,10 +230,20 @@ mod tests {
             vec![vec![2], vec![3], vec![4]],
             vec![vec![5], vec![6]],
         ];
-        let whole = relabel(&mut labels, u16::MAX - 2, &split);
+        let split = split.map(|pieces| Apart {
+            is_swept: pieces.len() == 2,
+            pieces,
+        });
+        let (whole, kept) = relabel(&mut labels, u16::MAX - 2, &split);
         assert_eq!(whole, 1);
         assert_eq!(labels, [1, u16::MAX - 1, 2, 2, 2, 3, u16::MAX]);
-        assert_eq!(relabel(&mut labels, 3, &[Vec::new(), vec![vec![2]]]), 0);
+        assert!(kept.are_apart(1, u16::MAX - 1) && kept.are_apart(3, u16::MAX));
+        assert!(!kept.are_apart(1, 3));
+        let one = Apart {
+            pieces: vec![vec![2]],
+            is_swept: false,
+        };
+        assert_eq!(relabel(&mut labels, 3, &[Apart::default(), one]).0, 0);
         assert_eq!(labels[2], 2);
     }
 }

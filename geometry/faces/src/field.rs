@@ -215,6 +215,11 @@ impl<'a> Field<'a> {
         decide(&samples, self.area()).into_fit()
     }
 
+    /// Where a node lies, millimetres.
+    pub(crate) fn point_mm(&self, place: usize) -> Option<Vector3<f64>> {
+        self.nodes[place].as_ref().map(|node| node.point_mm)
+    }
+
     /// Whether there is a node.
     pub(crate) fn has(&self, place: usize) -> bool {
         self.nodes[place].is_some()

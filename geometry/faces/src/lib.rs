@@ -20,6 +20,7 @@ mod fillet;
 mod grow;
 mod join;
 mod observations;
+mod profile;
 mod split;
 mod strain;
 #[cfg(test)]
