@@ -50,11 +50,9 @@ pub fn divide(
         if is_one(&field) {
             return Ok(Apart::default());
         }
-        let swept = split_profile(&field, monitor)?;
-        let is_swept = swept.is_some();
-        let pieces = match swept {
-            Some(pieces) => pieces,
-            None => split(&field, monitor)?.unwrap_or_default(),
+        let (pieces, swept) = match split_profile(&field, monitor)? {
+            Some(parted) => (parted.pieces, parted.swept),
+            None => (split(&field, monitor)?.unwrap_or_default(), 0),
         };
         let of_image = |set: &Set| {
             let nodes = places(set)
@@ -64,7 +62,7 @@ pub fn divide(
         };
         Ok(Apart {
             pieces: pieces.iter().map(of_image).collect(),
-            is_swept,
+            swept,
         })
     });
     let split: Vec<Result<Apart, Cancelled>> = split.collect();
@@ -88,8 +86,8 @@ pub fn divide(
 #[derive(Debug, Clone, Default)]
 struct Apart {
     pieces: Vec<Vec<usize>>,
-    /// Whether they are of one swept profile.
-    is_swept: bool,
+    /// How many of them, the first, are of one swept profile.
+    swept: usize,
 }
 
 /// Labels the pieces of each region, the first of which keeps the label. Gives how many regions
@@ -98,7 +96,7 @@ fn relabel(labels: &mut [u16], regions: u16, split: &[Apart]) -> (usize, Kept) {
     let mut next = regions;
     let mut whole = 0;
     let mut kept = Kept::default();
-    for (region, Apart { pieces, is_swept }) in split.iter().enumerate() {
+    for (region, Apart { pieces, swept }) in split.iter().enumerate() {
         let more = pieces.len().saturating_sub(1);
         let Some(last) = u16::try_from(more).ok().and_then(|m| next.checked_add(m)) else {
             whole += 1;
@@ -108,10 +106,9 @@ fn relabel(labels: &mut [u16], regions: u16, split: &[Apart]) -> (usize, Kept) {
             piece.iter().for_each(|node| labels[*node] = label);
         }
         next = last;
-        for node in pieces.iter().filter_map(|piece| piece.first()) {
-            if *is_swept {
-                kept.add(labels[*node], region);
-            }
+        let of_profile = pieces.iter().take(*swept);
+        for node in of_profile.filter_map(|piece| piece.first()) {
+            kept.add(labels[*node], region);
         }
     }
     (whole, kept)
@@ -231,7 +228,7 @@ mod tests {
             vec![vec![5], vec![6]],
         ];
         let split = split.map(|pieces| Apart {
-            is_swept: pieces.len() == 2,
+            swept: pieces.len() - 2 * usize::from(pieces.len() == 3),
             pieces,
         });
         let (whole, kept) = relabel(&mut labels, u16::MAX - 2, &split);
@@ -241,7 +238,7 @@ mod tests {
         assert!(!kept.are_apart(1, 3));
         let one = Apart {
             pieces: vec![vec![2]],
-            is_swept: false,
+            swept: 0,
         };
         assert_eq!(relabel(&mut labels, 3, &[Apart::default(), one]).0, 0);
         assert_eq!(labels[2], 2);

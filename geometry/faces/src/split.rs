@@ -106,7 +106,7 @@ pub(crate) fn split(
 
 /// Whether what has grown is of one surface, and not of several that some shape is near to. What
 /// joins it smoothly may be of it as far as noise tells, so nodes near its border are not asked.
-fn is_of_one(field: &Field<'_>, piece: &Piece) -> bool {
+pub(crate) fn is_of_one(field: &Field<'_>, piece: &Piece) -> bool {
     let inner = field.within(&piece.nodes, JOINED);
     let fit = piece.fit.as_ref();
     fit.is_none_or(|fit| !is_strained(field, fit, &inner))

@@ -17,8 +17,8 @@ const DOUBT: f64 = 4.0;
 pub(super) struct Chain {
     pub(super) curves: Vec<Curve>,
     pub(super) breaks_mm: Vec<f64>,
-    /// How many arcs there are that touch the lines beside them.
-    pub(super) touching: usize,
+    /// How many numbers arcs that touch lines have less than others, with their ends.
+    pub(super) spared: f64,
     /// Of the stations: small numbers keep their digits.
     middle: [f64; 2],
 }
@@ -41,7 +41,7 @@ impl Chain {
         ascend.then_some(Self {
             curves,
             breaks_mm,
-            touching: 0,
+            spared: 0.0,
             middle,
         })
     }
@@ -66,18 +66,32 @@ impl Chain {
         self.curves[self.at(s_mm)].off(s_mm - self.middle[0], t_mm - self.middle[1])
     }
 
-    /// Its free numbers. Of an arc that touches lines only the radius is free, and its ends are
-    /// where it touches them.
+    /// Its free numbers.
     pub(super) fn freedom(&self) -> f64 {
         let curves = self.curves.iter().map(Curve::freedom).sum::<f64>();
-        curves + self.breaks_mm.len() as f64 - 4.0 * self.touching as f64
+        curves + self.breaks_mm.len() as f64 - self.spared
     }
 
     /// The weighted squares that it leaves.
     pub(super) fn left(&self, stations: &[Station]) -> f64 {
-        let square = |s: &Station| s.weight * self.off(s.s_mm, s.t_mm).0.powi(2);
-        stations.iter().map(square).sum()
+        self.left_seen(&self.seen(stations))
     }
+
+    /// The same of stations from the middle.
+    pub(super) fn left_seen(&self, stations: &[Station]) -> f64 {
+        let curve = |s: &Station| &self.curves[self.seen_at(s.s_mm)];
+        stations.iter().map(|s| square(curve(s), s)).sum()
+    }
+}
+
+/// The weighted squares that a curve leaves of stations.
+pub(super) fn left(curve: &Curve, stations: &[Station]) -> f64 {
+    stations.iter().map(|s| square(curve, s)).sum()
+}
+
+/// What a curve leaves of a station.
+pub(super) fn square(curve: &Curve, station: &Station) -> f64 {
+    station.weight * curve.off(station.s_mm, station.t_mm).0.powi(2)
 }
 
 /// The middle of stations.
@@ -140,7 +154,6 @@ fn placed(
         .iter()
         .filter(|s| s.s_mm > low && s.s_mm < high)
         .collect();
-    let square = |curve: &Curve, s: &Station| s.weight * curve.off(s.s_mm, s.t_mm).0.powi(2);
     let cost = |at_mm: f64| {
         let costs = near
             .iter()

@@ -19,166 +19,63 @@ mod curve;
 mod cut;
 mod kept;
 mod motion;
+mod parted;
 mod refine;
 mod rounding;
 mod smooth;
 mod stations;
 mod sweep;
+mod swept;
+mod touching;
+
+pub(crate) use kept::Kept;
+pub(crate) use parted::Parted;
 
 use range_image::{Cancelled, Monitor};
-use shapes::Sample;
 
-use crate::compete::{NONE, Pieces};
-use crate::field::{Field, Set};
-use crate::grow::FEWEST;
-use crate::split::NO_CREASE;
-use crate::strain::are_strained;
-pub(crate) use kept::Kept;
-
-use chain::Chain;
-use curve::Curve;
-use cut::cuts;
+use crate::field::{Field, count};
 use motion::motions;
-use refine::refined;
-use rounding::rounded;
-use smooth::smooth;
-use stations::{Profile, Station};
-use sweep::{Motion, Sweep};
+use swept::Swept;
 
 /// Nodes at the border of a region that may be of the next.
 const FAR: usize = 2;
-/// Samples by which the motion is found, and the profile then told, at most.
-const SOME: usize = 4000;
-const MANY: usize = 40_000;
-/// Samples that deviate from the profile by more than this, of what they are said to, are of no
-/// sweep.
-const MOST_DEVIATION: f64 = 2.0;
-/// Least width of a piece, in pitches: what is narrower has hardly a node within.
-const LEAST_WIDTH: f64 = 2.5;
-/// Bins of the profile to a pitch: breaks are told between nodes.
-const BINS: f64 = 2.0;
-/// Samples of a bin, where there are enough.
-const PER_BIN: f64 = 12.0;
-/// What each number costs above its price, as where shapes are told apart.
-const CAUTION: f64 = 4.0;
+/// Least share of a region that one sweep must explain for the rest to be looked at: rims and small
+/// features are left over, where more is the sweep may be no more than near to a free form.
+const MOSTLY: f64 = 0.85;
 
-/// A motion and the chain that it sweeps, with what that costs.
-struct Swept {
-    sweep: Sweep,
-    chain: Chain,
-    cost: f64,
-}
-
-/// The pieces of a region that is one swept profile of several lines and arcs, each in its
-/// connected parts; `None` where it is not.
+/// The pieces of a region that is one swept profile of several lines and arcs, or is for the most
+/// part, and the rest of single shapes; `None` where it is not.
 pub(crate) fn split_profile(
     field: &Field<'_>,
     monitor: &dyn Monitor,
-) -> Result<Option<Vec<Set>>, Cancelled> {
+) -> Result<Option<Parted>, Cancelled> {
     let all = field.all();
-    let inner = field.within(&all, FAR);
-    let many = field.samples(&all, FAR, MANY);
-    let some: Vec<Sample> = shapes::spread(many.len(), SOME).map(|k| many[k]).collect();
-    let mut best: Option<Swept> = None;
-    for sweep in motions(field, &inner) {
+    let mut found: Vec<Swept> = Vec::new();
+    for sweep in motions(field, &field.within(&all, FAR)) {
         monitor.check()?;
-        let swept = swept(field, &inner, sweep, &some, &many);
-        best = [best, swept]
-            .into_iter()
-            .flatten()
-            .min_by(|a, b| a.cost.total_cmp(&b.cost));
+        found.extend(Swept::of(field, &all, sweep));
     }
-    Ok(best.and_then(|swept| pieces(field, &swept)))
-}
-
-/// The region as what a motion like this sweeps.
-fn swept(
-    field: &Field<'_>,
-    inner: &[bool],
-    sweep: Sweep,
-    some: &[Sample],
-    many: &[Sample],
-) -> Option<Swept> {
-    let pitch_mm = field.pitch_mm();
-    let (sweep, profile) = refined(sweep, some, pitch_mm)?;
-    if profile.deviation > MOST_DEVIATION {
-        return None;
+    found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let is_whole = |swept: &&Swept| swept.is_sound() && swept.explains(field, &all, FAR);
+    if let Some(swept) = found.iter().find(is_whole) {
+        return Ok(Parted::of(field, swept, &all));
     }
-    let (sweep, _) = refined(sweep, many, pitch_mm)?;
-    let profile = Profile::of(&sweep, many, pitch_mm / BINS, PER_BIN)?.held(many);
-    let stations: Vec<Station> = profile.stations.iter().flatten().copied().collect();
-    let independent = many.len() as f64 / field.area().max(1.0);
-    let price = libm::log(independent.max(2.0)) + CAUTION;
-    let least_mm = LEAST_WIDTH * pitch_mm;
-    let cuts = cuts(&stations, least_mm, price);
-    if cuts.len() < 2 {
-        return None;
-    }
-    let chain = Chain::of(&stations, &cuts, least_mm)?;
-    let chain = rounded(chain, &stations, price, least_mm);
-    let left = chain.left(&stations);
-    let cost = left + price * chain.freedom();
-    let smooth = smooth(&stations, price, stations.len() / 3);
-    if smooth < cost || sweep.motion == Motion::Extrusion && has_gentle(&chain) {
-        return None;
-    }
-    let offs = |samples: &[Sample]| {
-        let off = |sample: &Sample| {
-            let placed = sweep.place(&sample.point_mm);
-            let (off_mm, slope) = chain.off(placed.s_mm, placed.t_mm);
-            off_mm / sample.deviation_mm(&placed.normal(slope))
-        };
-        samples.iter().map(off).collect()
-    };
-    let strained = are_strained(field, inner, profile.deviation, &offs);
-    (!strained).then_some(Swept { sweep, chain, cost })
-}
-
-/// Whether flat pieces meet in no crease, be it round: these are parts of a wavy surface.
-fn has_gentle(chain: &Chain) -> bool {
-    let curves = &chain.curves;
-    let is_gentle = |a: &Curve, b: &Curve| match (a, b) {
-        (Curve::Line { normal: a, .. }, Curve::Line { normal: b, .. }) => {
-            a[0] * b[0] + a[1] * b[1] > NO_CREASE
+    for swept in &found {
+        monitor.check()?;
+        let on = swept.nodes(field, &all);
+        if (count(&on) as f64) < MOSTLY * count(&all) as f64 {
+            continue;
         }
-        _ => false,
-    };
-    let next = curves.windows(2).any(|pair| is_gentle(&pair[0], &pair[1]));
-    let over =
-        |three: &[Curve]| matches!(three[1], Curve::Arc { .. }) && is_gentle(&three[0], &three[2]);
-    next || curves.windows(3).any(over)
-}
-
-/// The nodes of each curve of a chain in connected parts, with those of parts that are too small
-/// given to neighbours.
-fn pieces(field: &Field<'_>, swept: &Swept) -> Option<Vec<Set>> {
-    let label = |place: usize| {
-        let point_mm = field.point_mm(place)?;
-        Some(swept.chain.at(swept.sweep.place(&point_mm).s_mm))
-    };
-    let mut labels: Vec<usize> = (0..field.len()).map(|p| label(p).unwrap_or(NONE)).collect();
-    for part in field.alike(&labels) {
-        if part.len() < FEWEST {
-            part.iter().for_each(|place| labels[*place] = NONE);
+        // What it does not explain has no say in where its breaks are.
+        let again = Swept::of(field, &on, swept.sweep);
+        let again = again.filter(|s| s.is_sound() && s.explains(field, &on, FAR));
+        let Some(again) = again else { continue };
+        let parted = Parted::of(field, &again, &on);
+        if parted.is_some() {
+            return Ok(parted);
         }
     }
-    let mut pieces = Pieces {
-        field,
-        labels,
-        fits: vec![None; swept.chain.curves.len()],
-    };
-    pieces.fill();
-    let set = |part: Vec<usize>| {
-        let mut set = vec![false; field.len()];
-        part.into_iter().for_each(|place| set[place] = true);
-        set
-    };
-    let parts = field.alike(&pieces.labels).into_iter();
-    let sets: Vec<Set> = parts
-        .filter(|part| pieces.labels[part[0]] != NONE)
-        .map(set)
-        .collect();
-    (sets.len() > 1).then_some(sets)
+    Ok(None)
 }
 
 #[cfg(test)]
@@ -186,7 +83,7 @@ mod tests {
     use range_image::Unmonitored;
 
     use super::*;
-    use crate::field::count;
+    use crate::grow::FEWEST;
     use crate::testing::Scan;
 
     const PITCH_MM: f64 = 0.4;
@@ -198,9 +95,10 @@ mod tests {
             .filter(|node| !scan.image.raw_z_mm()[*node].is_nan())
             .collect();
         let field = Field::new(&scan.image, &scan.observations, &nodes).unwrap();
-        let sets = split_profile(&field, &Unmonitored).unwrap();
+        let parted = split_profile(&field, &Unmonitored).unwrap();
+        let sets = parted.map_or_else(Vec::new, |parted| parted.pieces);
         let mut labels = vec![0; columns * rows];
-        for (k, set) in sets.into_iter().flatten().enumerate() {
+        for (k, set) in sets.into_iter().enumerate() {
             assert!(count(&set) >= FEWEST);
             for place in (0..set.len()).filter(|place| set[*place]) {
                 assert_eq!(labels[place], 0);
@@ -296,13 +194,33 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_sweep_all_over_is_left_whole() {
+    fn what_is_on_a_swept_profile_is_a_piece_of_its_own() {
         // A gentle dome on one half of a roof.
         let roof = |x: f64, y: f64| {
             let over2 = (x - 27.0).powi(2) + (y - 12.0).powi(2);
             let dome = libm::sqrt(400.0 - over2.min(25.0)) - libm::sqrt(375.0);
             -0.2 * (x - 18.0).abs() + dome
         };
-        assert!(labels((90, 60), roof).iter().all(|label| *label == 0));
+        let labels = labels((90, 60), roof);
+        assert_eq!(labels.iter().max(), Some(&3));
+        are_near(&breaks_mm(&labels, 60), &[18.0, 22.0, 32.0], 0.7);
+    }
+
+    #[test]
+    fn the_rims_of_a_plate_are_pieces_along_the_profile_and_across() {
+        let (cos, sin) = (libm::cos(0.3), libm::sin(0.3));
+        let plate = |x: f64, y: f64| {
+            let (x, y) = (x - 24.0, y - 21.0);
+            let over = |from: f64, half: f64| (from.abs() - half).max(0.0);
+            let (x, y) = (over(x * cos + y * sin, 16.0), over(y * cos - x * sin, 12.0));
+            let over2 = x * x + y * y;
+            if over2 < 9.0 {
+                libm::sqrt(3.6 * 3.6 - over2)
+            } else {
+                f64::NAN
+            }
+        };
+        let labels = labels((120, 105), plate);
+        assert_eq!(labels.iter().max(), Some(&5));
     }
 }

@@ -6,8 +6,6 @@ use shapes::Sample;
 use super::stations::Profile;
 use super::sweep::{MOST_FREE, Sweep};
 
-/// Steps at most, of the numbers of the motion.
-const STEPS: usize = 12;
 /// Most of a turn in one step, radians: farther, slopes are others.
 const MOST_TURN: f64 = 0.1;
 /// Change of the deviation, relative, at which it has settled.
@@ -19,10 +17,16 @@ const HALVINGS: usize = 4;
 /// Samples of each bin.
 const PER_BIN: f64 = 12.0;
 
-/// The motion after some steps of Gauss and Newton, and its profile in bins of this width.
-pub(super) fn refined(sweep: Sweep, samples: &[Sample], width_mm: f64) -> Option<(Sweep, Profile)> {
+/// The motion after at most so many steps of Gauss and Newton, and the deviation of samples about its
+/// profile in bins of this width.
+pub(super) fn refined(
+    sweep: Sweep,
+    samples: &[Sample],
+    width_mm: f64,
+    steps: usize,
+) -> Option<(Sweep, f64)> {
     let mut now = (sweep, Profile::of(&sweep, samples, width_mm, PER_BIN)?);
-    for _ in 0..STEPS {
+    for _ in 0..steps {
         let Some(mut step) = step(&now.0, &now.1, samples) else {
             break;
         };
@@ -45,7 +49,7 @@ pub(super) fn refined(sweep: Sweep, samples: &[Sample], width_mm: f64) -> Option
             break;
         }
     }
-    Some(now)
+    Some((now.0, now.1.deviation))
 }
 
 /// The step that linearised offs ask for.

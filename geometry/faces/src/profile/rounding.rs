@@ -3,13 +3,15 @@
 //! An arc that touches the lines beside it has one free number, its radius. By itself it has three,
 //! and each of its ends one more: so a narrow fillet is told from less with its lines than without.
 
-use super::chain::Chain;
+use super::chain::{Chain, square};
 use super::curve::{Curve, Moments};
 use super::stations::Station;
 
 /// Widths looked at, and halvings between the best two.
 const FIRST: u32 = 31;
 const HALVINGS: u32 = 12;
+/// Numbers that an arc between lines has less where it touches both.
+const SPARED: f64 = 4.0;
 /// Rounds of fitting the lines to what the arc leaves them.
 const ROUNDS: usize = 2;
 
@@ -61,10 +63,7 @@ fn round(
         arc = Some(found);
     }
     let arc = Edge::of(lines, &own)?.with_width(arc?.width_mm());
-    let before: f64 = own
-        .iter()
-        .map(|s| square(&chain.curves[chain.seen_at(s.s_mm)], s))
-        .sum();
+    let before = chain.left_seen(&own);
     if arc.left(&lines, &own) >= before + spared {
         return None;
     }
@@ -72,13 +71,8 @@ fn round(
         .curves
         .splice(first..=second, [lines[0], arc.curve, lines[1]]);
     chain.breaks_mm.splice(first..second, arc.ends_mm);
-    chain.touching += 1;
+    chain.spared += SPARED;
     Some(())
-}
-
-/// What a station leaves of a curve.
-fn square(curve: &Curve, station: &Station) -> f64 {
-    station.weight * curve.off(station.s_mm, station.t_mm).0.powi(2)
 }
 
 /// An arc that touches two lines, and where.

@@ -17,6 +17,9 @@ const FEWEST: usize = 4;
 /// A mean is no better known than that of so many samples with noise alone: a twentieth of their
 /// deviation is the scanner's own along the profile, and no averaging takes it away.
 const MOST_TELLING: f64 = 400.0;
+/// Bins that a slope is taken over, at least, and most stations to either side for that.
+const SLOPE_OVER: f64 = 1.5;
+const MOST_BESIDE: usize = 3;
 /// Samples from which deviations are told.
 const LEAST: usize = 100;
 
@@ -39,6 +42,7 @@ pub(super) struct Profile {
     /// How far samples lie off it, in their deviations, and their weights by that.
     pub(super) off: Vec<f64>,
     weights: Vec<f64>,
+    width_mm: f64,
     /// Their deviation from it, in what they are said to have.
     pub(super) deviation: f64,
 }
@@ -68,6 +72,7 @@ impl Profile {
             stations: vec![None; bins],
             off: Vec::new(),
             weights: vec![1.0; samples.len()],
+            width_mm: width,
             deviation: f64::INFINITY,
             placed,
         };
@@ -112,14 +117,20 @@ impl Profile {
         let means: Vec<(usize, Station)> = (0..sums.len())
             .filter_map(|k| Some((k, self.stations[k]?)))
             .collect();
+        // Rows of samples that fall in two bins would give two means in the same place.
+        let run = |j: usize, k: usize| {
+            let (_, before) = means[k.saturating_sub(j)];
+            let (_, after) = means[(k + j).min(means.len() - 1)];
+            (after.s_mm - before.s_mm, after.t_mm - before.t_mm)
+        };
         for (k, (bin, _)) in means.iter().enumerate() {
-            let (_, before) = means[k.saturating_sub(1)];
-            let (_, after) = means[(k + 1).min(means.len() - 1)];
-            let run = after.s_mm - before.s_mm;
+            let is_long = |j: &usize| run(*j, k).0 > SLOPE_OVER * self.width_mm;
+            let beside = (1..MOST_BESIDE).find(is_long).unwrap_or(MOST_BESIDE);
+            let (run, rise) = run(beside, k);
             if let Some(station) = &mut self.stations[*bin]
                 && run > 0.0
             {
-                station.slope = (after.t_mm - before.t_mm) / run;
+                station.slope = rise / run;
             }
         }
     }
