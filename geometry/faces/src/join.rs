@@ -16,8 +16,8 @@ const SAMPLES: usize = 1500;
 /// looked at together, in their deviations: what is a part of a surface tells less of the rest.
 const FAR: f64 = 10.0;
 
-/// Joins neighbours whose samples together are of one shape as well as they are of two, but for those
-/// with borders that are kept. `labels` are of the nodes, column by column; 0 is no region.
+/// Joins neighbours whose samples together are of one shape as well as they are of two, but for
+/// those with borders that are kept. `labels` are of the nodes, column by column; 0 is no region.
 pub(crate) fn join(
     image: &RangeImage,
     labels: &mut [u16],

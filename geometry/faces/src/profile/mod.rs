@@ -1,18 +1,18 @@
 //! A region that one profile sweeps, cut where the profile has its breaks.
 //!
-//! Of a turned shaft or an extruded bar the surface is told by one curve, the profile, and a motion.
-//! Averaged along the motion the profile is known to micrometres, far better than any window on the
-//! surface tells it, and it can be cut into straight lines and arcs in the best of all ways. So
-//! creases of a degree or two, and fillets of a few nodes, come to light that shapes grown from
-//! windows would smooth over.
+//! Of a turned shaft or an extruded bar the surface is told by one curve, the profile, and a
+//! motion. Averaged along the motion the profile is known to micrometres, far better than any
+//! window on the surface tells it, and it can be cut into straight lines and arcs in the best of
+//! all ways. So creases of a degree or two, and fillets of a few nodes, come to light that shapes
+//! grown from windows would smooth over.
 //!
 //! ```text
 //! normals --> motion --> refined by the samples --> stations (means along the motion)
 //!         --> lines and arcs by dynamic programming --> the nodes of each
 //! ```
 //!
-//! Regions that are not such a sweep all over, or whose profile is a smooth one as well, are left
-//! to others.
+//! Regions that are not such a sweep, but for rims and small features of single shapes, or whose
+//! profile is a smooth one as well, are left to others.
 
 mod chain;
 mod curve;

@@ -17,8 +17,8 @@ const HALVINGS: usize = 4;
 /// Samples of each bin.
 const PER_BIN: f64 = 12.0;
 
-/// The motion after at most so many steps of Gauss and Newton, and the deviation of samples about its
-/// profile in bins of this width.
+/// The motion after at most so many steps of Gauss and Newton, and the deviation of samples about
+/// its profile in bins of this width.
 pub(super) fn refined(
     sweep: Sweep,
     samples: &[Sample],

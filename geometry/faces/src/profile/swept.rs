@@ -84,8 +84,8 @@ impl Swept {
         self.cost <= self.smooth && !is_wavy
     }
 
-    /// Whether nowhere within a set of nodes, so far from its border, neighbouring samples lie to one
-    /// side of it.
+    /// Whether nowhere within a set of nodes, so far from its border, neighbouring samples lie to
+    /// one side of it.
     pub(super) fn explains(&self, field: &Field<'_>, set: &[bool], far: usize) -> bool {
         let offs = |samples: &[Sample]| {
             let off = |sample: &Sample| {

@@ -1,7 +1,8 @@
 //! Arcs that go on from a line smoothly.
 //!
-//! Such an arc has two free numbers, its radius and where it leaves the line; by itself it has three,
-//! and the break one more. So a short arc, and where it begins, are told better with the line.
+//! Such an arc has two free numbers, its radius and where it leaves the line; by itself it has
+//! three, and the break one more. So a short arc, and where it begins, are told better with the
+//! line.
 
 use super::chain::{Chain, left};
 use super::curve::{Curve, Moments};
@@ -13,8 +14,8 @@ const HALVINGS: u32 = 10;
 /// Numbers that an arc has less where it touches a line.
 const SPARED: f64 = 2.0;
 
-/// The chain with arcs beside one line that touch it wherever that costs less. Pieces are no narrower
-/// than `least_mm`.
+/// The chain with arcs beside one line that touch it wherever that costs less. Pieces are no
+/// narrower than `least_mm`.
 pub(super) fn touching(mut chain: Chain, stations: &[Station], price: f64, least_mm: f64) -> Chain {
     let own = chain.seen(stations);
     let is_line = |curve: Option<&Curve>| matches!(curve, Some(Curve::Line { .. }));
