@@ -8,6 +8,7 @@ use crate::compete::{NONE, Pieces};
 use crate::field::{Field, Set, places};
 use crate::join::join;
 use crate::observations::Observations;
+use crate::profile::{Kept, split_profile};
 use crate::split::split;
 use crate::strain::is_strained;
 
@@ -44,39 +45,58 @@ pub fn divide(
     let split = nodes.par_iter().map(|nodes| {
         monitor.check()?;
         let Some(field) = Field::new(image, observations, nodes) else {
-            return Ok(Vec::new());
+            return Ok(Apart::default());
         };
         if is_one(&field) {
-            return Ok(Vec::new());
+            return Ok(Apart::default());
         }
-        let pieces = split(&field, monitor)?.unwrap_or_default();
+        let (pieces, swept) = match split_profile(&field, monitor)? {
+            Some(parted) => (parted.pieces, parted.swept),
+            None => (split(&field, monitor)?.unwrap_or_default(), 0),
+        };
         let of_image = |set: &Set| {
             let nodes = places(set)
                 .into_iter()
                 .filter_map(|place| field.node(place));
             nodes.map(|node| node.index).collect::<Vec<_>>()
         };
-        Ok(pieces.iter().map(of_image).collect())
+        Ok(Apart {
+            pieces: pieces.iter().map(of_image).collect(),
+            swept,
+        })
     });
-    let split: Vec<Result<Vec<Vec<usize>>, Cancelled>> = split.collect();
+    let split: Vec<Result<Apart, Cancelled>> = split.collect();
     let split = split.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut labels = regions.raw_labels().to_vec();
-    let unlabelled = relabel(&mut labels, regions.regions(), &split);
-    join(image, &mut labels, observations, monitor)?;
+    let (unlabelled, mut kept) = relabel(&mut labels, regions.regions(), &split);
+    join(image, &mut labels, &mut kept, observations, monitor)?;
     let changed = changed(regions.raw_labels(), &labels);
-    place_borders(image, &mut labels, &changed, observations, monitor)?;
+    let borders = Borders {
+        changed: &changed,
+        kept: &kept,
+    };
+    place_borders(image, &mut labels, &borders, observations, monitor)?;
     Ok(Divided {
         regions: RegionMap::new(image, labels),
         unlabelled,
     })
 }
 
+/// The pieces of a region, as nodes of the image; none where it stays whole.
+#[derive(Debug, Clone, Default)]
+struct Apart {
+    pieces: Vec<Vec<usize>>,
+    /// How many of them, the first, are of one swept profile.
+    swept: usize,
+}
+
 /// Labels the pieces of each region, the first of which keeps the label. Gives how many regions
-/// stay whole since there are no labels left for their pieces.
-fn relabel(labels: &mut [u16], regions: u16, split: &[Vec<Vec<usize>>]) -> usize {
+/// stay whole since there are no labels left for their pieces, and the borders that are kept.
+fn relabel(labels: &mut [u16], regions: u16, split: &[Apart]) -> (usize, Kept) {
     let mut next = regions;
     let mut whole = 0;
-    for pieces in split {
+    let mut kept = Kept::default();
+    for (region, Apart { pieces, swept }) in split.iter().enumerate() {
         let more = pieces.len().saturating_sub(1);
         let Some(last) = u16::try_from(more).ok().and_then(|m| next.checked_add(m)) else {
             whole += 1;
@@ -86,8 +106,12 @@ fn relabel(labels: &mut [u16], regions: u16, split: &[Vec<Vec<usize>>]) -> usize
             piece.iter().for_each(|node| labels[*node] = label);
         }
         next = last;
+        let of_profile = pieces.iter().take(*swept);
+        for node in of_profile.filter_map(|piece| piece.first()) {
+            kept.add(labels[*node], region);
+        }
     }
-    whole
+    (whole, kept)
 }
 
 /// Which labels, as indices, have lost or gained nodes.
@@ -101,13 +125,27 @@ fn changed(before: &[u16], after: &[u16]) -> Vec<bool> {
     changed
 }
 
-/// Gives nodes at the borders of changed regions to those whose shape explains them best, and rounds
-/// off edges that are round. Other borders are where the nodes on either side have them, at steps,
-/// too.
+/// Which borders may move.
+struct Borders<'a> {
+    /// Labels, as indices, that have lost or gained nodes. Other borders are where the nodes on
+    /// either side have them, at steps, too.
+    changed: &'a [bool],
+    kept: &'a Kept,
+}
+
+impl Borders<'_> {
+    fn may_pass(&self, old: u16, new: u16) -> bool {
+        let is_changed = self.changed[usize::from(old)] || self.changed[usize::from(new)];
+        is_changed && !self.kept.are_apart(old, new)
+    }
+}
+
+/// Gives nodes at borders that may move to those whose shape explains them best, and rounds off edges
+/// that are round.
 fn place_borders(
     image: &RangeImage,
     labels: &mut [u16],
-    changed: &[bool],
+    borders: &Borders<'_>,
     observations: &Observations,
     monitor: &dyn Monitor,
 ) -> Result<(), Cancelled> {
@@ -138,16 +176,16 @@ fn place_borders(
         labels: of_field.clone(),
         fits: fits.into_iter().collect::<Result<_, _>>()?,
     };
-    if changed.contains(&true) {
+    if borders.changed.contains(&true) {
         pieces.compete(monitor)?;
-        let is_changed = |label: usize| label != NONE && changed[label + 1];
         for (new, old) in pieces.labels.iter_mut().zip(&of_field) {
-            if !is_changed(*new) && !is_changed(*old) {
+            if new != old && !borders.may_pass(label_of(*old), label_of(*new)) {
                 *new = *old;
             }
         }
     }
-    pieces.blend(monitor)?;
+    let are_apart = |a: usize, b: usize| borders.kept.are_apart(label_of(a), label_of(b));
+    pieces.blend(&are_apart, monitor)?;
     for (place, label) in pieces.labels.iter().enumerate() {
         if let Some(node) = field.node(place)
             && let Some(label) = label.checked_add(1).and_then(|l| u16::try_from(l).ok())
@@ -156,6 +194,11 @@ fn place_borders(
         }
     }
     Ok(())
+}
+
+/// The label of a piece; 0 for none.
+fn label_of(piece: usize) -> u16 {
+    piece.checked_add(1).map_or(0, |label| label as u16)
 }
 
 /// Whether a region is of one shape, all of it: nowhere do neighbouring samples lie to one side
@@ -193,10 +236,20 @@ mod tests {
             vec![vec![2], vec![3], vec![4]],
             vec![vec![5], vec![6]],
         ];
-        let whole = relabel(&mut labels, u16::MAX - 2, &split);
+        let split = split.map(|pieces| Apart {
+            swept: pieces.len() - 2 * usize::from(pieces.len() == 3),
+            pieces,
+        });
+        let (whole, kept) = relabel(&mut labels, u16::MAX - 2, &split);
         assert_eq!(whole, 1);
         assert_eq!(labels, [1, u16::MAX - 1, 2, 2, 2, 3, u16::MAX]);
-        assert_eq!(relabel(&mut labels, 3, &[Vec::new(), vec![vec![2]]]), 0);
+        assert!(kept.are_apart(1, u16::MAX - 1) && kept.are_apart(3, u16::MAX));
+        assert!(!kept.are_apart(1, 3));
+        let one = Apart {
+            pieces: vec![vec![2]],
+            swept: 0,
+        };
+        assert_eq!(relabel(&mut labels, 3, &[Apart::default(), one]).0, 0);
         assert_eq!(labels[2], 2);
     }
 }

@@ -40,6 +40,12 @@ pub(crate) struct Node {
     bend_mm: f64,
 }
 
+impl Node {
+    fn may_mm(&self, normal: &Vector3<f64>) -> f64 {
+        NEAR * self.deviation_mm * normal.z.abs() + self.bend_mm
+    }
+}
+
 impl<'a> Field<'a> {
     /// The nodes with these indices in the image, in ascending order, at least one.
     pub(crate) fn new(
@@ -100,11 +106,6 @@ impl<'a> Field<'a> {
         self.nodes[place].as_ref()
     }
 
-    /// The node at a place, if there is one.
-    pub(crate) fn point_mm(&self, place: usize) -> Option<Vector3<f64>> {
-        self.nodes[place].as_ref().map(|node| node.point_mm)
-    }
-
     /// The set of all nodes.
     pub(crate) fn all(&self) -> Set {
         self.nodes.iter().map(Option::is_some).collect()
@@ -115,9 +116,13 @@ impl<'a> Field<'a> {
         let Some(node) = &self.nodes[place] else {
             return f64::INFINITY;
         };
-        let facing = shape.normal(&node.point_mm).z.abs();
-        let may_mm = NEAR * node.deviation_mm * facing + node.bend_mm;
+        let may_mm = node.may_mm(&shape.normal(&node.point_mm));
         shape.distance_mm(&node.point_mm).abs() / may_mm
+    }
+
+    /// How far a node may lie off its surface with this unit normal, millimetres.
+    pub(crate) fn may_mm(&self, place: usize, normal: &Vector3<f64>) -> Option<f64> {
+        self.nodes[place].as_ref().map(|node| node.may_mm(normal))
     }
 
     /// Places up to so far to either side, as rows and columns go.
@@ -218,6 +223,11 @@ impl<'a> Field<'a> {
     pub(crate) fn fit(&self, set: &[bool], far: usize, most: usize) -> Option<Fit> {
         let samples = self.samples(set, far, most);
         decide(&samples, self.area()).into_fit()
+    }
+
+    /// Where a node lies, millimetres.
+    pub(crate) fn point_mm(&self, place: usize) -> Option<Vector3<f64>> {
+        self.nodes[place].as_ref().map(|node| node.point_mm)
     }
 
     /// Whether there is a node.

@@ -6,6 +6,7 @@ use range_image::{Cancelled, Monitor, RangeImage};
 use shapes::{Evidence, Sample, Shape, decide};
 
 use crate::observations::Observations;
+use crate::profile::Kept;
 
 /// Pairs of nodes beside each other that make regions neighbours.
 const LEAST_CONTACT: usize = 4;
@@ -15,11 +16,12 @@ const SAMPLES: usize = 1500;
 /// looked at together, in their deviations: what is a part of a surface tells less of the rest.
 const FAR: f64 = 10.0;
 
-/// Joins neighbours whose samples together are of one shape as well as they are of two.
-/// `labels` are of the nodes, column by column; 0 is no region.
+/// Joins neighbours whose samples together are of one shape as well as they are of two, but for
+/// those with borders that are kept. `labels` are of the nodes, column by column; 0 is no region.
 pub(crate) fn join(
     image: &RangeImage,
     labels: &mut [u16],
+    kept: &mut Kept,
     observations: &Observations,
     monitor: &dyn Monitor,
 ) -> Result<(), Cancelled> {
@@ -32,7 +34,13 @@ pub(crate) fn join(
     for (node, label) in labels.iter().enumerate().filter(|(_, label)| **label != 0) {
         regions.nodes.entry(*label).or_default().push(node);
     }
-    while let Some((a, b)) = regions.next(&neighbours(image, labels), monitor)? {
+    loop {
+        let mut pairs = neighbours(image, labels);
+        pairs.retain(|(a, b)| !kept.are_apart(*a, *b));
+        let Some((a, b)) = regions.next(&pairs, monitor)? else {
+            return Ok(());
+        };
+        kept.unite(a, b);
         let moved = regions.nodes.remove(&b).unwrap_or_default();
         moved.iter().for_each(|node| labels[*node] = a);
         let nodes = regions.nodes.entry(a).or_default();
@@ -45,7 +53,6 @@ pub(crate) fn join(
                 .retain(|pair| pair.0 != label && pair.1 != label);
         }
     }
-    Ok(())
 }
 
 /// Pairs of regions with enough nodes beside each other, the lower label first.

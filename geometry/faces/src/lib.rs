@@ -6,8 +6,9 @@
 //! neighbours that are one of these are made one.
 //!
 //! ```text
-//! regions, samples --> windows grown over their surface, the largest first
-//!                  --> nodes given to the piece that explains them best --> faces
+//! regions, samples --> of one shape? --> of one swept profile, cut into lines and arcs?
+//!     --> windows grown over their surface, the largest first
+//!     --> nodes given to the piece that explains them best --> faces
 //! ```
 //!
 //! What a window is of is decided by [`shapes::decide`], never by a distance; a region that is
@@ -21,6 +22,7 @@ mod fillet;
 mod grow;
 mod join;
 mod observations;
+mod profile;
 mod rounding;
 mod split;
 mod strain;

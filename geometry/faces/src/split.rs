@@ -31,7 +31,7 @@ const FLAT: f64 = 2.0;
 const SAMPLES: usize = 500;
 pub(crate) const STRAY: f64 = 4.0;
 /// Cosine of the turn (0.1 rad) up to which flat pieces of one region meet in no crease.
-const NO_CREASE: f64 = 0.995;
+pub(crate) const NO_CREASE: f64 = 0.995;
 /// Windows of a size that are looked at in a region, at most, and how many at once.
 const MOST_SEEDS: usize = 60;
 const AT_ONCE: usize = 8;

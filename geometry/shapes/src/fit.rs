@@ -30,9 +30,15 @@ impl Sample {
     /// side that was seen: what fits make least.
     #[must_use]
     pub fn off(&self, shape: &Shape) -> f64 {
-        let covered = shape.normal(&self.point_mm).dot(&self.ray);
-        let deviation_mm = (covered * covered + ACROSS * ACROSS).sqrt() * self.sigma_mm;
+        let deviation_mm = self.deviation_mm(&shape.normal(&self.point_mm));
         shape.distance_mm(&self.point_mm) / deviation_mm
+    }
+
+    /// Its standard deviation along the unit normal of a surface, millimetres.
+    #[must_use]
+    pub fn deviation_mm(&self, normal: &Vector3<f64>) -> f64 {
+        let covered = normal.dot(&self.ray);
+        (covered * covered + ACROSS * ACROSS).sqrt() * self.sigma_mm
     }
 }
 

@@ -26,8 +26,13 @@ const FITTED: usize = 1000;
 const WIDEST: usize = 30;
 
 impl Pieces<'_, '_> {
-    /// Finds fillets between pieces that meet, and bounds those that there are.
-    pub(crate) fn blend(&mut self, monitor: &dyn Monitor) -> Result<(), Cancelled> {
+    /// Finds fillets between pieces that meet, and bounds those that there are. Of pieces that `are_apart`
+    /// it is known already where they meet.
+    pub(crate) fn blend(
+        &mut self,
+        are_apart: &dyn Fn(usize, usize) -> bool,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Cancelled> {
         let contacts = self.contacts();
         let bounded = (0..self.fits.len()).filter_map(|fillet| self.rounded_by(fillet, &contacts));
         let known = contacts.keys();
@@ -36,7 +41,11 @@ impl Pieces<'_, '_> {
             sides: [a, b],
             fillet: None,
         });
-        let edges: Vec<Edge> = bounded.chain(sharp).collect();
+        let is_told = |edge: &Edge| match (edge.fillet, edge.sides) {
+            (Some(fillet), sides) => sides.iter().all(|side| are_apart(fillet, *side)),
+            (None, [a, b]) => are_apart(a, b),
+        };
+        let edges: Vec<Edge> = bounded.chain(sharp).filter(|e| !is_told(e)).collect();
         for edge in edges {
             monitor.check()?;
             self.round_off(&edge);
