@@ -15,7 +15,7 @@ use crate::border::settle::{Outlines, Placed};
 use crate::evidence::Evidence;
 use crate::fit::{Demand, Domain, FitError, patches_from_spline, patches_through_nodes};
 use crate::known;
-use crate::meeting::meet;
+use crate::meeting::{meet, part};
 use crate::metrics::{Metrics, compare, psnr_db};
 use crate::model::{EdgeKind, EdgeOrigin, Model, Surface};
 use crate::noise::ImageNoise;
@@ -241,6 +241,10 @@ impl<'a> Fitted<'a> {
         }
         for fit in &mut fits {
             fit.psnr_db = psnr_db(fit.rms_mm);
+        }
+        if settings.method == Method::Relief {
+            let surfaces: Vec<&PatchSurface> = carriers.iter().map(|own| &own.surface).collect();
+            part(&mut planar, &surfaces, placement);
         }
         let kinds = kinds(&planar, &carriers, placement);
         let origins = if settings.method == Method::Relief {

@@ -8,6 +8,7 @@
 
 mod corner;
 mod gap;
+mod part;
 #[cfg(test)]
 pub(crate) mod testing;
 mod touch;
@@ -26,6 +27,7 @@ use crate::border::map::{MapEdge, PlanarMap};
 use crate::polygon::{cross, minus, norm, signed_area};
 use corner::corner;
 pub(crate) use gap::{Gap, Line, Reach};
+pub(crate) use part::part;
 pub(crate) use touch::touch;
 use trace::trace;
 
