@@ -66,7 +66,7 @@ impl Curve {
     }
 }
 
-/// Weighted moments of stations; with z = s² + t².
+/// Weighted moments of stations; with z = s^2 + t^2.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Moments {
     all: f64,

@@ -102,7 +102,7 @@ fn touch(
 }
 
 /// The arc through stations that leaves a line at s. With u along the line from there and v above
-/// it, its points have curvature (u² + v²) + 2 v = 0, and others are half of that off.
+/// it, its points have curvature (u^2 + v^2) + 2 v = 0, and others are half of that off.
 fn leaving(line: &Curve, at_mm: f64, stations: &[Station]) -> Option<Curve> {
     let Curve::Line { normal, .. } = line else {
         return None;
