@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use nurbs::PatchSurface;
 use range_image::RangeImage;
 
+use crate::account::residuals;
 use crate::run::Node;
 
 /// A shape may leave its nodes so much more than a free-form surface, which follows the noise;
@@ -40,11 +41,13 @@ pub(crate) fn is_as_good(
     surface: &PatchSurface,
     free: &PatchSurface,
 ) -> bool {
-    let rms_mm = [surface, free].map(|s| most_of(image, nodes, s));
+    let most_mm = [surface, free].map(|s| most_of(image, nodes, s));
     let blunted_mm = BLUNTED * image.pitch_mm();
-    if rms_mm[0] > AS_WELL * rms_mm[1] + blunted_mm {
+    if most_mm[0] > AS_WELL * most_mm[1] + blunted_mm {
         return false;
     }
+    // Along z, as what the blocks are off.
+    let (deviation_mm, _) = residuals(image, nodes, free);
     // Of each block: nodes, sum of the nodes off the surface, and sum of their slopes.
     let mut blocks: BTreeMap<(usize, usize), (usize, f64, f64)> = BTreeMap::new();
     for node in nodes {
@@ -60,7 +63,7 @@ pub(crate) fn is_as_good(
     let mut large = blocks.values().filter(|block| block.0 >= FEWEST);
     large.all(|&(count, off_mm, steepness)| {
         let steepness = steepness / count as f64;
-        let allowed_mm = TOGETHER * rms_mm[1] + blunted_mm * steepness;
+        let allowed_mm = TOGETHER * deviation_mm + blunted_mm * steepness;
         (off_mm / count as f64).abs() <= allowed_mm
     })
 }
