@@ -81,3 +81,61 @@ fn most_of(image: &RangeImage, nodes: &[Node], surface: &PatchSurface) -> f64 {
     squares_mm2.truncate(nodes.len() - (STRAYS * nodes.len() as f64) as usize);
     (squares_mm2.iter().sum::<f64>() / squares_mm2.len().max(1) as f64).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::meeting::testing::{graph, plane};
+    use range_image::Lattice;
+
+    const NODES: usize = 60;
+
+    /// Whether a plane of this slope does for nodes that are so far off it along z, and off a free
+    /// form that has followed that, by noise alone.
+    fn does(slope: f64, noise_mm: f64, off_mm: impl Fn(usize, usize) -> f64) -> bool {
+        let image = RangeImage::masked(Lattice { pitch_mm: 0.5 }, -30, -30, NODES, NODES);
+        let places = (0..NODES).flat_map(|column| (0..NODES).map(move |row| (column, row)));
+        let node = |(column, row): (usize, usize)| {
+            let stray = ((column * 7 + row * 13) % 11) as f64 / 5.0 - 1.0;
+            Node {
+                column,
+                row,
+                z_mm: slope * image.x_mm(column) + off_mm(column, row) + 1.58 * noise_mm * stray,
+            }
+        };
+        let nodes: Vec<Node> = places.map(node).collect();
+        let at = |mm: f64| ((mm + 15.0) / 0.5).round().clamp(0.0, NODES as f64 - 1.0) as usize;
+        let free = graph(1.5, |x, y| slope * x + off_mm(at(x), at(y)));
+        is_as_good(&image, &nodes, &plane(0.0, slope, 0.0), &free)
+    }
+
+    #[test]
+    fn nodes_of_a_wall_do_not_tell_against_a_shape() {
+        // A column of nodes in sixty.
+        assert!(does(0.0, 0.01, |column, _| if column == 30 {
+            0.3
+        } else {
+            0.0
+        }));
+        assert!(!does(0.0, 0.01, |column, _| if column % 15 == 0 {
+            0.3
+        } else {
+            0.0
+        }));
+    }
+
+    #[test]
+    fn what_windows_blunt_of_a_slope_is_no_dent() {
+        let block = |off_mm: f64| {
+            move |column: usize, row: usize| {
+                let is_in = (24..32).contains(&column) && (24..32).contains(&row);
+                if is_in { off_mm } else { 0.0 }
+            }
+        };
+        assert!(does(3.0, 0.02, block(0.0)));
+        // As far off as is little along the normal.
+        assert!(does(3.0, 0.02, block(0.09)));
+        assert!(!does(3.0, 0.02, block(0.3)));
+        assert!(!does(0.0, 0.01, block(0.15)));
+    }
+}
