@@ -24,6 +24,7 @@ mod join;
 mod observations;
 mod profile;
 mod rounding;
+mod search;
 mod split;
 mod strain;
 #[cfg(test)]

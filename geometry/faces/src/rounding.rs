@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use shapes::{Cylinder, Sample, Shape};
 
+use crate::search::least;
 use crate::split::STRAY;
 
 /// Least turn from one shape to the other, radians: less is told by the shapes themselves.
@@ -54,19 +55,8 @@ impl Rounding {
             let off = self.offs(libm::exp(log_radius), samples);
             off.map(|off| off.abs().min(STRAY).powi(2)).sum::<f64>()
         };
-        let (low, high) = (libm::log(RADII.0 * pitch_mm), libm::log(RADII.1 * pitch_mm));
-        let mut step = (high - low) / f64::from(FIRST - 1);
-        let at = |k: u32| low + step * f64::from(k);
-        let all = (0..FIRST).map(|k| (left(at(k)), at(k)));
-        let least = |a: (f64, f64), b: (f64, f64)| if b.0 < a.0 { b } else { a };
-        let mut best = all.fold((f64::INFINITY, low), least);
-        for _ in 0..HALVINGS {
-            step /= 2.0;
-            for beside in [best.1 - step, best.1 + step] {
-                best = least(best, (left(beside), beside));
-            }
-        }
-        libm::exp(best.1)
+        let range = (libm::log(RADII.0 * pitch_mm), libm::log(RADII.1 * pitch_mm));
+        libm::exp(least(range, (FIRST, HALVINGS), left))
     }
 
     /// How far samples lie off the shapes and the edge of this radius, in their deviations.

@@ -6,6 +6,7 @@
 use super::chain::{Chain, square};
 use super::curve::{Curve, Moments};
 use super::stations::Station;
+use crate::search::least;
 
 /// Widths looked at, and halvings between the best two.
 const FIRST: u32 = 31;
@@ -178,22 +179,10 @@ impl Edge {
         if most_mm.is_nan() || most_mm < least_mm {
             return None;
         }
-        let (low, high) = (libm::log(least_mm), libm::log(most_mm));
-        let left = |at: f64| {
-            let arc = self.with_width(libm::exp(at.clamp(low, high)));
-            (arc.left(&self.lines, stations), at.clamp(low, high))
-        };
-        let least = |a: (f64, f64), b: (f64, f64)| if b.0 < a.0 { b } else { a };
-        let mut step = (high - low) / f64::from(FIRST - 1);
-        let all = (0..FIRST).map(|k| left(low + step * f64::from(k)));
-        let mut best = all.fold((f64::INFINITY, low), least);
-        for _ in 0..HALVINGS {
-            step /= 2.0;
-            for beside in [best.1 - step, best.1 + step] {
-                best = least(best, left(beside));
-            }
-        }
-        Some(self.with_width(libm::exp(best.1)))
+        let left = |at: f64| self.with_width(libm::exp(at)).left(&self.lines, stations);
+        let range = (libm::log(least_mm), libm::log(most_mm));
+        let width_mm = libm::exp(least(range, (FIRST, HALVINGS), left));
+        Some(self.with_width(width_mm))
     }
 }
 

@@ -7,6 +7,7 @@
 use super::chain::{Chain, left};
 use super::curve::{Curve, Moments};
 use super::stations::Station;
+use crate::search::least;
 
 /// Places looked at where the arc may leave the line, and halvings between the best two.
 const FIRST: u32 = 61;
@@ -68,21 +69,8 @@ fn touch(
         Some((left, found, moments.line().0))
     };
     let best = |curve: &Curve| {
-        let left = |at: f64| {
-            let at = at.clamp(low, high);
-            (of(curve, at).map_or(f64::INFINITY, |(left, ..)| left), at)
-        };
-        let least = |a: (f64, f64), b: (f64, f64)| if b.0 < a.0 { b } else { a };
-        let mut step = (high - low) / f64::from(FIRST - 1);
-        let all = (0..FIRST).map(|k| left(low + step * f64::from(k)));
-        let mut best = all.fold((f64::INFINITY, low), least);
-        for _ in 0..HALVINGS {
-            step /= 2.0;
-            for beside in [best.1 - step, best.1 + step] {
-                best = least(best, left(beside));
-            }
-        }
-        best.1
+        let left = |at: f64| of(curve, at).map_or(f64::INFINITY, |(left, ..)| left);
+        least((low, high), (FIRST, HALVINGS), left)
     };
     if high <= low {
         return None;
