@@ -151,3 +151,128 @@ impl Pieces<'_, '_> {
         again.or_else(|| fit.clone())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use range_image::Unmonitored;
+    use shapes::Cylinder;
+
+    use super::*;
+    use crate::field::Field;
+    use crate::testing::Scan;
+
+    const PITCH_MM: f64 = 0.42;
+    const SIDE: usize = 90;
+
+    /// The pieces of a scan before and after: labels column by column, and shapes.
+    fn blended(
+        z_mm: impl Fn(f64, f64) -> f64,
+        label: impl Fn(f64, f64) -> usize,
+        are_apart: bool,
+    ) -> (Vec<usize>, Vec<usize>, Vec<Option<Shape>>) {
+        let scan = Scan::of((SIDE, SIDE), PITCH_MM, 0.05, z_mm);
+        let all: Vec<usize> = (0..SIDE * SIDE).collect();
+        let field = Field::new(&scan.image, &scan.observations, &all).unwrap();
+        let at = |place: usize| {
+            let (column, row) = (place / SIDE, place % SIDE);
+            label(scan.image.x_mm(column), scan.image.y_mm(row))
+        };
+        let labels: Vec<usize> = all.iter().map(|place| at(*place)).collect();
+        let most = labels.iter().max().unwrap();
+        let fit = |own: usize| {
+            let set: Vec<bool> = labels.iter().map(|label| *label == own).collect();
+            field.fit(&set, 3, FITTED)
+        };
+        let mut pieces = Pieces {
+            field: &field,
+            labels: labels.clone(),
+            fits: (0..=*most).map(fit).collect(),
+        };
+        pieces.blend(&|_, _| are_apart, &Unmonitored).unwrap();
+        let shapes = pieces.fits.iter().map(|fit| fit.as_ref().map(|f| f.shape));
+        (labels, pieces.labels, shapes.collect())
+    }
+
+    /// A roof along y with its ridge at x = 18 mm, of this fall on both sides and rounded.
+    fn roof(radius_mm: f64, fall_rad: f64) -> impl Fn(f64, f64) -> f64 {
+        let half_mm = radius_mm * libm::sin(fall_rad);
+        move |x, _| {
+            let from = (x - 18.0).abs();
+            let on = from.min(half_mm);
+            libm::sqrt(radius_mm * radius_mm - on * on) - (from - on) * libm::tan(fall_rad)
+        }
+    }
+
+    fn count(labels: &[usize], own: usize) -> usize {
+        labels.iter().filter(|label| **label == own).count()
+    }
+
+    #[test]
+    fn a_fillet_that_its_planes_have_shared_is_found() {
+        // 3.7 mm wide.
+        let halves = |x: f64, _: f64| usize::from(x > 18.0);
+        let (_, labels, shapes) = blended(roof(9.3, 0.2), halves, false);
+        let columns = count(&labels, 2) as f64 / SIDE as f64;
+        assert!((columns - 3.7 / PITCH_MM).abs() < 1.5, "{columns}");
+        assert!(
+            matches!(shapes[2], Some(Shape::Cylinder(Cylinder { radius_mm, .. }))
+                if (radius_mm - 9.3).abs() < 1.0),
+            "{shapes:?}"
+        );
+    }
+
+    #[test]
+    fn a_fillet_that_has_the_wrong_borders_gets_its_own() {
+        let parted = |x: f64, _: f64| match x {
+            x if x < 17.4 => 0,
+            x if x < 21.0 => 2,
+            _ => 1,
+        };
+        let (before, labels, _) = blended(roof(9.3, 0.2), parted, false);
+        // It reaches from 16.15 to 19.85 mm.
+        let wrong = |labels: &[usize]| {
+            let is_wrong = |place: &usize| {
+                let x_mm = (place / SIDE) as f64 * PITCH_MM;
+                ((x_mm - 18.0).abs() < 1.85) != (labels[*place] == 2)
+            };
+            (0..labels.len()).filter(is_wrong).count() / SIDE
+        };
+        assert!(wrong(&before) > 4, "{}", wrong(&before));
+        assert!(wrong(&labels) <= 2, "{}", wrong(&labels));
+    }
+
+    #[test]
+    fn a_ring_between_a_plate_and_a_cone_is_found() {
+        // A cone of 45 degrees stands on a plate, with a fillet of 4 mm.
+        let (radius_mm, ball_mm) = (9.0, 4.0);
+        let turn = ball_mm * libm::sin(core::f64::consts::FRAC_PI_4);
+        let touch_mm = radius_mm + ball_mm * libm::tan(core::f64::consts::FRAC_PI_8);
+        let out_mm = |x: f64, y: f64| libm::hypot(x - 18.7, y - 18.9);
+        let boss = |x: f64, y: f64| {
+            let within = (touch_mm - out_mm(x, y)).max(0.0);
+            let on = within.min(turn);
+            ball_mm - libm::sqrt(ball_mm * ball_mm - on * on) + (within - on)
+        };
+        let halves = |x: f64, y: f64| usize::from(out_mm(x, y) < radius_mm);
+        let (_, labels, shapes) = blended(boss, halves, false);
+        let ring = core::f64::consts::PI * (touch_mm.powi(2) - (touch_mm - turn).powi(2));
+        let share = count(&labels, 2) as f64 * PITCH_MM * PITCH_MM / ring;
+        assert!((0.8..1.15).contains(&share), "{share}");
+        assert!(
+            matches!(shapes[2], Some(Shape::Torus(t)) if t.is_hollow && (t.tube_mm - 4.0).abs() < 0.8),
+            "{shapes:?}"
+        );
+    }
+
+    #[test]
+    fn sharp_edges_and_borders_that_are_told_stay() {
+        let halves = |x: f64, _: f64| usize::from(x > 18.0);
+        let (before, labels, _) = blended(roof(0.0, 0.2), halves, false);
+        assert_eq!(before, labels);
+        let (before, labels, _) = blended(roof(9.3, 0.2), halves, true);
+        assert_eq!(before, labels);
+        // A crease that one piece goes over is none.
+        let (before, labels, _) = blended(|x, _| 0.1 * x, halves, false);
+        assert_eq!(before, labels);
+    }
+}
