@@ -123,3 +123,49 @@ impl Rounding {
         if a <= b { Side::First } else { Side::Second }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shapes::{Plane, Sphere};
+
+    /// Half a ball of 10 mm on a plate, with a fillet of 2 mm: the middle of what leaves that lies
+    /// 12 mm from the ball's, and 2 mm above the plate.
+    #[test]
+    fn the_middle_lies_as_far_from_both_shapes_however_they_bend() {
+        let plate = Shape::Plane(Plane {
+            point_mm: Vector3::zeros(),
+            normal: Vector3::z(),
+        });
+        let ball = Shape::Sphere(Sphere {
+            centre_mm: Vector3::zeros(),
+            radius_mm: 10.0,
+            is_hollow: false,
+        });
+        let at = |out: f64, up: f64, turn: f64| {
+            Vector3::new(out * libm::cos(turn), out * libm::sin(turn), up)
+        };
+        let near: Vec<Sample> = (0..20)
+            .map(|k| Sample {
+                point_mm: at(10.5, 0.4, f64::from(k)),
+                ray: Vector3::z(),
+                sigma_mm: 0.05,
+            })
+            .collect();
+        let rounding = Rounding::of([plate, ball], &near).unwrap();
+        for turn in [0.3, 2.0, 4.0] {
+            let middle = at(libm::sqrt(140.0), 2.0, turn);
+            for share in [0.1, 0.5, 0.9] {
+                let towards = -Vector3::z() * (1.0 - share) - middle.normalize() * share;
+                let place = middle + towards.normalize() * 2.0;
+                let Side::Between(found) = rounding.side(2.0, &place) else {
+                    panic!("{turn} {share}")
+                };
+                let off_mm = (found.point_mm - middle).norm();
+                assert!(off_mm < 1e-4 && found.is_hollow, "{off_mm}");
+            }
+            assert_eq!(rounding.side(2.0, &at(13.0, 0.1, turn)), Side::First);
+            assert_eq!(rounding.side(2.0, &at(9.0, 4.5, turn)), Side::Second);
+        }
+    }
+}

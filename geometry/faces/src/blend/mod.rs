@@ -265,6 +265,15 @@ mod tests {
     }
 
     #[test]
+    fn noise_rounds_no_edges() {
+        let halves = |x: f64, _: f64| usize::from(x > 18.0);
+        for fall_rad in [0.055, 0.06, 0.08, 0.1] {
+            let (before, labels, _) = blended(roof(0.0, fall_rad), halves, false);
+            assert_eq!(before, labels, "{fall_rad}");
+        }
+    }
+
+    #[test]
     fn sharp_edges_and_borders_that_are_told_stay() {
         let halves = |x: f64, _: f64| usize::from(x > 18.0);
         let (before, labels, _) = blended(roof(0.0, 0.2), halves, false);

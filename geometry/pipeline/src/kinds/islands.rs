@@ -51,3 +51,64 @@ fn few(samples: &[Sample]) -> Vec<Sample> {
     let taken = spread(samples.len(), SAMPLES);
     taken.map(|index| samples[index]).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use range_image::{Lattice, RangeImage, RegionMap, Unmonitored};
+
+    use super::*;
+    use crate::kinds::samples::OnRegion;
+    use crate::kinds::{SmoothJoins, kinds};
+
+    const SIDE: usize = 80;
+    const PITCH_MM: f64 = 0.4;
+
+    /// Whether what lies in the middle of a ring on a wavy sheet, so much above that, is told as a
+    /// free form as well.
+    fn is_island(above_mm: f64) -> bool {
+        let lattice = Lattice { pitch_mm: PITCH_MM };
+        let mut image = RangeImage::masked(lattice, -40, -40, SIDE, SIDE);
+        let sheet = |x: f64, y: f64| 2.0 * libm::sin(0.06 * x + 0.5) * libm::cos(0.05 * y);
+        let (mut labels, mut samples) = (Vec::new(), Vec::new());
+        for node in 0..SIDE * SIDE {
+            let (column, row) = (node / SIDE, node % SIDE);
+            let (x, y) = (image.x_mm(column), image.y_mm(row));
+            let label = match (x * x + y * y).sqrt() {
+                out if out < 4.5 => 1,
+                out if (9.0..15.0).contains(&out) => 2,
+                _ => 0,
+            };
+            let z_mm = sheet(x, y) + if label == 1 { above_mm } else { 0.0 };
+            image.set_z_mm(column, row, Some(z_mm));
+            labels.push(label);
+            let turned = (node as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+            let mixed = (turned ^ (turned >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 40;
+            let noise = 0.05 * 1.73 * (mixed as f64 / f64::from(1 << 23) - 1.0);
+            if label != 0 && column + 1 < SIDE && row + 1 < SIDE {
+                samples.push(OnRegion {
+                    cell: [column as u32, row as u32],
+                    sample: Sample {
+                        point_mm: Vector3::new(x, y, z_mm + noise),
+                        ray: Vector3::z(),
+                        sigma_mm: 0.05,
+                    },
+                });
+            }
+        }
+        let regions = RegionMap::new(&image, labels);
+        let smooth = SmoothJoins::Split;
+        let decided = kinds(&image, &regions, Some(&samples), smooth, &Unmonitored).unwrap();
+        let is_free = |column: usize| {
+            let kind = &decided.kinds[usize::from(regions.label(column, SIDE / 2)) - 1];
+            matches!(kind.evidence.verdict, Verdict::FreeForm)
+        };
+        assert!(is_free(SIDE / 2 + 28), "the sheet");
+        is_free(SIDE / 2)
+    }
+
+    #[test]
+    fn what_a_ring_stands_around_is_told_with_the_sheet_beyond() {
+        assert!(is_island(0.0));
+        assert!(!is_island(0.5));
+    }
+}
