@@ -226,7 +226,8 @@ pub(crate) fn model(
 
 /// A step where the two surfaces part by more than their residuals explain, and more
 /// than a border off by a pitch would make of their different slopes. Each surface is
-/// judged a little inside its own face, where its data are, and carried on from there.
+/// judged on the border, and a little inside its own face, where its data are, and carried on
+/// from there; what is nearer counts.
 ///
 /// `sides` are the surfaces on the left and on the right, with the root mean squares of their
 /// residuals in millimetres.
@@ -249,7 +250,14 @@ fn kind_between(
             (surface.z(x, y) - side * dot(slope, step), slope)
         };
         let ((z_left, left), (z_right, right)) = (seen(sides[0].0, 1.0), seen(sides[1].0, -1.0));
-        gaps.push(z_left - z_right);
+        let carried = z_left - z_right;
+        let [x, y] = at;
+        let there = sides[0].0.z(x, y) - sides[1].0.z(x, y);
+        gaps.push(if there.abs() < carried.abs() {
+            there
+        } else {
+            carried
+        });
         bends.push(norm(minus(left, right)));
     }
     let noise = STEP_SIGMAS * norm(sides.map(|side| side.1));
@@ -269,7 +277,7 @@ fn median(values: &mut [f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::meeting::testing::{PLACEMENT, plane};
+    use crate::meeting::testing::{PLACEMENT, graph, plane};
 
     #[test]
     fn steps_are_borders_where_z_jumps() {
@@ -299,5 +307,31 @@ mod tests {
         assert_eq!(found(2.0), [false; 4]);
         // By the letter of the paper there are no surfaces yet.
         assert_eq!(steps(&cracks, &placed, &[], PLACEMENT), [false; 4]);
+    }
+
+    /// A rounding goes over into a fillet where both are steep, along y = 0: a little inside their
+    /// faces they part from their tangents by far more than a step has.
+    #[test]
+    fn steep_surfaces_that_touch_have_no_step_between_them() {
+        let arc = |y: f64| 2.5 * y - 1.2 * y * y.abs();
+        let (left, right) = (
+            graph(1.5, |_, y| if y > -2.0 { arc(y.min(2.0)) } else { -9.8 }),
+            graph(1.5, |_, y| arc(y.clamp(-2.0, 2.0)) + 0.04),
+        );
+        let path = polyline(&[[-5.0, 0.0], [5.0, 0.0]]).unwrap();
+        let kind = |lift_mm: f64| {
+            let lifted = plane(lift_mm, 0.0, 0.0);
+            let mut right = right.clone();
+            for (patch, by) in right
+                .patches
+                .iter_mut()
+                .zip(core::iter::repeat(lifted.z(0.0, 0.0)))
+            {
+                patch[0][0] += by;
+            }
+            kind_between([(&left, 0.01), (&right, 0.01)], &path, 0.5)
+        };
+        assert_eq!(kind(0.0), EdgeKind::Crease);
+        assert_eq!(kind(2.0), EdgeKind::Step);
     }
 }

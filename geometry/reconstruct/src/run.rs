@@ -15,7 +15,7 @@ use crate::border::settle::{Outlines, Placed};
 use crate::evidence::Evidence;
 use crate::fit::{Demand, Domain, FitError, patches_from_spline, patches_through_nodes};
 use crate::known;
-use crate::meeting::{meet, part};
+use crate::meeting::{loosen, meet, part};
 use crate::metrics::{Metrics, compare, psnr_db};
 use crate::model::{EdgeKind, EdgeOrigin, Model, Surface};
 use crate::noise::ImageNoise;
@@ -78,6 +78,9 @@ pub(crate) const SURFACE_MARGIN: f64 = 3.0;
 /// Narrowest span of a fitted spline, pitches: halving brings spans as near to two pitches as it
 /// can.
 const LEAST_SPAN: f64 = core::f64::consts::SQRT_2;
+
+/// Rounds in which creases are cut loose from what keeps them from their line.
+const LOOSENINGS: usize = 2;
 
 /// A node with its place and height in millimetres.
 #[derive(Debug, Clone, Copy)]
@@ -246,11 +249,12 @@ impl<'a> Fitted<'a> {
             let surfaces: Vec<&PatchSurface> = carriers.iter().map(|own| &own.surface).collect();
             part(&mut planar, &surfaces, placement);
         }
-        let kinds = kinds(&planar, &carriers, placement);
-        let origins = if settings.method == Method::Relief {
-            origins(&mut planar, &carriers, &kinds, placement, monitor)?
+        let (kinds, origins) = if settings.method == Method::Relief {
+            met(&mut planar, &carriers, placement, monitor)?
         } else {
-            vec![EdgeOrigin::Assumed; kinds.len()]
+            let kinds = kinds(&planar, &carriers, placement);
+            let origins = vec![EdgeOrigin::Assumed; kinds.len()];
+            (kinds, origins)
         };
         let model = model(&planar, carriers, (&kinds, &origins), placement);
         monitor.check()?;
@@ -354,28 +358,36 @@ impl<'a> Fitted<'a> {
     }
 }
 
-/// Puts creases where their surfaces intersect; gives how it is known where each edge runs.
-fn origins(
+/// Puts creases where their surfaces intersect; gives what each edge is, and how it is known where
+/// it runs.
+fn met(
     planar: &mut PlanarMap,
     carriers: &[Carrier],
-    kinds: &[EdgeKind],
     placement: Placement,
     monitor: &dyn Monitor,
-) -> Result<Vec<EdgeOrigin>, Cancelled> {
+) -> Result<(Vec<EdgeKind>, Vec<EdgeOrigin>), Cancelled> {
     let fitted = carriers
         .iter()
         .map(|carrier| (&carrier.surface, carrier.rms_mm));
     let surfaces: Vec<(&PatchSurface, f64)> = fitted.collect();
-    let is_crease: Vec<bool> = kinds.iter().map(|kind| *kind == EdgeKind::Crease).collect();
-    let is_met = meet(planar, &surfaces, &is_crease, placement, monitor)?;
-    let edges = planar.edges.iter().zip(is_met);
-    Ok(edges
-        .map(|(edge, is_met)| match (is_met, edge.is_settled) {
+    let mut rounds = 0..LOOSENINGS;
+    loop {
+        let kinds = kinds(planar, carriers, placement);
+        let is_crease: Vec<bool> = kinds.iter().map(|kind| *kind == EdgeKind::Crease).collect();
+        let mut moved = planar.clone();
+        let meeting = meet(&mut moved, &surfaces, &is_crease, placement, monitor)?;
+        if rounds.next().is_some() && loosen(planar, &surfaces, &is_crease, &meeting, placement) {
+            continue;
+        }
+        *planar = moved;
+        let edges = planar.edges.iter().zip(meeting.is_met);
+        let origins = edges.map(|(edge, is_met)| match (is_met, edge.is_settled) {
             (true, _) => EdgeOrigin::Intersected,
             (false, true) => EdgeOrigin::Measured,
             (false, false) => EdgeOrigin::Assumed,
-        })
-        .collect())
+        });
+        return Ok((kinds, origins.collect()));
+    }
 }
 
 fn check_input(image: &RangeImage, map: &RegionMap) -> Result<(), ReconstructError> {

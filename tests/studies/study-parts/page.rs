@@ -176,9 +176,9 @@ fn edges(totals: &Totals) -> String {
 fn files(judged: &[Judged]) -> String {
     let mut out = format!(
         "As OpenCASCADE reads them. Faces are sewn at 0.01 mm; an edge of one face belongs within \
-         two nodes of what is not seen and of steps (0.5 mm; 0.2 mm, four times the noise, where \
-         the two faces share no edge in the part), and a file may have {MISPLACED_MM} mm of them \
-         elsewhere.\n\n\
+         two nodes of what is not seen and of steps (0.5 mm; 0.05 mm, the noise, where the two \
+         faces share no edge in the part within half a millimetre), and a file may have \
+         {MISPLACED_MM} mm of them elsewhere.\n\n\
          | files | faces | not valid | free edges, mm | where none belong, mm | files with more than \
          that |\n| --- | ---: | ---: | ---: | ---: | --- |\n"
     );

@@ -63,11 +63,17 @@ pub(crate) struct TrueEdge {
 }
 
 impl TrueEdge {
-    /// Whether it is of these two faces and passes so near to a place.
-    pub(crate) fn joins(&self, faces: [usize; 2], place: &Vector3<f64>, near_mm: f64) -> bool {
+    /// Whether it is of these two faces and passes so near beside a place, and above or below it.
+    pub(crate) fn joins(
+        &self,
+        faces: [usize; 2],
+        place: &Vector3<f64>,
+        (beside_mm, above_mm): (f64, f64),
+    ) -> bool {
         let is_of = self.faces == faces || self.faces == [faces[1], faces[0]];
         let mut points = self.points_mm.iter().map(|p| Vector3::from(*p));
-        is_of && points.any(|point| (point - place).norm() <= near_mm)
+        let is_near = |off: Vector3<f64>| off.xy().norm() <= beside_mm && off.z.abs() <= above_mm;
+        is_of && points.any(|point| is_near(point - place))
     }
 }
 

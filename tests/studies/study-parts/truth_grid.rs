@@ -16,10 +16,11 @@ const AWAY: usize = 2;
 const BESIDE: usize = 2;
 /// Neighbours that are so far off each other's tangent planes have a step between them.
 const STEP_MM: f64 = 0.5;
-/// So have those of two faces that share no edge so near by, from four times the noise on: what
-/// stands between them is not seen.
-const LOW_STEP_MM: f64 = 0.2;
-const SHARED_MM: f64 = 1.0;
+/// So have those of two faces that share no edge so near by, from the noise on: what stands between
+/// them is not seen, and there is nothing in which they could meet.
+const LOW_STEP_MM: f64 = 0.05;
+/// About a pitch beside, and what a steep face rises over that.
+const SHARED_MM: (f64, f64) = (0.5, 1.0);
 
 /// What stands at each node.
 pub(crate) struct TruthGrid {
@@ -229,7 +230,7 @@ pub(crate) mod tests {
         assert_eq!(cell(2.0, half - 10), b'0');
         assert_eq!(cell(2.0, 1), b'1');
         // What is too low for a step is none.
-        assert_eq!(cell(0.1, half), b'0');
+        assert_eq!(cell(0.04, half), b'0');
         // A low one is one where the faces do not meet in the part.
         assert_eq!(cell(0.3, half), b'1');
         assert_eq!(cell_of(0.3, half, core::slice::from_ref(&shared)), b'0');

@@ -33,6 +33,8 @@ const BLUNT_MM: f64 = 2e-3;
 pub(crate) enum Line {
     /// That in which they intersect.
     Intersection,
+    /// The same of surfaces that hardly bend there.
+    Faint,
     /// That along which they are nearest to each other or farthest into each other, and have one
     /// tangent plane: where a fillet ends.
     Touch,
@@ -61,7 +63,7 @@ impl Gap<'_> {
     /// surfaces touch nowhere in particular.
     pub(crate) fn at(&self, place: [f64; 2]) -> (f64, [f64; 2]) {
         match self.line {
-            Line::Intersection => self.height(place),
+            Line::Intersection | Line::Faint => self.height(place),
             Line::Touch => self.touch(place),
         }
     }
@@ -105,7 +107,7 @@ impl Gap<'_> {
     /// How far off a place may be that lies on the line, as [`Gap::at`] tells it.
     pub(crate) fn tolerance_mm(&self) -> f64 {
         match self.line {
-            Line::Intersection => SPACE_CURVE_TOLERANCE_MM,
+            Line::Intersection | Line::Faint => SPACE_CURVE_TOLERANCE_MM,
             Line::Touch => STAND_IN * ON_TOUCH_MM,
         }
     }
@@ -121,7 +123,7 @@ impl Gap<'_> {
     /// The place of the line nearest to another one, along the slope of what vanishes on it.
     pub(crate) fn nearest(&self, start: [f64; 2], reach: Reach) -> Option<[f64; 2]> {
         let close = match self.line {
-            Line::Intersection => CLOSE,
+            Line::Intersection | Line::Faint => CLOSE,
             Line::Touch => CLOSE_TO_TOUCH,
         };
         let mut place = start;

@@ -8,6 +8,8 @@
 
 mod corner;
 mod gap;
+mod line;
+mod loosen;
 mod part;
 #[cfg(test)]
 pub(crate) mod testing;
@@ -27,37 +29,15 @@ use crate::border::map::{MapEdge, PlanarMap};
 use crate::polygon::{cross, minus, norm, signed_area};
 use corner::corner;
 pub(crate) use gap::{Gap, Line, Reach};
+use line::{REACH, is_closed_up, line, places, reach};
+pub(crate) use loosen::loosen;
 pub(crate) use part::part;
 pub(crate) use touch::touch;
 use trace::trace;
 
-/// How far a crease or a vertex is moved at most, and how much the surfaces bend there at least
-/// (3 degrees): what hardly bends is off by twenty times what the surfaces are.
-const REACH: Reach = Reach {
-    farthest: 0.75,
-    least_bend: 0.05,
-};
-
 /// How far, pitches, the end of a crease may be moved that runs out between outlines: there the last
 /// nodes are lost first, and a border is drawn by those that are left.
 const LONE_END: f64 = 2.0;
-
-/// Slope (7 degrees) from which on a crease is one. Where surfaces bend less they may touch instead.
-const PLAIN_BEND: f64 = 0.12;
-
-/// How far surfaces that touch may be apart for their join to be where they meet, millimetres: what
-/// CAD programs sew.
-const TOUCHED_MM: f64 = 0.01;
-
-/// Share of a border's places that must find its line: a few are drawn too far off, mostly beside
-/// its ends.
-const LEAST_SHARE: f64 = 0.8;
-
-/// A crease is looked at so often, pitches.
-const STEP: f64 = 0.5;
-
-/// Ends of a crease that are not looked at, pitches: its vertices are.
-const TIP: f64 = 1.0;
 
 /// Places of each piece of a path at which the area of a loop is taken.
 const PER_PIECE: usize = 8;
@@ -82,6 +62,17 @@ const MOST_AREA: f64 = 2.0;
 struct Left {
     edges: BTreeSet<usize>,
     vertices: BTreeSet<usize>,
+    /// Edges that are left for one of their vertices, with it.
+    loose: BTreeSet<(usize, usize)>,
+}
+
+/// What has come of the creases of a map.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Meeting {
+    /// Which edges have come to lie where their surfaces meet.
+    pub(crate) is_met: Vec<bool>,
+    /// Edges that would, but for this vertex of theirs.
+    loose: BTreeSet<(usize, usize)>,
 }
 
 /// Puts creases where the surfaces of their sides intersect, and smooth joins where they touch;
@@ -95,7 +86,7 @@ pub(crate) fn meet(
     is_crease: &[bool],
     placement: Placement,
     monitor: &dyn Monitor,
-) -> Result<Vec<bool>, Cancelled> {
+) -> Result<Meeting, Cancelled> {
     let gap = |(edge, is_crease): (&MapEdge, &bool)| {
         let side = |k: usize| {
             let piece = (edge.sides[k] as usize).checked_sub(1)?;
@@ -103,7 +94,9 @@ pub(crate) fn meet(
         };
         let sides = [side(0)?, side(1)?];
         let is_border = *is_crease && edge.sides[0] != edge.sides[1];
-        is_border.then(|| line(sides, placement, edge)).flatten()
+        is_border
+            .then(|| line(sides, placement, places(edge)))
+            .flatten()
     };
     let mut around = vec![Vec::new(); map.vertices.len()];
     for (e, edge) in map.edges.iter().enumerate() {
@@ -132,11 +125,14 @@ pub(crate) fn meet(
     };
     let is_met = |(e, edge): (usize, &MapEdge)| {
         let gap = drawn.met(e, &left);
-        gap.is_some_and(|gap| gap.line == Line::Intersection || is_closed_up(&gap, edge))
+        gap.is_some_and(|gap| gap.line != Line::Touch || is_closed_up(&gap, edge))
     };
     let is_met = edges.iter().enumerate().map(is_met).collect();
     (map.vertices, map.edges) = (vertices, edges);
-    Ok(is_met)
+    Ok(Meeting {
+        is_met,
+        loose: left.loose,
+    })
 }
 
 /// Paths of creases by edge and ends, so that a round costs what has changed.
@@ -154,64 +150,6 @@ struct Drawn<'a> {
     areas: Vec<f64>,
     surfaces: &'a [(&'a PatchSurface, f64)],
     placement: Placement,
-}
-
-/// The line of two surfaces that runs along an edge and near to it.
-fn line<'a>(
-    sides: [(&'a PatchSurface, f64); 2],
-    placement: Placement,
-    edge: &MapEdge,
-) -> Option<Gap<'a>> {
-    let gap = Gap {
-        sides: sides.map(|side| side.0),
-        placement,
-        line: Line::Intersection,
-    };
-    let meets = |least_bend: f64| {
-        let reach = Reach {
-            least_bend,
-            ..REACH
-        };
-        let places = places(edge);
-        let least = LEAST_SHARE * places.len() as f64;
-        let found = places.filter(|place| gap.nearest(*place, reach).is_some());
-        found.count() as f64 >= least
-    };
-    if meets(PLAIN_BEND) {
-        return Some(gap);
-    }
-    let touched = touch(sides, placement, places(edge));
-    let touched = touched.map(|(gap, _)| gap);
-    touched.or_else(|| meets(REACH.least_bend).then_some(gap))
-}
-
-/// Places along an edge, but for its tips.
-fn places(edge: &MapEdge) -> impl ExactSizeIterator<Item = [f64; 2]> {
-    let (first, last) = edge.path.domain();
-    let (from, to) = if edge.start == edge.end {
-        (first, last)
-    } else {
-        let tip = TIP.min((last - first) / 4.0);
-        (first + tip, last - tip)
-    };
-    let steps = ((to - from) / STEP).ceil().max(1.0) as usize;
-    (0..steps + 1).map(move |k| {
-        let at = from + (to - from) * k as f64 / steps as f64;
-        edge.path.evaluate(at)
-    })
-}
-
-/// Whether surfaces are so near to each other along an edge that it lies on both.
-fn is_closed_up(gap: &Gap<'_>, edge: &MapEdge) -> bool {
-    places(edge).all(|place| gap.height(place).0.abs() <= TOUCHED_MM)
-}
-
-/// How far an edge is moved onto its line.
-fn reach(gap: &Gap<'_>) -> Reach {
-    match gap.line {
-        Line::Intersection => REACH,
-        Line::Touch => touch::REACH,
-    }
 }
 
 impl Drawn<'_> {
@@ -324,7 +262,7 @@ impl Drawn<'_> {
             common(&others, &outlines, place).is_some()
         };
         let least = |a: &&(usize, Gap<'_>), b: &&(usize, Gap<'_>)| {
-            let is_crease = |own: &(usize, Gap<'_>)| own.1.line == Line::Intersection;
+            let is_crease = |own: &(usize, Gap<'_>)| own.1.line != Line::Touch;
             let lengths = length(a.0).total_cmp(&length(b.0));
             is_crease(a).cmp(&is_crease(b)).then(lengths)
         };
@@ -354,6 +292,7 @@ impl Drawn<'_> {
             } else if let Some(e) = self.odd(v, *vertex, &meeting, &outlines) {
                 // Without it the others have a corner, or may have.
                 left.edges.insert(e);
+                left.loose.insert((e, v));
                 return;
             } else {
                 left.vertices.insert(v);
@@ -364,6 +303,7 @@ impl Drawn<'_> {
             && (off_mm.is_nan() || off_mm > CORNER_MM)
         {
             left.edges.insert(e);
+            left.loose.insert((e, v));
         }
     }
 }
@@ -384,7 +324,14 @@ fn common(creases: &[Gap<'_>], outlines: &[[f64; 2]], place: [f64; 2]) -> Option
     let least = if is_lone_end { LONE_END } else { 0.0 };
     let farthest = creases.iter().map(|gap| reach(gap).farthest);
     let farthest = farthest.fold(least, f64::max);
-    corner(creases, outlines, place, farthest, REACH.least_bend)
+    let least_bend = creases.iter().map(|gap| reach(gap).least_bend);
+    let least_bend = least_bend.fold(REACH.least_bend, f64::min);
+    let found = corner(creases, outlines, place, farthest, least_bend);
+    // Outlines that run beside the crease lead along it rather than to it.
+    found.or_else(|| {
+        let own = creases.first().filter(|_| is_lone_end)?;
+        own.nearest(place, reach(own))
+    })
 }
 
 /// Signed areas of all loops, square pitches.
@@ -498,8 +445,8 @@ mod tests {
         let mut map = drawn(aside);
         let is_crease = [true, false, false];
         let sides = surfaces.map(|surface| (surface, 0.01));
-        let is_met = meet(&mut map, &sides, &is_crease, PLACEMENT, &Unmonitored).unwrap();
-        (is_met[0], map.vertices[1])
+        let found = meet(&mut map, &sides, &is_crease, PLACEMENT, &Unmonitored).unwrap();
+        (found.is_met[0], map.vertices[1])
     }
 
     #[test]
@@ -539,13 +486,29 @@ mod tests {
         };
         let (first, second) = (of([10.0, 20.35], 0.0), of([10.0, 19.75], 0.2));
         let sides = [&flat, &first, &second].map(|surface| (surface, 0.01));
-        let is_met = meet(&mut map, &sides, &[true; 2], PLACEMENT, &Unmonitored).unwrap();
-        assert_eq!(is_met, [true, false]);
+        let found = meet(&mut map, &sides, &[true; 2], PLACEMENT, &Unmonitored).unwrap();
+        assert_eq!(found.is_met, [true, false]);
+        assert_eq!(found.loose, BTreeSet::from([(1, 0)]));
         assert!(
             (map.vertices[0][1] - 20.35).abs() < 1e-6,
             "{:?}",
             map.vertices
         );
+    }
+
+    #[test]
+    fn beside_an_outline_that_runs_along_it_a_crease_ends_where_it_is_nearest() {
+        // The crease is in row 20, an outline leaves the vertex nearly along it.
+        let (flat, tilted) = (plane(0.0, 0.0, 0.0), plane(0.0, 0.0, 0.5));
+        let crease = Gap {
+            sides: [&tilted, &flat],
+            placement: PLACEMENT,
+            line: Line::Intersection,
+        };
+        let along = [0.995, 0.1];
+        let [column, row] = common(&[crease], &[along], [10.0, 21.2]).unwrap();
+        assert!((column - 10.0).abs() < 1e-9 && (row - 20.0).abs() < 1e-9);
+        assert_eq!(common(&[crease], &[along], [10.0, 22.2]), None);
     }
 
     #[test]

@@ -6,7 +6,7 @@
 use nurbs::PatchSurface;
 
 use super::gap::{Gap, Line, Reach};
-use super::{PLAIN_BEND, REACH, STEP};
+use super::line::{PLAIN_BEND, REACH, STEP};
 use crate::assemble::Placement;
 use crate::border::cracks::Use;
 use crate::border::map::{MapEdge, PlanarMap};
@@ -74,7 +74,7 @@ fn cuts(edge: &MapEdge, gap: &Gap<'_>) -> Vec<f64> {
 }
 
 /// Stretches of one kind, each from its first place to the one after its last.
-fn runs(meets: &[bool]) -> Vec<(usize, usize)> {
+pub(super) fn runs<T: PartialEq>(meets: &[T]) -> Vec<(usize, usize)> {
     let mut runs: Vec<(usize, usize)> = Vec::new();
     for (k, own) in meets.iter().enumerate() {
         match runs.last_mut() {
@@ -86,7 +86,7 @@ fn runs(meets: &[bool]) -> Vec<(usize, usize)> {
 }
 
 /// Cuts an edge at these parameters, ascending.
-fn cut(map: &mut PlanarMap, index: usize, at: &[f64]) {
+pub(super) fn cut(map: &mut PlanarMap, index: usize, at: &[f64]) {
     let edge = map.edges[index].clone();
     let (first, last) = edge.path.domain();
     let ends: Vec<f64> = [first]

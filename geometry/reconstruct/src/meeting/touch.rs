@@ -6,15 +6,15 @@
 
 use nurbs::PatchSurface;
 
-use super::LEAST_SHARE;
 use super::gap::{Gap, Line, Reach};
+use super::line::LEAST_SHARE;
 use crate::assemble::Placement;
 use crate::polygon::norm;
 
 /// How far a border may lie from the line of touch, pitches: of the nodes beside it, those tell
 /// little whose surfaces are less apart than noise.
 pub(crate) const REACH: Reach = Reach {
-    farthest: 2.0,
+    farthest: 4.0,
     least_bend: 0.05,
 };
 
@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn what_is_apart_or_meets_in_a_crease_does_not_touch() {
         assert_eq!(touched(&fillet(0.2), 0.02, 0.0), None);
-        assert_eq!(touched(&fillet(0.0), 0.02, 3.0), None, "too far");
+        assert_eq!(touched(&fillet(0.0), 0.02, 5.0), None, "too far");
         let planes = [plane(0.0, 0.1, 0.0), plane(0.0, -0.1, 0.1)];
         assert_eq!(touched(&planes, 0.02, 0.0), None);
         let same = [plane(0.0, 0.1, 0.0), plane(0.0, 0.1, 0.0)];
