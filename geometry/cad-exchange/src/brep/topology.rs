@@ -14,7 +14,7 @@ use shapes::Shape;
 use super::bend::bent;
 use super::corners::Corners;
 use super::groups::Groups;
-use super::seam::{Seam, distance};
+use super::seam::{Seam, distance, facing};
 use super::{Sharing, onto};
 use crate::common::{ROUNDING_PART, SMOOTH_MM, without_kinks};
 
@@ -89,6 +89,7 @@ pub(super) fn topology(model: &Model, shapes: &[Option<Shape>], sharing: Sharing
     };
     let mut builder = Builder {
         out: &mut out,
+        model,
         shapes,
         rounding_mm: ROUNDING_PART * sharing.resolution_mm,
         written: BTreeMap::new(),
@@ -127,7 +128,13 @@ fn seams(model: &Model, sharing_mm: f64) -> (BTreeMap<Place, Seam>, usize) {
         if kind != Some(EdgeKind::Crease) || first.reversed == second.reversed {
             continue;
         }
-        match Seam::between(&first.space_curve, &second.space_curve, other, sharing_mm) {
+        let both = [place, other].map(|place| model.faces.get(place.0));
+        let facing = |at: [f64; 3]| {
+            let of_faces = both.iter().flatten().map(|face| facing(face, at));
+            of_faces.fold(0.0, f64::max)
+        };
+        let curves = (&first.space_curve, &second.space_curve);
+        match Seam::between(curves.0, curves.1, facing, other, sharing_mm) {
             Some(seam) => {
                 seams.insert(place, seam);
             }
@@ -140,6 +147,7 @@ fn seams(model: &Model, sharing_mm: f64) -> (BTreeMap<Place, Seam>, usize) {
 /// Writes down strands, shared ones once.
 struct Builder<'a> {
     out: &'a mut Topology,
+    model: &'a Model,
     /// Of each face.
     shapes: &'a [Option<Shape>],
     rounding_mm: f64,
@@ -246,7 +254,10 @@ impl Builder<'_> {
         for (face, side) in sides {
             let off_mm = match &self.shapes[*face] {
                 Some(shape) => onto::off(&curve, shape),
-                None => distance(side, &curve),
+                None => distance(&curve, side, |at| {
+                    let face = self.model.faces.get(*face);
+                    face.map_or(1.0, |face| facing(face, at))
+                }),
             };
             self.out.gap_mm = self.out.gap_mm.max(off_mm);
         }
