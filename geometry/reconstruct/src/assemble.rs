@@ -320,15 +320,11 @@ mod tests {
         );
         let path = polyline(&[[-5.0, 0.0], [5.0, 0.0]]).unwrap();
         let kind = |lift_mm: f64| {
-            let lifted = plane(lift_mm, 0.0, 0.0);
             let mut right = right.clone();
-            for (patch, by) in right
+            right
                 .patches
                 .iter_mut()
-                .zip(core::iter::repeat(lifted.z(0.0, 0.0)))
-            {
-                patch[0][0] += by;
-            }
+                .for_each(|patch| patch[0][0] += lift_mm);
             kind_between([(&left, 0.01), (&right, 0.01)], &path, 0.5)
         };
         assert_eq!(kind(0.0), EdgeKind::Crease);

@@ -38,6 +38,14 @@ pub(super) const STEP: f64 = 0.5;
 /// Ends of a crease that are not looked at, pitches: its vertices are.
 const TIP: f64 = 1.0;
 
+/// What belongs to the two different pieces on the sides of an edge, if there are two; `of_pieces[k]`
+/// belongs to piece `k + 1`.
+pub(super) fn sides<T: Copy>(edge: &MapEdge, of_pieces: &[T]) -> Option<[T; 2]> {
+    let side = |k: usize| of_pieces.get((edge.sides[k] as usize).checked_sub(1)?);
+    let [left, right] = [side(0)?, side(1)?];
+    (edge.sides[0] != edge.sides[1]).then_some([*left, *right])
+}
+
 /// The line of two surfaces that is near to nearly all of these places. `sides` are the surfaces and
 /// the root mean squares of their residuals, millimetres.
 pub(super) fn line<'a>(

@@ -8,7 +8,7 @@ use nurbs::PatchSurface;
 
 use super::Meeting;
 use super::gap::Line;
-use super::line::{STEP, line};
+use super::line::{STEP, line, sides};
 use super::part::{cut, runs};
 use crate::assemble::Placement;
 use crate::border::map::{MapEdge, PlanarMap};
@@ -37,18 +37,11 @@ pub(crate) fn loosen(
     let asked = is_crease.iter().zip(&meeting.is_met).enumerate();
     for (index, (is_crease, is_met)) in asked {
         let edge = &map.edges[index];
-        let side = |k: usize| {
-            let piece = (edge.sides[k] as usize).checked_sub(1)?;
-            surfaces.get(piece).copied()
-        };
-        let (Some(left), Some(right)) = (side(0), side(1)) else {
+        let Some(sides) = sides(edge, surfaces).filter(|_| *is_crease && !is_met) else {
             continue;
         };
-        if *is_met || !is_crease || edge.sides[0] == edge.sides[1] {
-            continue;
-        }
         let ends = [edge.start, edge.end].map(|v| meeting.loose.contains(&(index, v)));
-        let cuts = cuts(edge, [left, right], ends, placement);
+        let cuts = cuts(edge, sides, ends, placement);
         any |= !cuts.is_empty();
         cut(map, index, &cuts);
     }

@@ -29,7 +29,7 @@ use crate::border::map::{MapEdge, PlanarMap};
 use crate::polygon::{cross, minus, norm, signed_area};
 use corner::corner;
 pub(crate) use gap::{Gap, Line, Reach};
-use line::{REACH, is_closed_up, line, places, reach};
+use line::{REACH, is_closed_up, line, places, reach, sides};
 pub(crate) use loosen::loosen;
 pub(crate) use part::part;
 pub(crate) use touch::touch;
@@ -88,15 +88,8 @@ pub(crate) fn meet(
     monitor: &dyn Monitor,
 ) -> Result<Meeting, Cancelled> {
     let gap = |(edge, is_crease): (&MapEdge, &bool)| {
-        let side = |k: usize| {
-            let piece = (edge.sides[k] as usize).checked_sub(1)?;
-            surfaces.get(piece).copied()
-        };
-        let sides = [side(0)?, side(1)?];
-        let is_border = *is_crease && edge.sides[0] != edge.sides[1];
-        is_border
-            .then(|| line(sides, placement, places(edge)))
-            .flatten()
+        let sides = sides(edge, surfaces).filter(|_| *is_crease)?;
+        line(sides, placement, places(edge))
     };
     let mut around = vec![Vec::new(); map.vertices.len()];
     for (e, edge) in map.edges.iter().enumerate() {

@@ -6,7 +6,7 @@
 use nurbs::PatchSurface;
 
 use super::gap::{Gap, Line, Reach};
-use super::line::{PLAIN_BEND, REACH, STEP};
+use super::line::{PLAIN_BEND, REACH, STEP, sides};
 use crate::assemble::Placement;
 use crate::border::cracks::Use;
 use crate::border::map::{MapEdge, PlanarMap};
@@ -18,19 +18,11 @@ const LEAST_LENGTH: f64 = 8.0;
 pub(crate) fn part(map: &mut PlanarMap, surfaces: &[&PatchSurface], placement: Placement) {
     for index in 0..map.edges.len() {
         let edge = &map.edges[index];
-        let side = |k: usize| {
-            surfaces
-                .get((edge.sides[k] as usize).checked_sub(1)?)
-                .copied()
-        };
-        let (Some(left), Some(right)) = (side(0), side(1)) else {
+        let Some(sides) = sides(edge, surfaces) else {
             continue;
         };
-        if edge.sides[0] == edge.sides[1] {
-            continue;
-        }
         let gap = Gap {
-            sides: [left, right],
+            sides,
             placement,
             line: Line::Intersection,
         };
