@@ -166,8 +166,7 @@ pub(super) fn distance(
 /// The cosine between z and the normal of a face over a place.
 pub(super) fn facing(face: &Face, [x, y, _]: [f64; 3]) -> f64 {
     let Surface::Patches(patches) = &face.surface;
-    let [along_x, along_y] = [patches.z_partial(x, y, 1, 0), patches.z_partial(x, y, 0, 1)];
-    1.0 / (1.0 + along_x * along_x + along_y * along_y).sqrt()
+    patches.normal(x, y)[2]
 }
 
 fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {

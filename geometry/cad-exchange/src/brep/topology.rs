@@ -133,8 +133,8 @@ fn seams(model: &Model, sharing_mm: f64) -> (BTreeMap<Place, Seam>, usize) {
             let of_faces = both.iter().flatten().map(|face| facing(face, at));
             of_faces.fold(0.0, f64::max)
         };
-        let curves = (&first.space_curve, &second.space_curve);
-        match Seam::between(curves.0, curves.1, facing, other, sharing_mm) {
+        let (first, second) = (&first.space_curve, &second.space_curve);
+        match Seam::between(first, second, facing, other, sharing_mm) {
             Some(seam) => {
                 seams.insert(place, seam);
             }

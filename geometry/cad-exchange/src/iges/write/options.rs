@@ -52,8 +52,8 @@ pub struct WriteOptions {
     pub resolution_mm: f64,
     /// Where [`Entities::shares_edges`], a crease is one curve of both its faces as far as the curves
     /// that they make of it are as near to the other face as this, millimetres; the mean of both is
-    /// written there.
-    /// A face is written by its numbers if its edges lie as near to that, too; else as a B-spline.
+    /// written there. A face is written by its numbers if its edges lie as near to that, too; else
+    /// as a B-spline.
     pub sharing_mm: f64,
     /// Colours of the faces: region `r` gets `palette[r % palette.len()]`.
     pub palette: Vec<[u8; 3]>,
