@@ -25,6 +25,7 @@ mod known;
 mod lift;
 mod meeting;
 mod noise;
+mod origins;
 mod pieces;
 mod refine;
 mod run;

@@ -1,7 +1,7 @@
 //! The whole road from regions to the model.
 
 use nurbs::{Observation, PatchSurface};
-use range_image::{Cancelled, Monitor, RangeImage, RegionMap};
+use range_image::{Monitor, RangeImage, RegionMap};
 use rayon::prelude::*;
 use shapes::Shape;
 
@@ -15,10 +15,11 @@ use crate::border::settle::{Outlines, Placed};
 use crate::evidence::Evidence;
 use crate::fit::{Demand, Domain, FitError, patches_from_spline, patches_through_nodes};
 use crate::known;
-use crate::meeting::{loosen, meet, part};
+use crate::meeting::part;
 use crate::metrics::{Metrics, compare, psnr_db};
-use crate::model::{EdgeKind, EdgeOrigin, Model, Surface};
+use crate::model::{EdgeOrigin, Model, Surface};
 use crate::noise::ImageNoise;
+use crate::origins::met;
 use crate::pieces::{PieceLimits, PieceMap};
 use crate::settings::{Method, ReconstructError, ReconstructSettings};
 use crate::trim::Trim;
@@ -78,9 +79,6 @@ pub(crate) const SURFACE_MARGIN: f64 = 3.0;
 /// Narrowest span of a fitted spline, pitches: halving brings spans as near to two pitches as it
 /// can.
 const LEAST_SPAN: f64 = core::f64::consts::SQRT_2;
-
-/// Rounds in which creases are cut loose from what keeps them from their line.
-const LOOSENINGS: usize = 2;
 
 /// A node with its place and height in millimetres.
 #[derive(Debug, Clone, Copy)]
@@ -355,38 +353,6 @@ impl<'a> Fitted<'a> {
             label: self.pieces.regions[piece],
             reason: e.to_string(),
         })
-    }
-}
-
-/// Puts creases where their surfaces intersect; gives what each edge is, and how it is known where
-/// it runs.
-fn met(
-    planar: &mut PlanarMap,
-    carriers: &[Carrier],
-    placement: Placement,
-    monitor: &dyn Monitor,
-) -> Result<(Vec<EdgeKind>, Vec<EdgeOrigin>), Cancelled> {
-    let fitted = carriers
-        .iter()
-        .map(|carrier| (&carrier.surface, carrier.rms_mm));
-    let surfaces: Vec<(&PatchSurface, f64)> = fitted.collect();
-    let mut rounds = 0..LOOSENINGS;
-    loop {
-        let kinds = kinds(planar, carriers, placement);
-        let is_crease: Vec<bool> = kinds.iter().map(|kind| *kind == EdgeKind::Crease).collect();
-        let mut moved = planar.clone();
-        let meeting = meet(&mut moved, &surfaces, &is_crease, placement, monitor)?;
-        if rounds.next().is_some() && loosen(planar, &surfaces, &is_crease, &meeting, placement) {
-            continue;
-        }
-        *planar = moved;
-        let edges = planar.edges.iter().zip(meeting.is_met);
-        let origins = edges.map(|(edge, is_met)| match (is_met, edge.is_settled) {
-            (true, _) => EdgeOrigin::Intersected,
-            (false, true) => EdgeOrigin::Measured,
-            (false, false) => EdgeOrigin::Assumed,
-        });
-        return Ok((kinds, origins.collect()));
     }
 }
 

@@ -112,33 +112,14 @@ mod tests {
     use range_image::Unmonitored;
 
     use super::*;
-    use crate::border::path::polyline;
     use crate::meeting::meet;
-    use crate::meeting::testing::{PLACEMENT, graph, plane};
-
-    /// A crease in row 20, which is y = 0, drawn a quarter of a row off it from column 0 to 40, with an
-    /// outline that goes on from its end.
-    fn drawn() -> PlanarMap {
-        let vertices = vec![[0.0, 20.25], [40.0, 20.25], [50.0, 20.25]];
-        let edge = |start: usize, sides: [u32; 2]| MapEdge {
-            start,
-            end: start + 1,
-            sides,
-            path: polyline(&[vertices[start], vertices[start + 1]]).unwrap(),
-            is_settled: false,
-        };
-        PlanarMap {
-            edges: vec![edge(0, [1, 2]), edge(1, [1, 0])],
-            vertices,
-            ..PlanarMap::default()
-        }
-    }
+    use crate::meeting::testing::{PLACEMENT, crease_and_outline, graph, plane, running_out};
 
     /// The map with what is cut loose of the crease, and what is met of it.
     fn loosened(tilted: &PatchSurface) -> (PlanarMap, Vec<bool>) {
         let flat = plane(0.0, 0.0, 0.0);
         let sides = [(tilted, 0.01), (&flat, 0.01)];
-        let mut map = drawn();
+        let mut map = crease_and_outline();
         let mut is_crease = vec![true, false];
         let mut rounds = 0..2;
         loop {
@@ -154,9 +135,7 @@ mod tests {
 
     #[test]
     fn a_crease_is_cut_before_a_vertex_that_is_not_on_it() {
-        // From x = 8 on, column 36, the tilted face falls away.
-        let runs_out = |x: f64, y: f64| 0.5 * y - 8.0 * (x - 8.0).max(0.0);
-        let (map, is_met) = loosened(&graph(0.5, runs_out));
+        let (map, is_met) = loosened(&running_out());
         let edges = map.edges.iter().zip(&is_met);
         let met_pitches: f64 = edges
             .clone()
@@ -191,6 +170,40 @@ mod tests {
                 "{width}"
             );
         }
+    }
+
+    /// Where a crease of 40 pitches is cut, with these ends loose.
+    fn cut_at(tilted: &PatchSurface, ends: [bool; 2]) -> Vec<f64> {
+        let flat = plane(0.0, 0.0, 0.0);
+        let map = crease_and_outline();
+        cuts(
+            &map.edges[0],
+            [(tilted, 0.01), (&flat, 0.01)],
+            ends,
+            PLACEMENT,
+        )
+    }
+
+    #[test]
+    fn tips_are_cut_off_at_loose_ends_and_at_both_if_none_is() {
+        let tilted = plane(0.0, 0.0, 0.5);
+        let (from, to) = (TIP + MARGIN, 40.0 - TIP - MARGIN);
+        assert_eq!(cut_at(&tilted, [false, true]), [to]);
+        assert_eq!(cut_at(&tilted, [true, false]), [from]);
+        for both in [[true; 2], [false; 2]] {
+            assert_eq!(cut_at(&tilted, both), [from, to]);
+        }
+    }
+
+    #[test]
+    fn where_the_line_is_lost_for_a_moment_nothing_is_cut() {
+        // Lost within 0.3 mm of x = 0, which is column 20, and within 1.3 mm.
+        let lost = |width: f64| {
+            let notch = |x: f64, y: f64| 0.5 * y + if x.abs() < width { 3.0 } else { 0.0 };
+            cut_at(&graph(0.1, notch), [false, true])
+        };
+        assert_eq!(lost(0.3), [40.0 - TIP - MARGIN]);
+        assert_eq!(lost(1.3).len(), 3);
     }
 
     #[test]

@@ -505,6 +505,28 @@ mod tests {
     }
 
     #[test]
+    fn a_crease_is_loose_from_the_vertex_that_is_not_on_it() {
+        let (a, b) = (plane(1.0, 0.25, 0.0), plane(0.0, 0.0, 1.0));
+        let mut map = drawn(4.0);
+        let sides = [&a, &b].map(|surface| (surface, 0.01));
+        let is_crease = [true, false, false];
+        let found = meet(&mut map, &sides, &is_crease, PLACEMENT, &Unmonitored).unwrap();
+        assert_eq!(found.loose, BTreeSet::from([(0, 1)]));
+    }
+
+    #[test]
+    fn faint_creases_have_ends_and_corners_as_well() {
+        let (flat, gentle) = (plane(0.0, 0.0, 0.0), plane(0.0, 0.0, 0.03));
+        let faint = Gap {
+            sides: [&gentle, &flat],
+            placement: PLACEMENT,
+            line: Line::Faint,
+        };
+        let [column, row] = common(&[faint], &[], [10.0, 22.0]).unwrap();
+        assert!((column - 10.0).abs() < 1e-9 && (row - 20.0).abs() < 1e-9);
+    }
+
+    #[test]
     fn what_is_apart_on_a_steep_wall_is_near_aside() {
         let (flat, steep, gentle) = (
             plane(0.0, 0.0, 0.0),

@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn a_fillet_is_touched_where_it_would_touch() {
-        for (off_mm, off) in [(0.0, 0.0), (0.01, 1.2), (-0.01, -1.2)] {
+        for (off_mm, off) in [(0.0, 0.0), (0.01, 1.2), (-0.01, -1.2), (0.0, 3.5)] {
             let found = touched(&fillet(off_mm), 0.02, off).expect("it touches");
             assert_eq!(found.len(), 20);
             for place in found {
