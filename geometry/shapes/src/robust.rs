@@ -8,11 +8,14 @@ use crate::spread::spread;
 /// counts in steps as wide as its noise, more than half of the samples of a small face may lie
 /// on one step.
 pub(crate) const LEAST_SCATTER: f64 = 0.3;
-/// Rounds of weighing, and those of them that see all equations.
+/// Rounds of weighing, at most, and those of them that see all equations.
 const ROUNDS: usize = 8;
 const ROUNDS_OF_ALL: usize = 2;
 /// Most equations of the other rounds.
 const SOME: usize = 2000;
+/// Least share of its square that a term must have of its own, beside the terms before it: less is
+/// rounding.
+const UNIQUE: f64 = 1e-12;
 /// The median distance times this is where an equation weighs half.
 const WIDE: f64 = 1.0;
 
@@ -56,10 +59,24 @@ fn weighed<const N: usize>(
         let mut matrix = SMatrix::<f64, N, N>::zeros();
         let mut right = SVector::<f64, N>::zeros();
         for ((terms, value), weight) in equations.iter().zip(&by) {
-            matrix += terms * terms.transpose() * *weight;
-            right += terms * (value * weight);
+            for column in 0..N {
+                let weighed = terms[column] * weight;
+                right[column] += weighed * value;
+                // The lower half is all that the factors are made from.
+                for row in column..N {
+                    matrix[(row, column)] += weighed * terms[row];
+                }
+            }
         }
-        solution = matrix.cholesky()?.solve(&right);
+        let factors = matrix.cholesky()?;
+        let is_unique = (0..N).all(|k| {
+            let pivot = factors.l_dirty()[(k, k)];
+            pivot * pivot > UNIQUE * matrix[(k, k)]
+        });
+        if !is_unique {
+            return None;
+        }
+        solution = factors.solve(&right);
         by = weights(equations, &solution)?;
     }
     Some((solution, by))
@@ -105,6 +122,29 @@ pub(crate) fn held(off: impl Iterator<Item = f64>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn terms_that_depend_on_each_other_but_for_rounding_solve_nothing() {
+        // Of what lies in two rows, the square of the row is no more than a line.
+        let solved = |rows: u32, first: f64| {
+            let equation = |k: u32| {
+                let (u, v) = (f64::from(k) / 300.0, f64::from(k % rows) * 0.01 + first);
+                let noise = 0.001 * f64::from(k * 7919 % 13);
+                (
+                    SVector::from([1.0, u, v, 2.0 * u * u - 1.0, u * v, 2.0 * v * v - 1.0]),
+                    0.4 * u + noise,
+                )
+            };
+            let equations: Vec<_> = (0..300).map(equation).collect();
+            weighed(&equations, vec![1.0; 300], 1).map(|(solution, _)| solution)
+        };
+        for k in 0..50 {
+            let first = 0.001 * f64::from(k);
+            assert_eq!(solved(2, first), None);
+            let plane = solved(3, first).expect("three rows tell a bend");
+            assert!((plane[1] - 0.4).abs() < 0.02, "{plane}");
+        }
+    }
 
     #[test]
     fn a_third_of_strays_leaves_the_line() {
