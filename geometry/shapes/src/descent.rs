@@ -2,16 +2,16 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::distance::{Distances, Sloped};
 use crate::fit::Sample;
-use crate::jet::{Jet, MOST_FREE, Scalar};
-use crate::local::{Distances, Local};
+use crate::local::{Local, MOST_FREE};
 
 type Matrix = SMatrix<f64, MOST_FREE, MOST_FREE>;
 type Step = SVector<f64, MOST_FREE>;
 
 /// What of a sample is made small.
 pub(crate) trait Residual {
-    fn of<S: Scalar>(distances: &Distances<'_, S>, sample: &Sample) -> S;
+    fn of(distances: &Distances, sample: &Sample) -> Sloped;
 }
 
 /// How far it lies off along its ray, in its standard deviations: what counts.
@@ -22,57 +22,65 @@ pub(crate) struct Off;
 pub(crate) struct Distance;
 
 impl Residual for Off {
-    fn of<S: Scalar>(distances: &Distances<'_, S>, sample: &Sample) -> S {
-        distances.off(sample)
+    fn of(distances: &Distances, sample: &Sample) -> Sloped {
+        distances.sloped_off(sample)
     }
 }
 
 impl Residual for Distance {
-    fn of<S: Scalar>(distances: &Distances<'_, S>, sample: &Sample) -> S {
-        distances.distance(&sample.point_mm)
+    fn of(distances: &Distances, sample: &Sample) -> Sloped {
+        distances.sloped_distance(&sample.point_mm)
     }
-}
-
-/// Squared residuals of the samples, each with its weight.
-fn cost<R: Residual>(local: &Local, samples: &[Sample], weights: &[f64]) -> f64 {
-    let distances = local.distances::<f64>();
-    let weighed = samples.iter().zip(weights);
-    weighed
-        .map(|(sample, weight)| weight * R::of(&distances, sample).powi(2))
-        .sum()
 }
 
 /// The normal equations of the least squares at a shape; numbers that are not free stay.
-pub(crate) fn normal_equations<R: Residual>(
-    local: &Local,
-    samples: &[Sample],
-    weights: &[f64],
-) -> (Matrix, Step) {
-    let (mut matrix, mut right) = (Matrix::zeros(), Step::zeros());
-    let free = local.free();
-    let distances = local.distances::<Jet>();
-    for (sample, weight) in samples
-        .iter()
-        .zip(weights)
-        .filter(|(_, weight)| **weight > 0.0)
-    {
-        let residual = R::of(&distances, sample);
-        for &i in free {
-            right[i] -= weight * residual.by[i] * residual.value;
-            for &j in free.iter().take_while(|j| **j <= i) {
-                matrix[(i, j)] += weight * residual.by[i] * residual.by[j];
+pub(crate) struct Equations {
+    pub(crate) matrix: Matrix,
+    right: Step,
+    /// Squared residuals of the samples, each with its weight.
+    cost: f64,
+}
+
+impl Equations {
+    pub(crate) fn at<R: Residual>(local: &Local, samples: &[Sample], weights: &[f64]) -> Self {
+        let (mut matrix, mut right, mut cost) = (Matrix::zeros(), Step::zeros(), 0.0);
+        let free = local.free();
+        let distances = local.distances();
+        let weighed = samples.iter().zip(weights);
+        for (sample, weight) in weighed.filter(|(_, weight)| **weight > 0.0) {
+            let Sloped { value, by } = R::of(&distances, sample);
+            cost += weight * value * value;
+            for i in 0..free {
+                let weighed = weight * by[i];
+                right[i] -= weighed * value;
+                for j in 0..=i {
+                    matrix[(i, j)] += weighed * by[j];
+                }
             }
         }
-    }
-    for i in 0..MOST_FREE {
-        if !free.contains(&i) {
-            matrix[(i, i)] = 1.0;
+        for i in 0..MOST_FREE {
+            if i >= free {
+                matrix[(i, i)] = 1.0;
+            }
+            for j in 0..i {
+                matrix[(j, i)] = matrix[(i, j)];
+            }
         }
-        for j in 0..i {
-            matrix[(j, i)] = matrix[(i, j)];
+        Self {
+            matrix,
+            right,
+            cost,
         }
     }
-    (matrix, right)
+
+    /// The step to the least, the shorter the more it is damped.
+    fn step(&self, damping: f64) -> Option<Step> {
+        let mut damped = self.matrix;
+        for k in 0..MOST_FREE {
+            damped[(k, k)] *= 1.0 + damping;
+        }
+        Some(damped.cholesky()?.solve(&self.right))
+    }
 }
 
 /// Levenberg and Marquardt's descent, until a step lessens the cost by no more than the share
@@ -85,23 +93,18 @@ pub(crate) fn descend<R: Residual>(
     ended: f64,
 ) -> Option<Local> {
     let mut damping = 1e-3;
-    let mut least = cost::<R>(&local, samples, weights);
-    if !least.is_finite() {
+    let mut here = Equations::at::<R>(&local, samples, weights);
+    if !here.cost.is_finite() {
         return None;
     }
     for _ in 0..steps {
-        let (matrix, right) = normal_equations::<R>(&local, samples, weights);
         let mut next = None;
         while next.is_none() && damping < 1e9 {
-            let mut damped = matrix;
-            for k in 0..MOST_FREE {
-                damped[(k, k)] *= 1.0 + damping;
-            }
-            let moved = damped
-                .cholesky()
-                .map(|factors| local.moved(&factors.solve(&right).into()))
-                .map(|moved| (cost::<R>(&moved, samples, weights), moved))
-                .filter(|(cost, _)| *cost <= least);
+            let moved = here
+                .step(damping)
+                .map(|step| local.moved(&step.into()))
+                .map(|moved| (Equations::at::<R>(&moved, samples, weights), moved))
+                .filter(|(there, _)| there.cost <= here.cost);
             match moved {
                 Some(found) => {
                     damping = (damping * 0.1).max(1e-12);
@@ -110,9 +113,9 @@ pub(crate) fn descend<R: Residual>(
                 None => damping *= 10.0,
             }
         }
-        let Some((cost, moved)) = next else { break };
-        let has_ended = least - cost <= ended * least;
-        (local, least) = (moved, cost);
+        let Some((there, moved)) = next else { break };
+        let has_ended = here.cost - there.cost <= ended * here.cost;
+        (local, here) = (moved, there);
         if has_ended {
             break;
         }

@@ -11,7 +11,7 @@ use nalgebra::SVector;
 use crate::fit::{ACROSS, Fit, Sample, finished, found};
 use crate::robust;
 use crate::shape::Family;
-use crate::start::Frame;
+use crate::start::{Frame, Middle};
 
 /// What the samples speak for.
 #[derive(Debug, Clone)]
@@ -88,10 +88,11 @@ pub fn decide(samples: &[Sample], area: f64) -> Evidence {
         independent,
         surfaces: polynomials_of(samples, independent),
     };
+    let middle = Middle::of(samples);
     for family in Family::ALL {
         if enough(family.freedom())
             && scale.leaves_room(family.freedom())
-            && let Some(found) = found(family, samples)
+            && let Some(found) = middle.as_ref().and_then(|m| found(family, samples, m))
             && scale.leaves_hope(&found.offs(samples).collect::<Vec<_>>(), family.freedom())
             && let Some(fit) = finished(found, samples, area)
         {

@@ -4,12 +4,12 @@ use std::borrow::Cow;
 
 use nalgebra::Vector3;
 
-use crate::descent::{Distance, Off, descend, normal_equations};
+use crate::descent::{Distance, Equations, Off, descend};
 use crate::local::Local;
 use crate::robust;
 use crate::shape::{Family, Shape};
 use crate::spread::spread;
-use crate::start::starts;
+use crate::start::Middle;
 use crate::uncertainty::{Joint, Numbers, joint, numbers};
 
 /// A point of a surface, as measured.
@@ -91,19 +91,34 @@ impl Fit {
     }
 }
 
-/// Starts are tried first in few rounds on few samples, and the best of them, so many, in more
-/// rounds on more.
-const FIRST_TRIAL: Trial = Trial {
-    samples: 100,
-    rounds: 3,
-    steps: 6,
-};
-const PROMISING: usize = 5;
-const SECOND_TRIAL: Trial = Trial {
+/// Trials by which starts are sifted, where there are more than so many: those that it leads nearest
+/// to the samples remain. Tori have forty, and few of them lead anywhere.
+const SIEVES: [(Trial, usize); 2] = [
+    (
+        Trial {
+            samples: 100,
+            rounds: 1,
+            steps: 4,
+        },
+        20,
+    ),
+    (
+        Trial {
+            samples: 100,
+            rounds: 3,
+            steps: 4,
+        },
+        5,
+    ),
+];
+/// The trial of those that remain.
+const LAST_TRIAL: Trial = Trial {
     samples: 300,
     rounds: 10,
-    steps: 6,
+    steps: 3,
 };
+/// Starts that leave the same in the last trial, but for this share, have come to the same.
+const SAME: f64 = 1e-3;
 /// Steps of a fit in each round.
 const STEPS: usize = 40;
 /// Robust scales at which a sample weighs half in a trial.
@@ -127,22 +142,28 @@ const TRIAL_ENDED: f64 = 1e-3;
 /// `None` where there are too few samples, or the surface is too flat to be of this family.
 #[must_use]
 pub fn fit(family: Family, samples: &[Sample], area: f64) -> Option<Fit> {
-    finished(found(family, samples)?, samples, area)
+    let found = found(family, samples, &Middle::of(samples)?)?;
+    finished(found, samples, area)
 }
 
-/// Where the descent from the best of the starts ends on some of the samples.
-pub(crate) fn found(family: Family, samples: &[Sample]) -> Option<Local> {
+/// Where the descent from the best of the starts ends on some of the samples, with their middle.
+pub(crate) fn found(family: Family, samples: &[Sample], middle: &Middle) -> Option<Local> {
     if samples.len() <= family.freedom() {
         return None;
     }
-    let mut shapes = starts(family, samples)?;
-    if shapes.len() > PROMISING {
-        let first = FIRST_TRIAL.of(shapes, samples).into_iter();
-        shapes = first.take(PROMISING).map(|(_, local)| local).collect();
+    let mut tried = middle.starts(family, samples);
+    for (trial, most) in SIEVES {
+        if tried.len() > most {
+            let led = trial.of(tried, samples).into_iter();
+            tried = led.take(most).map(|(_, local)| local).collect();
+        }
     }
-    let tried = SECOND_TRIAL.of(shapes, samples).into_iter();
+    let mut tried = LAST_TRIAL.of(tried, samples);
+    tried.truncate(FOLLOWED);
+    let least = tried.first()?.0;
+    tried.dedup_by(|other, _| other.0 <= (1.0 + SAME) * least);
     let some = some_of(samples, FOLLOWED_ON);
-    let followed = tried.take(FOLLOWED).filter_map(|(_, local)| {
+    let followed = tried.into_iter().filter_map(|(_, local)| {
         let local = settled(local, &some)?;
         Some((scale(&local, &some), local))
     });
@@ -181,8 +202,8 @@ struct Trial {
 }
 
 impl Trial {
-    /// Where the starts lead, with their scales, the best first.
-    fn of(&self, starts: impl IntoIterator<Item = Local>, samples: &[Sample]) -> Vec<(f64, Local)> {
+    /// Where the starts lead, with what they leave, the best first.
+    fn of(&self, starts: Vec<Local>, samples: &[Sample]) -> Vec<(f64, Local)> {
         let few = some_of(samples, self.samples);
         let led = starts
             .into_iter()
@@ -196,22 +217,24 @@ impl Trial {
     /// Follows a start for a while, the less drawn by a sample the farther off it lies.
     fn lead(&self, mut local: Local, samples: &[Sample]) -> Option<(f64, Local)> {
         let mut weights = vec![1.0; samples.len()];
-        let mut before = scale(&local, samples);
-        for _ in 0..self.rounds {
-            let wide = WIDE * before.max(f64::MIN_POSITIVE);
-            let distances = local.distances::<f64>();
-            for (weight, sample) in weights.iter_mut().zip(samples) {
-                let deviation_mm = distances.deviation_mm(sample);
-                let off = distances.distance(&sample.point_mm) / deviation_mm;
+        let mut before = f64::INFINITY;
+        for round in 0..=self.rounds {
+            let distances = local.distances();
+            let about: Vec<_> = samples.iter().map(|s| distances.about(s)).collect();
+            let offs = about
+                .iter()
+                .map(|(distance_mm, deviation_mm)| distance_mm / deviation_mm);
+            let now = robust::deviation(offs.clone());
+            let is_steady = round > 0 && (now - before).abs() <= STEADY * before;
+            before = now;
+            if is_steady || round == self.rounds {
+                break;
+            }
+            let wide = WIDE * now.max(f64::MIN_POSITIVE);
+            for ((weight, off), (_, deviation_mm)) in weights.iter_mut().zip(offs).zip(&about) {
                 *weight = (1.0 + (off / wide).powi(2)).recip() / deviation_mm.powi(2);
             }
             local = descend::<Distance>(local, samples, &weights, self.steps, TRIAL_ENDED)?;
-            let now = scale(&local, samples);
-            let is_steady = (now - before).abs() <= STEADY * before;
-            before = now;
-            if is_steady {
-                break;
-            }
         }
         Some((before, local))
     }
@@ -219,9 +242,14 @@ impl Trial {
 
 /// Follows a start to its end.
 fn settled(mut local: Local, samples: &[Sample]) -> Option<Local> {
+    let mut before = Vec::new();
     for _ in 0..ROUNDS {
         let held = held(&local, samples);
+        if held == before {
+            break;
+        }
         local = descend::<Off>(local, samples, &held, STEPS, ENDED)?;
+        before = held;
     }
     Some(local)
 }
@@ -243,16 +271,15 @@ fn told(local: Local, samples: &[Sample], area: f64) -> Option<Fit> {
     };
     let held = held(&local, samples);
     let (mut squares, mut squares_mm2, mut count) = (0.0, 0.0, 0_usize);
-    let distances = local.distances::<f64>();
+    let distances = local.distances();
     for (sample, _) in samples.iter().zip(&held).filter(|(_, held)| **held > 0.0) {
         squares += distances.off(sample).powi(2);
         squares_mm2 += distances.distance(&sample.point_mm).powi(2);
         count += 1;
     }
-    let free = local.free();
-    let left = count.checked_sub(free.len()).filter(|left| *left > 0)? as f64;
-    let (normal, _) = normal_equations::<Off>(&local, samples, &held);
-    let covariance = normal.cholesky()?.inverse() * (squares / left * area.max(1.0));
+    let left = count.checked_sub(local.free()).filter(|left| *left > 0)? as f64;
+    let Equations { matrix, .. } = Equations::at::<Off>(&local, samples, &held);
+    let covariance = matrix.cholesky()?.inverse() * (squares / left * area.max(1.0));
     Some(Fit {
         shape,
         rms_mm: (squares_mm2 / count as f64).sqrt(),

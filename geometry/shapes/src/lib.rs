@@ -11,9 +11,9 @@
 //! uncertainties: those of the noise met, to first order.
 
 mod descent;
+mod distance;
 mod evidence;
 mod fit;
-mod jet;
 mod local;
 mod robust;
 mod rotation;

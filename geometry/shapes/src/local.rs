@@ -8,8 +8,8 @@ use core::f64::consts::PI;
 
 use nalgebra::Vector3;
 
-use crate::fit::{ACROSS, Sample};
-use crate::jet::{MOST_FREE, Scalar};
+use crate::distance::Distances;
+use crate::fit::Sample;
 use crate::shape::{Cone, Cylinder, Family, Plane, Shape, Sphere, Torus};
 
 /// Curvatures below this, per millimetre, have no centre to speak of.
@@ -39,49 +39,32 @@ pub(crate) struct Local {
     pub(crate) numbers: [f64; 3],
 }
 
+/// Numbers that a shape may have free, at most: those of a torus.
+pub(crate) const MOST_FREE: usize = 7;
 /// Indices of free numbers in a step: the shift along the normal, the turns of the normal
-/// towards `along` and across it, the turn about the normal, and then `numbers`.
-const SHIFT: usize = 0;
-const TILT_ALONG: usize = 1;
-const TILT_ACROSS: usize = 2;
-const TURN: usize = 3;
-const NUMBERS: usize = 4;
+/// towards `along` and across it, the turn about the normal, and those of `numbers`. In this
+/// order the free ones of every family come first.
+pub(crate) const SHIFT: usize = 0;
+pub(crate) const TILT_ALONG: usize = 1;
+pub(crate) const TILT_ACROSS: usize = 2;
+pub(crate) const TURN: usize = 4;
+pub(crate) const NUMBERS: [usize; 3] = [3, 5, 6];
 
 impl Local {
-    /// Which numbers of a step are free.
-    pub(crate) fn free(&self) -> &'static [usize] {
-        match self.family {
-            Family::Plane => &[0, 1, 2],
-            Family::Sphere => &[0, 1, 2, 4],
-            Family::Cylinder => &[0, 1, 2, 3, 4],
-            Family::Cone => &[0, 1, 2, 3, 4, 5],
-            Family::Torus => &[0, 1, 2, 3, 4, 5, 6],
-        }
+    /// How many numbers of a step are free; the others have no part in it.
+    pub(crate) fn free(&self) -> usize {
+        self.family.freedom()
     }
 
     /// How far samples lie off along their rays, in their standard deviations, positive above.
     pub(crate) fn offs(&self, samples: &[Sample]) -> impl Iterator<Item = f64> {
-        let distances = self.distances::<f64>();
+        let distances = self.distances();
         samples.iter().map(move |sample| distances.off(sample))
     }
 
-    /// Tells distances from the shape, with their derivatives by the numbers of a step.
-    pub(crate) fn distances<S: Scalar>(&self) -> Distances<'_, S> {
-        let [first, second, third] = [0, 1, 2].map(|k| S::free(self.numbers[k], NUMBERS + k));
-        let nothing = S::constant(0.0);
-        Distances {
-            local: self,
-            across: self.normal.cross(&self.along),
-            first,
-            angle: match self.family {
-                Family::Cone | Family::Torus => second.sin_cos(),
-                _ => (nothing, nothing),
-            },
-            tube: match self.family {
-                Family::Torus => third.recip(),
-                _ => nothing,
-            },
-        }
+    /// What tells distances from the shape.
+    pub(crate) fn distances(&self) -> Distances {
+        Distances::of(self)
     }
 
     /// The shape after a step.
@@ -92,8 +75,8 @@ impl Local {
         let along = self.along - self.normal * step[TILT_ALONG] + across * step[TURN];
         let along = (along - normal * along.dot(&normal)).normalize();
         let mut numbers = self.numbers;
-        for (number, change) in numbers.iter_mut().zip(&step[NUMBERS..]) {
-            *number += change;
+        for (number, index) in numbers.iter_mut().zip(NUMBERS) {
+            *number += step[index];
         }
         if matches!(self.family, Family::Cone | Family::Torus) {
             let [number, angle, _] = &mut numbers;
@@ -188,113 +171,9 @@ impl Local {
     }
 }
 
-/// What tells distances from a shape: what is the same for all points is worked out once.
-pub(crate) struct Distances<'a, S> {
-    local: &'a Local,
-    across: Vector3<f64>,
-    /// The first of the shape's numbers: a curvature, or 1 / distance from the axis.
-    first: S,
-    /// Sine and cosine of the second.
-    angle: (S, S),
-    /// Radius of a torus's tube, negative where it is hollow.
-    tube: S,
-}
-
-impl<S: Scalar> Distances<'_, S> {
-    /// Signed distance of a point, millimetres, positive above.
-    pub(crate) fn distance(&self, point: &Vector3<f64>) -> S {
-        let from = point - self.local.place;
-        let (u, v, s) = (
-            from.dot(&self.local.along),
-            from.dot(&self.across),
-            from.dot(&self.local.normal),
-        );
-        let along = S::varying(u, [(TILT_ALONG, -s), (TURN, v)]);
-        let across = S::varying(v, [(TILT_ACROSS, -s), (TURN, -u)]);
-        let s = S::varying(s, [(SHIFT, -1.0), (TILT_ALONG, u), (TILT_ACROSS, v)]);
-        let first = self.first;
-        let (sin, cos) = self.angle;
-        match self.local.family {
-            Family::Plane => s,
-            Family::Sphere => off_round(first, along * along + across * across + s * s, s),
-            Family::Cylinder => off_round(first, across * across + s * s, s),
-            Family::Cone => {
-                let out = sin * along + cos * s;
-                let up = cos * along - sin * s;
-                cos * off_round(first, across * across + out * out, out) - sin * up
-            }
-            Family::Torus => {
-                let raised = s + self.tube;
-                let out = cos * raised - sin * along;
-                let up = sin * raised + cos * along;
-                let off = off_round(first, across * across + out * out, out);
-                let from_centre = (off * off + up * up).sqrt();
-                if self.tube.value() < 0.0 {
-                    -from_centre - self.tube
-                } else {
-                    from_centre - self.tube
-                }
-            }
-        }
-    }
-
-    /// How far a sample lies off along its ray, in its standard deviations, positive above: the
-    /// distance over the share of it that the ray covers on its way to the surface.
-    pub(crate) fn off(&self, sample: &Sample) -> S {
-        let here = self.distance(&sample.point_mm);
-        here * self.deviation_from(here, sample).recip()
-    }
-
-    /// Standard deviation of a sample's distance, millimetres.
-    pub(crate) fn deviation_mm(&self, sample: &Sample) -> S {
-        self.deviation_from(self.distance(&sample.point_mm), sample)
-    }
-
-    fn deviation_from(&self, here: S, sample: &Sample) -> S {
-        /// How far along the ray the distance is looked at once more, millimetres, at least, and
-        /// at most, in the sample's deviations.
-        const STEP_MM: f64 = 1e-3;
-        const MOST: f64 = 4.0;
-        // The share covered at the sample is not that half way to the surface: where a surface
-        // turns away, samples before it would count otherwise than those behind, and the radius
-        // of a rod of 3 mm seen to 75 degrees would be off by four times its uncertainty.
-        let plain = self.plain();
-        let distance = here.value();
-        let further = plain.distance(&(sample.point_mm + sample.ray * STEP_MM));
-        let covered = (further - distance) / STEP_MM;
-        let back = distance / covered.abs().max(ACROSS).copysign(covered);
-        let most = (MOST * sample.sigma_mm).max(STEP_MM);
-        let back = back.clamp(-most, most);
-        let back = back.abs().max(STEP_MM).copysign(back);
-        let there = self.distance(&(sample.point_mm - sample.ray * back));
-        let covered = (here - there) * (1.0 / back);
-        (covered * covered + ACROSS * ACROSS).sqrt() * sample.sigma_mm
-    }
-
-    /// The same without derivatives.
-    fn plain(&self) -> Distances<'_, f64> {
-        Distances {
-            local: self.local,
-            across: self.across,
-            first: self.first.value(),
-            angle: (self.angle.0.value(), self.angle.1.value()),
-            tube: self.tube.value(),
-        }
-    }
-}
-
-/// How much farther a point is from the centre of a circle than the circle, which passes
-/// through the origin with this curvature: from the point's squared distance to the origin
-/// and how far it is above it. As the curvature goes to zero this becomes the height.
-fn off_round<S: Scalar>(curvature: S, distance2: S, above: S) -> S {
-    let twice = curvature * distance2 + above * 2.0;
-    twice * ((curvature * twice + 1.0).sqrt() + 1.0).recip()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::jet::Jet;
 
     fn local(family: Family, numbers: [f64; 3]) -> Local {
         let normal = Vector3::new(0.2, -0.3, 0.9).normalize();
@@ -341,7 +220,7 @@ mod tests {
             };
             for point in points() {
                 let (near, far) = (
-                    local.distances::<f64>().distance(&point),
+                    local.distances().distance(&point),
                     shape.distance_mm(&point),
                 );
                 assert!((near - far).abs() < 1e-9, "{shape:?}: {near} {far}");
@@ -354,7 +233,7 @@ mod tests {
         for local in all() {
             let turned = local.turned();
             for point in points() {
-                let [one, other] = [&local, &turned].map(|l| l.distances::<f64>().distance(&point));
+                let [one, other] = [&local, &turned].map(|l| l.distances().distance(&point));
                 assert!((one + other).abs() < 1e-9, "{local:?}: {one} {other}");
             }
             assert_eq!(turned.turned().numbers, local.numbers);
@@ -365,22 +244,36 @@ mod tests {
     fn derivatives_are_those_of_a_small_step() {
         const STEP: f64 = 1e-6;
         for local in all() {
+            let distances = local.distances();
             for point in points() {
-                let jet = local.distances::<Jet>().distance(&point);
-                assert_eq!(jet.value, local.distances::<f64>().distance(&point));
-                for &k in local.free() {
-                    let moved = |by: f64| {
-                        let mut step = [0.0; MOST_FREE];
-                        step[k] = by;
-                        local.moved(&step).distances::<f64>().distance(&point)
-                    };
-                    let slope = (moved(STEP) - moved(-STEP)) / (2.0 * STEP);
-                    let off = (slope - jet.by[k]).abs();
-                    assert!(
-                        off < 1e-5 * (1.0 + slope.abs()),
-                        "{local:?} {k}: {slope} {}",
-                        jet.by[k]
-                    );
+                let sample = Sample {
+                    point_mm: point,
+                    ray: Vector3::new(0.1, 0.2, 1.0).normalize(),
+                    sigma_mm: 0.05,
+                };
+                type Plain<'a> = &'a dyn Fn(&Local) -> f64;
+                let distance: Plain<'_> = &|local| local.distances().distance(&point);
+                let off: Plain<'_> = &|local| local.distances().off(&sample);
+                for (sloped, close, plain) in [
+                    (distances.sloped_distance(&point), 1e-5, distance),
+                    // What the way along the ray changes by is left out.
+                    (distances.sloped_off(&sample), 1e-2, off),
+                ] {
+                    assert_eq!(sloped.value, plain(&local));
+                    for k in 0..local.free() {
+                        let moved = |by: f64| {
+                            let mut step = [0.0; MOST_FREE];
+                            step[k] = by;
+                            plain(&local.moved(&step))
+                        };
+                        let slope = (moved(STEP) - moved(-STEP)) / (2.0 * STEP);
+                        let off = (slope - sloped.by[k]).abs();
+                        assert!(
+                            off < close * (1.0 + slope.abs()),
+                            "{local:?} {k}: {slope} {}",
+                            sloped.by[k]
+                        );
+                    }
                 }
             }
         }

@@ -98,8 +98,8 @@ impl Frame {
     }
 }
 
-/// What a quadratic through the samples says of their middle.
-struct Middle {
+/// What a quadratic through the samples says of their middle: where shapes begin.
+pub(crate) struct Middle {
     frame: Frame,
     /// Samples that lie near to the quadratic.
     near: Vec<Sample>,
@@ -112,7 +112,8 @@ struct Middle {
 }
 
 impl Middle {
-    fn of(samples: &[Sample]) -> Option<Self> {
+    /// `None` where the samples lie on a line or curve.
+    pub(crate) fn of(samples: &[Sample]) -> Option<Self> {
         let frame = Frame::of(samples)?;
         let quadratic = |sample: &Sample| frame.quadratic(&sample.point_mm);
         let equations: Vec<_> = samples.iter().map(quadratic).collect();
@@ -165,56 +166,55 @@ impl Middle {
             curvature
         }
     }
-}
 
-/// Shapes of a family to begin with. `None` where the samples lie on a line or curve.
-pub(crate) fn starts(family: Family, samples: &[Sample]) -> Option<Vec<Local>> {
-    let middle = Middle::of(samples)?;
-    let [(most, most_curvature), (least, least_curvature)] = middle.principal;
-    let ways = [
-        (least, most_curvature, least_curvature),
-        (most, least_curvature, most_curvature),
-    ];
-    Some(match family {
-        Family::Plane => vec![middle.local(family, least, [0.0; 3])],
-        Family::Sphere => {
-            let mean = 0.5 * (most_curvature + least_curvature);
-            vec![middle.local(family, least, [mean, 0.0, 0.0])]
-        }
-        Family::Cylinder => ways
-            .map(|(along, bend, _)| middle.local(family, along, [bend, 0.0, 0.0]))
-            .to_vec(),
-        Family::Cone => {
-            let mut all = Vec::new();
-            for (along, bend, _) in ways {
-                for angle in HALF_ANGLES_RAD {
-                    let bend = middle.bent(bend) / libm::cos(angle);
-                    all.push(middle.local(family, along, [bend, angle, 0.0]));
+    /// The principal directions, each with the curvature across it and that along it.
+    fn ways(&self) -> [(Vector3<f64>, f64, f64); 2] {
+        let [(most, most_curvature), (least, least_curvature)] = self.principal;
+        [
+            (least, most_curvature, least_curvature),
+            (most, least_curvature, most_curvature),
+        ]
+    }
+
+    /// Shapes of a family to begin with, for these samples.
+    pub(crate) fn starts(&self, family: Family, samples: &[Sample]) -> Vec<Local> {
+        match family {
+            Family::Plane => vec![self.local(family, self.principal[1].0, [0.0; 3])],
+            Family::Sphere => {
+                let [(_, most), (along, least)] = self.principal;
+                vec![self.local(family, along, [0.5 * (most + least), 0.0, 0.0])]
+            }
+            Family::Cylinder => self
+                .ways()
+                .map(|(along, bend, _)| self.local(family, along, [bend, 0.0, 0.0]))
+                .to_vec(),
+            Family::Cone => {
+                let mut all = Vec::new();
+                for (along, bend, _) in self.ways() {
+                    for angle in HALF_ANGLES_RAD {
+                        let bend = self.bent(bend) / libm::cos(angle);
+                        all.push(self.local(family, along, [bend, angle, 0.0]));
+                    }
                 }
+                all
             }
-            all
-        }
-        Family::Torus => {
-            let mut all = Vec::new();
-            all.extend(rotation::torus(&middle.near, &middle.frame));
-            all.extend(tori(&middle));
-            for patch in patches(samples) {
-                all.extend(Middle::of(&patch).iter().flat_map(tori));
+            Family::Torus => {
+                let mut all = Vec::new();
+                all.extend(rotation::torus(&self.near, &self.frame));
+                all.extend(tori(self));
+                for patch in patches(samples) {
+                    all.extend(Middle::of(&patch).iter().flat_map(tori));
+                }
+                all
             }
-            all
         }
-    })
+    }
 }
 
 /// Tori with the curvatures that samples have in their middle.
 fn tori(middle: &Middle) -> Vec<Local> {
-    let [(most, most_curvature), (least, least_curvature)] = middle.principal;
-    let ways = [
-        (least, most_curvature, least_curvature),
-        (most, least_curvature, most_curvature),
-    ];
     let mut all = Vec::new();
-    for (along, about, tube) in ways {
+    for (along, about, tube) in middle.ways() {
         let (about, tube) = (middle.bent(about), middle.bent(tube));
         for angle in TUBE_ANGLES_RAD {
             // Meusnier: the circle about the axis bends by the cosine less than the surface does

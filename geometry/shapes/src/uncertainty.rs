@@ -2,8 +2,7 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen, Vector3};
 
-use crate::jet::MOST_FREE;
-use crate::local::Local;
+use crate::local::{Local, MOST_FREE};
 use crate::shape::Shape;
 
 /// A number and its standard uncertainty, in the number's unit.
@@ -105,8 +104,8 @@ impl Told {
 /// another shape.
 fn slopes(local: &Local, covariance: &SMatrix<f64, MOST_FREE, MOST_FREE>) -> Option<Vec<Told>> {
     let free = local.free();
-    let mut slopes = Vec::with_capacity(free.len());
-    for &k in free {
+    let mut slopes = Vec::with_capacity(free);
+    for k in 0..free {
         let size = STEP * covariance[(k, k)].max(0.0).sqrt();
         let at = |size: f64| {
             let mut step = [0.0; MOST_FREE];
@@ -140,8 +139,8 @@ pub(crate) fn joint(
         })
         .collect();
     let mut joint = Joint::zeros();
-    for (one, &row) in slopes.iter().zip(local.free()) {
-        for (other, &column) in slopes.iter().zip(local.free()) {
+    for (row, one) in slopes.iter().enumerate() {
+        for (column, other) in slopes.iter().enumerate() {
             joint += one * other.transpose() * covariance[(row, column)];
         }
     }
@@ -156,13 +155,12 @@ pub(crate) fn numbers(
 ) -> Option<Numbers> {
     let shape = local.shape()?;
     let here = Told::of(&shape);
-    let free = local.free();
     let slopes = slopes(local, covariance)?;
     let common = |a: &dyn Fn(&Told) -> f64, b: &dyn Fn(&Told) -> f64| -> f64 {
         let mut sum = 0.0;
-        for (i, &row) in free.iter().enumerate() {
-            for (j, &column) in free.iter().enumerate() {
-                sum += a(&slopes[i]) * covariance[(row, column)] * b(&slopes[j]);
+        for (row, one) in slopes.iter().enumerate() {
+            for (column, other) in slopes.iter().enumerate() {
+                sum += a(one) * covariance[(row, column)] * b(other);
             }
         }
         sum
