@@ -4,12 +4,15 @@
 //! as a shape of its own does. But beside two shapes that are known from afar it has one free
 //! number, its radius: that tells it from a surface that is smooth all over.
 
-use shapes::is_smoother;
+use shapes::{is_smoother, spread};
 
 use crate::field::{Field, Set, places};
 use crate::grow::Piece;
 use crate::rounding::Rounding;
 use crate::split::BESIDE;
+
+/// Samples that tell the radius.
+const SOME: usize = 600;
 
 /// Whether a piece is a fillet between two others, and not one smooth surface with them.
 pub(crate) fn is_fillet(field: &Field<'_>, piece: &Set, others: [&Piece; 2]) -> bool {
@@ -26,7 +29,8 @@ pub(crate) fn is_fillet(field: &Field<'_>, piece: &Set, others: [&Piece; 2]) -> 
     let Some(rounding) = Rounding::of([a, b], &own) else {
         return false;
     };
-    let radius_mm = rounding.radius_mm(&samples, field.pitch_mm());
+    let some: Vec<_> = spread(samples.len(), SOME).map(|k| samples[k]).collect();
+    let radius_mm = rounding.radius_mm(&some, field.pitch_mm());
     let off = rounding.offs(radius_mm, &samples).collect();
     !is_smoother(&samples, off, 1)
 }

@@ -9,7 +9,7 @@ use crate::field::{Field, Set, count, places};
 use crate::fillet::is_fillet;
 use crate::grow::{FEWEST, Piece, grow, grow_left};
 use crate::strain::is_strained;
-use crate::unite::unite;
+use crate::unite::Known;
 
 /// Half-widths of the windows that pieces are grown from, in nodes, one after the other.
 const WINDOWS: [usize; 3] = [8, 5, 3];
@@ -54,6 +54,7 @@ pub(crate) fn split(
     let all = field.all();
     let mut open = all.clone();
     let mut pieces: Vec<Piece> = Vec::new();
+    let mut known = Known::default();
     for window in WINDOWS.into_iter().map(Some).chain([None]) {
         let mut found = match window {
             Some(half) => candidates(field, &open, half, monitor)?,
@@ -87,7 +88,7 @@ pub(crate) fn split(
             }
             pieces.push(Piece { nodes, ..piece });
         }
-        unite(field, &mut open, &mut pieces, monitor)?;
+        known.unite(field, &mut open, &mut pieces, monitor)?;
         if is_free_form(field, &pieces) {
             return Ok(None);
         }

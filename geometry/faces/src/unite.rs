@@ -3,6 +3,8 @@
 //! From a small window a cone is a cylinder that leans, and grows as far as that goes: what tells it
 //! from a cone are the pieces beside it.
 
+use std::collections::BTreeSet;
+
 use range_image::{Cancelled, Monitor};
 use shapes::{Evidence, Sample, decide};
 
@@ -17,43 +19,71 @@ const SAMPLES: usize = 1500;
 /// surface would spoil one that has not.
 const HELD: f64 = 0.9;
 
-/// Makes one of pieces that touch and are of one shape, which then grows on over what is open.
-pub(crate) fn unite(
-    field: &Field<'_>,
-    open: &mut [bool],
-    pieces: &mut Vec<Piece>,
-    monitor: &dyn Monitor,
-) -> Result<(), Cancelled> {
-    let told = |piece: &Piece| -> (Vec<Sample>, Evidence) {
-        let samples = field.samples(&piece.nodes, 1, SAMPLES);
-        let evidence = decide(&samples, field.area());
-        (samples, evidence)
-    };
-    let mut each: Vec<_> = pieces.iter().map(told).collect();
-    let mut apart: Vec<(usize, usize)> = Vec::new();
-    'united: loop {
+/// What is known of pieces, in their order.
+#[derive(Default)]
+pub(crate) struct Known {
+    /// Samples of each, and what they speak for.
+    told: Vec<(Vec<Sample>, Evidence)>,
+    /// Pairs that are not one.
+    apart: BTreeSet<(usize, usize)>,
+}
+
+impl Known {
+    /// Makes one of pieces that touch and are of one shape, which then grows on over what is open.
+    /// Pieces that were there before must be the same as then, and come first.
+    pub(crate) fn unite(
+        &mut self,
+        field: &Field<'_>,
+        open: &mut [bool],
+        pieces: &mut Vec<Piece>,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Cancelled> {
+        let told = |piece: &Piece| -> (Vec<Sample>, Evidence) {
+            let samples = field.samples(&piece.nodes, 1, SAMPLES);
+            let evidence = decide(&samples, field.area());
+            (samples, evidence)
+        };
+        self.told.extend(pieces[self.told.len()..].iter().map(told));
+        while let Some((a, b, both)) = self.next(field, open, pieces, monitor)? {
+            for (place, is_in) in both.nodes.iter().enumerate() {
+                let was_in = pieces[a].nodes[place] || pieces[b].nodes[place];
+                open[place] = (open[place] || was_in) && !is_in;
+            }
+            self.told[a] = told(&both);
+            self.told.remove(b);
+            pieces[a] = both;
+            pieces.remove(b);
+            let others = self
+                .apart
+                .iter()
+                .filter(|(c, d)| ![a, b].contains(c) && ![a, b].contains(d));
+            let now = |piece: usize| piece - usize::from(piece > b);
+            self.apart = others.map(|(c, d)| (now(*c), now(*d))).collect();
+        }
+        Ok(())
+    }
+
+    /// The first pair that is of one shape, and what it grows to.
+    fn next(
+        &mut self,
+        field: &Field<'_>,
+        open: &[bool],
+        pieces: &[Piece],
+        monitor: &dyn Monitor,
+    ) -> Result<Option<(usize, usize, Piece)>, Cancelled> {
         for (a, b) in touching(field, pieces) {
             monitor.check()?;
-            if apart.contains(&(a, b)) {
+            if self.apart.contains(&(a, b)) {
                 continue;
             }
-            if are_one(&each[a], &each[b], field.area())
+            if are_one(&self.told[a], &self.told[b], field.area())
                 && let Some(both) = grown(field, open, [&pieces[a], &pieces[b]])
             {
-                for (place, is_in) in both.nodes.iter().enumerate() {
-                    let was_in = pieces[a].nodes[place] || pieces[b].nodes[place];
-                    open[place] = (open[place] || was_in) && !is_in;
-                }
-                each[a] = told(&both);
-                each.remove(b);
-                pieces[a] = both;
-                pieces.remove(b);
-                apart.clear();
-                continue 'united;
+                return Ok(Some((a, b, both)));
             }
-            apart.push((a, b));
+            self.apart.insert((a, b));
         }
-        return Ok(());
+        Ok(None)
     }
 }
 
@@ -105,7 +135,9 @@ mod tests {
         };
         let mut pieces: Vec<Piece> = (0..8).map(wedge).collect();
         let mut open = vec![false; field.len()];
-        unite(&field, &mut open, &mut pieces, &Unmonitored).unwrap();
+        let mut known = Known::default();
+        let united = known.unite(&field, &mut open, &mut pieces, &Unmonitored);
+        united.unwrap();
         pieces
     }
 
