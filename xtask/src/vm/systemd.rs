@@ -35,7 +35,7 @@ const PARAMETERS: &str = "mitigations=off systemd.show_status=0 systemd.mask=get
 /// From the kernel's hands to systemd's.
 const INIT: &str = include_str!("../../../tests/vm/systemd/init.sh");
 
-/// What `.ci/run` has time for is all but the checks that wait long.
+/// What is wanted of the machine.
 #[derive(Debug, Args)]
 pub(crate) struct Options {
     /// Leave out what takes longest.
