@@ -13,7 +13,9 @@ import sys
 import gmsh
 
 # Relative difference of all triangles from the area of the faces that chords explain; bumps
-# finer than the mesh count, so that single faces may be off by more.
+# finer than the mesh count, so that single faces may be off by more. OpenCASCADE's own integral,
+# the only one to be had of Gmsh, is off by a third of rings whose patches have many knots: where
+# the area is known otherwise, it is to be told.
 AREA_TOLERANCE = 0.02
 
 
@@ -45,6 +47,7 @@ def judge(path, arguments):
         if triangles == 0:
             problems.append(f"face {tag} has no triangles")
     area, meshed = (sum(face[key] for face in faces) for key in ("area_mm2", "meshed_mm2"))
+    area = arguments.area_mm2 or area
     if not abs(meshed - area) <= AREA_TOLERANCE * area:
         problems.append(f"triangles cover {meshed} of {area} mm2")
     if arguments.expect_faces is not None and len(faces) != arguments.expect_faces:
@@ -58,6 +61,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("files", nargs="+")
     parser.add_argument("--expect-faces", type=int, metavar="N")
+    parser.add_argument("--area-mm2", type=float, metavar="MM2", help="of all faces")
     parser.add_argument(
         "--elements", type=float, default=100, metavar="N", help="along the longest side"
     )

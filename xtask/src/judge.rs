@@ -77,9 +77,7 @@ struct Case {
 /// STEP file of each judged. All are judged before the first failure is reported.
 pub(crate) fn run(options: &Options) -> Result<()> {
     let place = shell::root().join("target/judges");
-    let mut packages = PACKAGES.to_vec();
-    packages.extend(options.gmsh.then_some(GMSH));
-    let python = python_with(&place, &packages)?;
+    let python = python(&place, options.gmsh)?;
     let scenes = options.out.clone().unwrap_or_else(|| place.join("scenes"));
     study::build()?;
     let judges = Judges {
@@ -312,12 +310,10 @@ fn cadmpeg(place: &Path) -> Result<String> {
     Ok(home.join("release/judge-cadmpeg").display().to_string())
 }
 
-/// A Python with the judge's packages, made once.
-pub(crate) fn python(place: &Path) -> Result<String> {
-    python_with(place, &PACKAGES)
-}
-
-fn python_with(place: &Path, packages: &[&str]) -> Result<String> {
+/// A Python with the judge's packages, and Gmsh if asked for, made once.
+pub(crate) fn python(place: &Path, with_gmsh: bool) -> Result<String> {
+    let mut packages = PACKAGES.to_vec();
+    packages.extend(with_gmsh.then_some(GMSH));
     let home = place.join("python");
     let python = home.join("bin/python").display().to_string();
     let ready = home.join("ready");
@@ -337,7 +333,7 @@ fn python_with(place: &Path, packages: &[&str]) -> Result<String> {
         "--quiet",
         "--disable-pip-version-check",
     ];
-    install.extend(packages);
+    install.extend(packages.iter().copied());
     shell::run(&python, &install)?;
     std::fs::write(&ready, packages.join("\n"))
         .with_context(|| format!("cannot write {}", ready.display()))?;

@@ -95,7 +95,9 @@ pub(crate) fn run(study: &Study) -> Result<()> {
         Study::Mutations { options } => program("study-mutations", options),
         Study::Outline { options } => program("study-outline", options),
         Study::Parts { options } => {
-            let python = judge::python(&shell::root().join("target/judges"))?;
+            let place = shell::root().join("target/judges");
+            let with_gmsh = options.iter().any(|word| word == "--gmsh");
+            let python = judge::python(&place, with_gmsh)?;
             let mut words: Vec<OsString> = vec!["--python".into(), python.into()];
             words.extend(options.iter().cloned());
             program("study-parts", &words)

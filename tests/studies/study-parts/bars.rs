@@ -160,6 +160,16 @@ pub(crate) fn of_files(judged: &[Judged]) -> Vec<Bar> {
                 count == files.len() && count > 0,
             ));
         }
+        let meshed: Vec<_> = files.iter().filter_map(|j| j.complaints.as_ref()).collect();
+        let count = meshed.iter().filter(|said| said.is_empty()).count();
+        if !meshed.is_empty() {
+            bars.push(bar(
+                &format!("{name} files, by Gmsh: all faces meshed without a complaint"),
+                "100 %",
+                format!("{count} of {}", files.len()),
+                count == files.len(),
+            ));
+        }
     }
     bars
 }
@@ -191,7 +201,22 @@ mod tests {
             invalid,
             free_mm: 100.0,
             misplaced_mm,
+            complaints: None,
         }
+    }
+
+    #[test]
+    fn a_file_that_was_not_meshed_is_not_meshed_well() {
+        let with = |complaints: Option<&[&str]>| Judged {
+            complaints: complaints.map(|said| said.iter().map(|s| (*s).to_owned()).collect()),
+            ..judged("igs", 0, 0.0)
+        };
+        let last = |files: &[Judged]| of_files(files).swap_remove(2);
+        let well = last(&[with(Some(&[])), with(Some(&[]))]);
+        assert!(well.what.contains("Gmsh") && well.holds);
+        assert!(!last(&[with(Some(&[])), with(Some(&["Error"]))]).holds);
+        assert!(!last(&[with(Some(&[])), with(None)]).holds);
+        assert!(!last(&[with(None)]).what.contains("Gmsh"));
     }
 
     #[test]

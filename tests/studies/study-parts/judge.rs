@@ -1,14 +1,15 @@
-//! What OpenCASCADE says of the exported files, and who makes the parts.
+//! What OpenCASCADE and Gmsh say of the exported files, and who makes the parts.
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 
 use anyhow::{Context, Result, ensure};
 use serde::Deserialize;
 
 const MAKE: &str = "tests/judges/parts/make.py";
 const CHECK: &str = "tests/judges/parts/check.py";
+const MESH: &str = "tests/judges/gmsh_check.py";
 /// Edges of one face may lie so far in all where none belongs: a corner's worth.
 pub(crate) const MISPLACED_MM: f64 = 1.0;
 
@@ -24,6 +25,15 @@ pub(crate) struct Judged {
     /// Edges of one face after sewing, and those where none belongs.
     pub(crate) free_mm: f64,
     pub(crate) misplaced_mm: f64,
+    /// What Gmsh complains of as it meshes the faces, where it was asked.
+    #[serde(default)]
+    pub(crate) complaints: Option<Vec<String>>,
+}
+
+/// What the script about meshes says of a file.
+#[derive(Debug, Deserialize)]
+struct Meshed {
+    problems: Vec<String>,
 }
 
 impl Judged {
@@ -36,20 +46,24 @@ impl Judged {
     }
 }
 
-/// A Python with OpenCASCADE.
+/// A Python with OpenCASCADE, and with Gmsh where that is asked.
 #[derive(Debug, Clone)]
 pub(crate) struct Python(pub(crate) PathBuf);
 
 impl Python {
-    fn said(&self, script: &str, words: &[String]) -> Result<String> {
+    fn run(&self, script: &str, words: &[String]) -> Result<Output> {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let output = Command::new(&self.0)
+        Command::new(&self.0)
             .args(["-B", script])
             .args(words)
             .current_dir(root)
             .stderr(Stdio::inherit())
             .output()
-            .with_context(|| format!("cannot start {}", self.0.display()))?;
+            .with_context(|| format!("cannot start {}", self.0.display()))
+    }
+
+    fn said(&self, script: &str, words: &[String]) -> Result<String> {
+        let output = self.run(script, words)?;
         ensure!(
             output.status.success(),
             "{script} ended with {}",
@@ -73,6 +87,35 @@ impl Python {
         words.extend(seeds.iter().map(u64::to_string));
         Ok(serde_json::from_str(&self.said(CHECK, &words)?)?)
     }
+
+    /// Has Gmsh mesh the files that were judged, each by a process of its own: one that falls
+    /// over says nothing of the others.
+    pub(crate) fn mesh(&self, folder: &Path, judged: &mut [Judged]) -> Result<()> {
+        let folder = absolute(folder)?;
+        for file in judged {
+            let model = format!("{folder}/{}.step", file.seed);
+            let text = fs::read_to_string(&model).context(model.clone())?;
+            let area_mm2 = stated_area_mm2(&text).context(format!("{model} states no area"))?;
+            let words = [
+                format!("{folder}/{}.{}", file.seed, file.file),
+                "--area-mm2".to_owned(),
+                area_mm2.to_string(),
+            ];
+            let output = self.run(MESH, &words)?;
+            let said: Result<Vec<Meshed>, _> = serde_json::from_slice(&output.stdout);
+            file.complaints = Some(match said {
+                Ok(said) => said.into_iter().flat_map(|m| m.problems).collect(),
+                Err(_) => vec![format!("{MESH} ended with {}", output.status)],
+            });
+        }
+        Ok(())
+    }
+}
+
+/// The area that a STEP file says its faces have.
+fn stated_area_mm2(step: &str) -> Option<f64> {
+    let (_, rest) = step.split_once("AREA_MEASURE(")?;
+    rest.split_once(')')?.0.trim().parse().ok()
 }
 
 fn absolute(folder: &Path) -> Result<String> {
@@ -85,6 +128,14 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_area_is_that_of_the_file() {
+        let text =
+            "#1=MEASURE_REPRESENTATION_ITEM('surface area measure',\nAREA_MEASURE(8327.5),#2);";
+        assert_eq!(stated_area_mm2(text), Some(8327.5));
+        assert_eq!(stated_area_mm2("#1=PLANE('',#2);"), None);
+    }
+
+    #[test]
     fn a_file_holds_if_it_was_read_and_all_is_where_it_belongs() {
         let sound = Judged {
             seed: 1,
@@ -94,6 +145,7 @@ mod tests {
             invalid: 0,
             free_mm: 300.0,
             misplaced_mm: 0.4,
+            complaints: None,
         };
         assert!(sound.is_valid() && sound.is_closed());
         let with = |change: fn(&mut Judged)| {

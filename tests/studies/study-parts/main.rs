@@ -50,6 +50,9 @@ struct Options {
     /// A Python with OpenCASCADE, which makes parts that are not there and judges models
     #[arg(long, value_name = "FILE")]
     python: Option<PathBuf>,
+    /// Also have Gmsh mesh the models; the Python must have it
+    #[arg(long, requires = "python")]
+    gmsh: bool,
     /// The folder of the parts: SEED.stl and SEED.json
     #[arg(long, value_name = "DIR", default_value = "target/studies/parts")]
     parts: PathBuf,
@@ -138,7 +141,11 @@ fn run(options: &Options) -> Result<()> {
     let judged = match &python {
         Some(python) => {
             let made: Vec<u64> = parts.iter().map(|part| part.seed).collect();
-            Some(python.judge(&options.models, &made)?)
+            let mut judged = python.judge(&options.models, &made)?;
+            if options.gmsh {
+                python.mesh(&options.models, &mut judged)?;
+            }
+            Some(judged)
         }
         None => None,
     };

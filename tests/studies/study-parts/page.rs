@@ -25,7 +25,7 @@ pub(crate) fn page(
     let mut out = String::from("# Exact models of parts, measured\n\n");
     let _ = writeln!(
         out,
-        "`cargo xtask study parts --write` makes this page. Seeds {} to {}, none left out; the code \
+        "`cargo xtask study parts --gmsh --write` makes this page. Seeds {} to {}, none left out; the code \
          under test was not tuned on them.\n",
         seeds.start(),
         seeds.end()
@@ -211,6 +211,18 @@ fn files(judged: &[Judged]) -> String {
             j.invalid,
             j.faces,
             if j.is_read { "" } else { ", and not read" }
+        );
+    }
+    let complained = judged
+        .iter()
+        .filter_map(|j| Some((j, j.complaints.as_ref()?)));
+    for (j, said) in complained.filter(|(_, said)| !said.is_empty()) {
+        let _ = writeln!(
+            out,
+            "\n{}.{}, by Gmsh: {}.",
+            j.seed,
+            j.file,
+            said.join("; ")
         );
     }
     out
