@@ -53,14 +53,20 @@ impl Known {
             self.told.remove(b);
             pieces[a] = both;
             pieces.remove(b);
-            let others = self
-                .apart
-                .iter()
-                .filter(|(c, d)| ![a, b].contains(c) && ![a, b].contains(d));
-            let now = |piece: usize| piece - usize::from(piece > b);
-            self.apart = others.map(|(c, d)| (now(*c), now(*d))).collect();
+            self.merged(a, b);
         }
         Ok(())
+    }
+
+    /// Piece `b` has become a part of `a`, of which nothing is known now but what it is told as.
+    fn merged(&mut self, a: usize, b: usize) {
+        let is_other = |piece: &usize| *piece != a && *piece != b;
+        let others = self
+            .apart
+            .iter()
+            .filter(|(c, d)| is_other(c) && is_other(d));
+        let now = |piece: usize| piece - usize::from(piece > b);
+        self.apart = others.map(|(c, d)| (now(*c), now(*d))).collect();
     }
 
     /// The first pair that is of one shape, and what it grows to.
@@ -139,6 +145,16 @@ mod tests {
         let united = known.unite(&field, &mut open, &mut pieces, &Unmonitored);
         united.unwrap();
         pieces
+    }
+
+    #[test]
+    fn pairs_that_are_apart_stay_so_but_for_those_of_what_has_grown() {
+        let mut known = Known {
+            apart: [(0, 1), (0, 2), (0, 3), (1, 2), (2, 4), (3, 4)].into(),
+            ..Known::default()
+        };
+        known.merged(1, 3);
+        assert_eq!(known.apart, [(0, 2), (2, 3)].into());
     }
 
     #[test]
