@@ -25,8 +25,8 @@ pub(crate) fn page(
     let mut out = String::from("# Exact models of parts, measured\n\n");
     let _ = writeln!(
         out,
-        "`cargo xtask study parts --gmsh --write` makes this page. Seeds {} to {}, none left out; the code \
-         under test was not tuned on them.\n",
+        "`cargo xtask study parts --gmsh --write` makes this page. Seeds {} to {}, none left out; \
+         the code under test was not tuned on them.\n",
         seeds.start(),
         seeds.end()
     );
