@@ -188,14 +188,15 @@ fn loops_that_run_the_wrong_way() {
 #[test]
 fn small_gaps_are_written_and_stated() {
     let (result, bytes) = attempt(|model| {
-        let curve = &mut model.faces[0].outer.coedges[1].space_curve;
+        let curve = &mut model.faces[0].outer.coedges[0].space_curve;
         for piece in &mut curve.pieces {
             piece[2][0] += 4e-4;
         }
     });
     let summary = result.unwrap();
     assert!(bytes > 0);
-    assert!((summary.resolution_mm - 4e-4).abs() < 1e-9, "{summary:?}");
+    // Off its surface, and led to the vertex that it leaves by as much.
+    assert!((summary.resolution_mm - 8e-4).abs() < 1e-9, "{summary:?}");
     assert_eq!(attempt(|_| ()).0.unwrap().resolution_mm, 1e-4);
 }
 

@@ -10,13 +10,19 @@ use cad_exchange::iges::{
     self, DEFAULT_PALETTE, Entities, SplineCurve, TrimmedCurve, TrimmedModel, TrimmedSurface,
     WriteOptions,
 };
-use reconstruct::{Loop, Surface};
+use reconstruct::{EdgeId, EdgeKind, Loop, Surface};
 
 const ALL: [Entities; 3] = [
     Entities::Parametric114,
     Entities::Rational128,
     Entities::Analytic,
 ];
+
+fn near(a: &[f64], b: &[f64]) {
+    for (a, b) in a.iter().zip(b) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
+    }
+}
 
 fn round_trip(entities: Entities) -> TrimmedModel {
     let options = WriteOptions {
@@ -72,21 +78,27 @@ fn every_shade() {
 }
 
 #[test]
-fn parametric_splines_to_the_last_bit() {
+fn parametric_splines_are_the_same_shapes() {
     let read = round_trip(Entities::Parametric114);
     let model = sample::model();
     assert_eq!(read.faces.len(), model.faces.len());
+    let of = |curve: &TrimmedCurve| match &curve.parameter_curve {
+        Some(SplineCurve::Cubic(curve)) => curve.clone(),
+        other => panic!("{other:?}"),
+    };
     let same = |curves: &[TrimmedCurve], border: &Loop| {
         assert_eq!(curves.len(), border.coedges.len());
         for (curve, coedge) in curves.iter().zip(&border.coedges) {
-            assert_eq!(
-                curve.parameter_curve,
-                Some(SplineCurve::Cubic(coedge.parameter_curve.clone()))
-            );
-            assert_eq!(
-                curve.space_curve,
-                SplineCurve::Cubic(coedge.space_curve.clone())
-            );
+            // Where faces share it, half way between the two that there are of it.
+            let (first, last) = coedge.space_curve.domain();
+            for k in 0..=50 {
+                let t = first + (last - first) * f64::from(k) / 50.0;
+                near(&of(curve).evaluate(t), &coedge.parameter_curve.evaluate(t));
+                near(
+                    &curve.space_curve.evaluate(t),
+                    &coedge.space_curve.evaluate(t),
+                );
+            }
         }
     };
     for (face, original) in read.faces.iter().zip(&model.faces) {
@@ -100,14 +112,46 @@ fn parametric_splines_to_the_last_bit() {
     }
 }
 
+/// Two faces are written on one curve, half way between those that they make of their edge.
+#[test]
+fn neighbours_share_their_curve_in_every_form() {
+    let mut model = sample::model();
+    let edge = model.edges.iter().position(|e| e.kind == EdgeKind::Crease);
+    let edge = EdgeId(edge.unwrap());
+    let coedge = model.faces[0].outer.coedges.iter_mut();
+    let coedge = coedge.filter(|c| c.edge == edge).next().unwrap();
+    for piece in &mut coedge.space_curve.pieces {
+        piece[2][0] += 4e-4;
+    }
+    let raised = coedge.space_curve.clone();
+    for entities in ALL {
+        let options = WriteOptions {
+            entities,
+            ..WriteOptions::new("sample", "20261121.093000")
+        };
+        let mut file = Vec::new();
+        iges::write(&model, &options, &mut file).unwrap();
+        let read = iges::read_model(&file[..]).unwrap();
+        let of = |face: usize| {
+            let uses = model.faces[face].outer.coedges.iter();
+            let at = uses.clone().position(|c| c.edge == edge).unwrap();
+            read.faces[face].outer[at].space_curve.clone()
+        };
+        let (first, second) = (of(0), of(1).reversed());
+        let (from, to) = raised.domain();
+        for k in 0..=50 {
+            let t = from + (to - from) * f64::from(k) / 50.0;
+            near(&first.evaluate(t), &second.evaluate(t));
+        }
+        let middle = (from + to) / 2.0;
+        let [x, y, z] = raised.evaluate(middle);
+        near(&first.evaluate(middle), &[x, y, z - 2e-4]);
+    }
+}
+
 #[test]
 fn bsplines_are_the_same_shapes() {
     let read = round_trip(Entities::Rational128);
-    let near = |a: &[f64], b: &[f64]| {
-        for (a, b) in a.iter().zip(b) {
-            assert!((a - b).abs() < 1e-9, "{a} {b}");
-        }
-    };
     for (face, original) in read.faces.iter().zip(&sample::model().faces) {
         let Surface::Patches(patches) = &original.surface;
         let TrimmedSurface::BSpline(surface) = &face.surface else {

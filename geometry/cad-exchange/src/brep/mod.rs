@@ -35,12 +35,19 @@ pub(crate) struct Brep {
 }
 
 impl Brep {
-    /// Of a checked model.
-    pub(crate) fn of(model: &Model, sharing: Sharing) -> Self {
+    /// Of a checked model, its faces by their numbers where they have some.
+    pub(crate) fn by_numbers(model: &Model, sharing: Sharing) -> Self {
         let faces = model.faces.iter();
-        let carriers: Vec<Carrier> = faces
-            .map(|face| Carrier::of(face, sharing.sharing_mm))
-            .collect();
+        let carriers = faces.map(|face| Carrier::of(face, sharing.sharing_mm));
+        Self::on(model, carriers.collect(), sharing)
+    }
+
+    /// Of a checked model, each face on its own patches.
+    pub(crate) fn of_splines(model: &Model, sharing: Sharing) -> Self {
+        Self::on(model, vec![Carrier::Spline; model.faces.len()], sharing)
+    }
+
+    fn on(model: &Model, carriers: Vec<Carrier>, sharing: Sharing) -> Self {
         let shapes: Vec<_> = carriers.iter().map(Carrier::shape).collect();
         Self {
             topology: topology::topology(model, &shapes, sharing),

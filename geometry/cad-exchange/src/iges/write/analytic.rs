@@ -1,133 +1,14 @@
-//! Faces by their numbers: planes, cylinders, cones, spheres and tori (entities 190 to 198), on
-//! the edges that they share; what is none of these is a B-spline (128).
-//!
-//! Curves of the former are given in space alone: a reader's parameters of these surfaces are its
-//! own affair. On a B-spline over x and y, they are x and y.
+//! Surfaces by their numbers: planes, cylinders, cones, spheres and tori (entities 190 to 198).
 
-use nurbs::PiecewiseCubic;
-use reconstruct::{Face, Surface};
 use shapes::Family;
 
 use super::error::WriteError;
-use super::shapes::{Joined, curve, curve_status, plain_entry, surface};
+use super::shapes::plain_entry;
 use super::sheet::{Entry, Pointer, Sheet, Status};
-use super::{PREFER_SPACE_CURVE, Style};
-use crate::brep::{Analytic, Carrier, Flat, Topology, Use};
-
-/// The surface of a face and its borders, the outer one first: entities 142.
-pub(super) fn bounded_surface(
-    sheet: &mut Sheet,
-    style: Style,
-    (face, carrier): (&Face, &Carrier),
-    topology: &Topology,
-    loops: &[Vec<Use>],
-) -> Result<(Pointer, Vec<Pointer>), WriteError> {
-    let (surface, is_spline) = carrier_surface(sheet, style, face, carrier)?;
-    let borders = loops
-        .iter()
-        .map(|uses| {
-            let uses = as_the_surface_sees(carrier, uses);
-            border(sheet, style, (surface, is_spline), topology, &uses)
-        })
-        .collect::<Result<Vec<_>, _>>()?;
-    Ok((surface, borders))
-}
-
-/// What a face lies on, and whether that is a B-spline over x and y.
-pub(super) fn carrier_surface(
-    sheet: &mut Sheet,
-    style: Style,
-    face: &Face,
-    carrier: &Carrier,
-) -> Result<(Pointer, bool), WriteError> {
-    let Surface::Patches(patches) = &face.surface;
-    Ok(match carrier {
-        Carrier::Plane(flat) => (plane(sheet, style.level, flat)?, false),
-        Carrier::Round(round) => (round_surface(sheet, style.level, round)?, false),
-        Carrier::Spline => (surface(sheet, style.entities, style.level, patches)?, true),
-    })
-}
-
-/// A loop in the sense in which the surface's own normal sees it: outer ones counter-clockwise.
-/// The normal of entities 192 to 198 always points outwards: a face that is seen from within shows
-/// its back, and its loops run the other way.
-pub(super) fn as_the_surface_sees(carrier: &Carrier, uses: &[Use]) -> Vec<Use> {
-    if carrier.same_sense() {
-        return uses.to_vec();
-    }
-    let reversed = uses.iter().rev().map(|of| Use {
-        forward: !of.forward,
-        ..*of
-    });
-    reversed.collect()
-}
-
-/// Entity 142 and the curves below it.
-fn border(
-    sheet: &mut Sheet,
-    style: Style,
-    (surface, is_spline): (Pointer, bool),
-    topology: &Topology,
-    uses: &[Use],
-) -> Result<Pointer, WriteError> {
-    let spatial: Vec<PiecewiseCubic<3>> = uses
-        .iter()
-        .map(|of| topology.edges[of.edge].directed(of.forward))
-        .collect();
-    let flat = is_spline.then(|| spatial.iter().map(plan).collect::<Vec<_>>());
-    let flat = flat.map(|flat| chain(sheet, style, &flat)).transpose()?;
-    let spatial = chain(sheet, style, &spatial)?;
-    let status = Status::DependentInParameterPlane;
-    let mut record = sheet.begin(plain_entry(142, style.level, status));
-    // How the curve came about is left open.
-    record.integer(0);
-    record.pointer(surface);
-    match flat {
-        Some(flat) => record.pointer(flat),
-        None => record.integer(0),
-    }
-    record.pointer(spatial);
-    record.integer(PREFER_SPACE_CURVE);
-    record.finish()
-}
-
-/// x and y of a curve.
-pub(super) fn plan(curve: &PiecewiseCubic<3>) -> PiecewiseCubic<2> {
-    PiecewiseCubic {
-        breaks: curve.breaks.clone(),
-        pieces: curve.pieces.iter().map(|&[x, y, _]| [x, y]).collect(),
-    }
-}
-
-/// The curves of a closed loop (126), and entity 102 over them where there are several.
-fn chain<const D: usize>(
-    sheet: &mut Sheet,
-    style: Style,
-    curves: &[PiecewiseCubic<D>],
-) -> Result<Pointer, WriteError> {
-    let mut pointers = Vec::with_capacity(curves.len());
-    for (of, next) in curves.iter().zip(curves.iter().cycle().skip(1)) {
-        let joined = Joined {
-            curve: of,
-            end: next.start(),
-            closed: curves.len() == 1,
-            flat_mm: style.resolution_mm,
-        };
-        pointers.push(curve(sheet, style.entities, style.level, &joined)?);
-    }
-    if let &[single] = pointers.as_slice() {
-        return Ok(single);
-    }
-    let mut record = sheet.begin(plain_entry(102, style.level, curve_status(D)));
-    record.integer(pointers.len());
-    for pointer in pointers {
-        record.pointer(pointer);
-    }
-    record.finish()
-}
+use crate::brep::{Analytic, Flat};
 
 /// Entity 190.
-fn plane(sheet: &mut Sheet, level: u16, flat: &Flat) -> Result<Pointer, WriteError> {
+pub(super) fn plane(sheet: &mut Sheet, level: u16, flat: &Flat) -> Result<Pointer, WriteError> {
     let location = point(sheet, level, flat.origin_mm)?;
     let normal = direction(sheet, level, flat.normal)?;
     let reference = direction(sheet, level, flat.x)?;
@@ -139,7 +20,11 @@ fn plane(sheet: &mut Sheet, level: u16, flat: &Flat) -> Result<Pointer, WriteErr
 }
 
 /// Entities 192 to 198.
-fn round_surface(sheet: &mut Sheet, level: u16, of: &Analytic) -> Result<Pointer, WriteError> {
+pub(super) fn round_surface(
+    sheet: &mut Sheet,
+    level: u16,
+    of: &Analytic,
+) -> Result<Pointer, WriteError> {
     let location = point(sheet, level, of.origin_mm)?;
     let axis = direction(sheet, level, of.axis)?;
     let reference = direction(sheet, level, of.x)?;

@@ -1,13 +1,14 @@
 //! The writer: a model in, five sections out.
 //!
-//! By [`Entities::Analytic`] faces are written on the edges that they share ([`analytic`]), by
-//! [`Entities::Boundary`] as shells of these ([`shell`]); else each face becomes, in this order: its surface (114 or 128); for each loop the curves
-//! of its edges in the parameter plane and in space (112 or 126), a composite of each
-//! (102) where there are several, and the curve on the surface that pairs them (142);
-//! its name (406 form 15); and the trimmed surface (144) over all of these. Colours (314)
-//! come first. So every pointer points back, and one pass numbers everything.
+//! By [`Entities::Boundary`] faces are written as shells ([`shell`]); else each becomes, in this
+//! order: its surface (114, 128, or 190 to 198); for each loop the curves of its edges in the
+//! parameter plane and in space (112 or 126), a composite of each (102) where there are several,
+//! and the curve on the surface that pairs them (142, [`border`]); its name (406 form 15); and the
+//! trimmed surface (144) over all of these. Neighbours share the curves of their edges in every
+//! form. Colours (314) come first. So every pointer points back, and one pass numbers everything.
 
 mod analytic;
+mod border;
 mod colour;
 mod error;
 mod fields;
@@ -18,22 +19,17 @@ mod shell;
 
 use std::io;
 
-use nurbs::PiecewiseCubic;
-use reconstruct::{Face, Loop, Model, Surface};
+use reconstruct::{Face, Model, Surface};
 
 pub use crate::common::{DEFAULT_PALETTE, FaceDefect};
 pub use error::WriteError;
 pub use options::{Entities, WriteOptions};
 
 use crate::brep::{Brep, Sharing};
-use crate::common::{ROUNDING_PART, SMOOTH_MM, check, without_kinks};
+use crate::common::check;
 use colour::Colours;
-use shapes::{Joined, curve_status, plain_entry};
+use shapes::plain_entry;
 use sheet::{ColourField, Entry, Pointer, Sheet, Status};
-
-/// Preference of 142 for the curve in space. Neighbours share it, and readers that take
-/// one curve only (Autodesk Alias among them) take this one.
-const PREFER_SPACE_CURVE: usize = 2;
 
 /// Width of lines on paper; the standard wants one above 0.
 const LINE_WIDTH_MM: f64 = 0.1;
@@ -63,10 +59,10 @@ pub struct Summary {
 
 /// Writes a model as an IGES 5.3 file of trimmed surfaces, or of shells.
 ///
-/// The same model and options give the same bytes. Curves are written as they are
-/// ([`Entities::Analytic`] and [`Entities::Boundary`] put them on what both faces are), but for slight kinks, which are
-/// rounded within half the resolution: readers would split the edge there. Nothing is written unless the whole
-/// model can be.
+/// The same model and options give the same bytes. Where two faces meet both are written on one
+/// curve: half way between those that they make of their edge, or ([`Entities::Analytic`] and
+/// [`Entities::Boundary`]) on what both are. Slight kinks are rounded within half the resolution:
+/// readers would split the edge there. Nothing is written unless the whole model can be.
 ///
 /// # Errors
 /// [`WriteError::Option`] for an option that cannot stand in a file; [`WriteError::Face`]
@@ -79,23 +75,21 @@ pub fn write(
 ) -> Result<Summary, WriteError> {
     options.validate()?;
     let gap_mm = check(model, options.resolution_mm)?;
-    let shared = options.entities.shares_edges().then(|| {
-        let sharing = Sharing {
-            sharing_mm: options.sharing_mm,
-            resolution_mm: options.resolution_mm,
-        };
-        Brep::of(model, sharing)
-    });
-    let shared_mm = shared.as_ref().map_or(0.0, |brep| brep.topology.gap_mm);
-    let resolution_mm = (gap_mm + shared_mm).max(options.resolution_mm);
+    let sharing = Sharing {
+        sharing_mm: options.sharing_mm,
+        resolution_mm: options.resolution_mm,
+    };
+    let brep = match options.entities {
+        Entities::Parametric114 | Entities::Rational128 => Brep::of_splines(model, sharing),
+        Entities::Analytic | Entities::Boundary => Brep::by_numbers(model, sharing),
+    };
+    let resolution_mm = (gap_mm + brep.topology.gap_mm).max(options.resolution_mm);
     let mut sheet = Sheet::default();
     let colours = Colours::define(&mut sheet, model, options)?;
     let looks = (&colours, options);
-    match &shared {
-        Some(brep) if options.entities == Entities::Boundary => {
-            shell::shells(&mut sheet, model, brep, looks, resolution_mm)?;
-        }
-        shared => trimmed_surfaces(&mut sheet, model, shared.as_ref(), looks, resolution_mm)?,
+    match options.entities {
+        Entities::Boundary => shell::shells(&mut sheet, model, &brep, looks, resolution_mm)?,
+        _ => trimmed_surfaces(&mut sheet, model, &brep, looks, resolution_mm)?,
     }
     let what = match options.entities {
         Entities::Boundary => "shells of faces",
@@ -112,11 +106,11 @@ pub fn write(
     })
 }
 
-/// Each face as a thing of its own, on the edges that it shares if these are known.
+/// Each face as a thing of its own, on the edges that it shares.
 fn trimmed_surfaces(
     sheet: &mut Sheet,
     model: &Model,
-    shared: Option<&Brep>,
+    Brep { carriers, topology }: &Brep,
     (colours, options): (&Colours, &WriteOptions),
     resolution_mm: f64,
 ) -> Result<(), WriteError> {
@@ -127,31 +121,11 @@ fn trimmed_surfaces(
             level: face.region,
             resolution_mm,
         };
-        let (surface, borders) = match shared {
-            Some(Brep { carriers, topology }) => {
-                let (of, loops) = ((face, &carriers[index]), &topology.uses[index]);
-                analytic::bounded_surface(sheet, style, of, topology, loops)?
-            }
-            None => bounded_surface(sheet, style, face)?,
-        };
+        let (of, loops) = ((face, &carriers[index]), &topology.uses[index]);
+        let (surface, borders) = border::bounded_surface(sheet, style, of, topology, loops)?;
         write_face(sheet, style, face, index + 1, colour, surface, &borders)?;
     }
     Ok(())
-}
-
-/// The surface of a face and its borders, the outer one first: entities 142.
-fn bounded_surface(
-    sheet: &mut Sheet,
-    style: Style,
-    face: &Face,
-) -> Result<(Pointer, Vec<Pointer>), WriteError> {
-    let Surface::Patches(patches) = &face.surface;
-    let surface = shapes::surface(sheet, style.entities, style.level, patches)?;
-    let borders = std::iter::once(&face.outer)
-        .chain(&face.inner)
-        .map(|border| write_loop(sheet, style, surface, border))
-        .collect::<Result<Vec<_>, _>>()?;
-    Ok((surface, borders))
 }
 
 /// Entity 144 and the name of the face; `borders` begin with the outer one.
@@ -196,56 +170,6 @@ fn write_name(sheet: &mut Sheet, level: u16, name: &str) -> Result<Pointer, Writ
     });
     record.integer(1);
     record.text(name);
-    record.finish()
-}
-
-/// Entity 142 and the curves below it.
-fn write_loop(
-    sheet: &mut Sheet,
-    style: Style,
-    surface: Pointer,
-    border: &Loop,
-) -> Result<Pointer, WriteError> {
-    let flat: Vec<_> = border.coedges.iter().map(|c| &c.parameter_curve).collect();
-    let spatial: Vec<_> = border.coedges.iter().map(|c| &c.space_curve).collect();
-    let flat = write_chain(sheet, style, &flat)?;
-    let spatial = write_chain(sheet, style, &spatial)?;
-    let level = style.level;
-    let mut record = sheet.begin(plain_entry(142, level, Status::DependentInParameterPlane));
-    // How the curve came about is left open.
-    record.integer(0);
-    record.pointer(surface);
-    record.pointer(flat);
-    record.pointer(spatial);
-    record.integer(PREFER_SPACE_CURVE);
-    record.finish()
-}
-
-/// The curves of a closed loop, and entity 102 over them where there are several.
-fn write_chain<const D: usize>(
-    sheet: &mut Sheet,
-    style: Style,
-    curves: &[&PiecewiseCubic<D>],
-) -> Result<Pointer, WriteError> {
-    let rounding_mm = style.resolution_mm * ROUNDING_PART;
-    let mut pointers = Vec::with_capacity(curves.len());
-    for (curve, next) in curves.iter().zip(curves.iter().cycle().skip(1)) {
-        let joined = Joined {
-            curve: &without_kinks(curve, SMOOTH_MM, rounding_mm),
-            end: next.start(),
-            closed: curves.len() == 1,
-            flat_mm: style.resolution_mm,
-        };
-        pointers.push(shapes::curve(sheet, style.entities, style.level, &joined)?);
-    }
-    if let &[single] = pointers.as_slice() {
-        return Ok(single);
-    }
-    let mut record = sheet.begin(plain_entry(102, style.level, curve_status(D)));
-    record.integer(pointers.len());
-    for pointer in pointers {
-        record.pointer(pointer);
-    }
     record.finish()
 }
 

@@ -12,19 +12,11 @@ pub enum Entities {
     /// B-splines of the same shape, 128 and 126, for readers without the former.
     Rational128,
     /// Planes, cylinders, cones, spheres and tori by their numbers, 190 to 198, other faces as
-    /// B-splines, 128; on edges that neighbours share (126).
+    /// B-splines, 128.
     Analytic,
     /// The same surfaces as boundary representation: shells (514) of faces (510) on edges and
     /// vertices that are each listed once (504, 502); a solid (186) where a shell is closed.
     Boundary,
-}
-
-impl Entities {
-    /// Faces are written on the edges that they share.
-    #[must_use]
-    pub fn shares_edges(self) -> bool {
-        matches!(self, Self::Analytic | Self::Boundary)
-    }
 }
 
 /// Everything about a file that is not in the model. Characters beyond printable ASCII
@@ -50,10 +42,10 @@ pub struct WriteOptions {
     /// Least gap between what should meet, millimetres: readers take it as the tolerance
     /// of every vertex and edge. A larger gap in the model is written instead.
     pub resolution_mm: f64,
-    /// Where [`Entities::shares_edges`], a crease is one curve of both its faces as far as the curves
-    /// that they make of it are as near to the other face as this, millimetres; the mean of both is
-    /// written there. A face is written by its numbers if its edges lie as near to that, too; else
-    /// as a B-spline.
+    /// A crease is one curve of both its faces as far as the curves that they make of it are as near
+    /// to the other face as this, millimetres; the mean of both is written there. Where entities
+    /// have numbers, a face is written by them if its edges lie as near to that, too; else as a
+    /// B-spline.
     pub sharing_mm: f64,
     /// Colours of the faces: region `r` gets `palette[r % palette.len()]`.
     pub palette: Vec<[u8; 3]>,

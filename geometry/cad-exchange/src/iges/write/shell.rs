@@ -8,7 +8,7 @@
 use reconstruct::{Face, Model};
 
 use super::Style;
-use super::analytic::{as_the_surface_sees, carrier_surface, plan};
+use super::border::{as_the_surface_sees, carrier_surface, plan};
 use super::error::WriteError;
 use super::options::{Entities, WriteOptions};
 use super::shapes::{Joined, curve, plain_entry};

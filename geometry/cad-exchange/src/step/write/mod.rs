@@ -83,7 +83,7 @@ pub fn write(
         sharing_mm: options.sharing_mm,
         resolution_mm: options.resolution_mm,
     };
-    let Brep { carriers, topology } = Brep::of(model, sharing);
+    let Brep { carriers, topology } = Brep::by_numbers(model, sharing);
     let moments = Moments::of(model);
     let uncertainty_mm = (gap_mm + topology.gap_mm).max(options.resolution_mm);
 
