@@ -48,7 +48,7 @@ pub(crate) struct Options {
 const STEP_SAMPLES: [&str; 2] = ["sample_ap242.step", "sample_ap214_inch.step"];
 
 /// Shapes that files know by their numbers, from either side; no simulated object has them all.
-const SHAPES: [&str; 8] = [
+const SHAPES: [&str; 13] = [
     "cylinder",
     "hollow-cylinder",
     "cone",
@@ -57,6 +57,11 @@ const SHAPES: [&str; 8] = [
     "hollow-sphere",
     "torus",
     "hollow-torus",
+    "standing-torus",
+    "ring-cone",
+    "hollow-ring-cone",
+    "ring-torus",
+    "hollow-ring-torus",
 ];
 
 /// The IGES entities that know their neighbours without sewing.

@@ -118,8 +118,8 @@ fn neighbours_share_their_curve_in_every_form() {
     let mut model = sample::model();
     let edge = model.edges.iter().position(|e| e.kind == EdgeKind::Crease);
     let edge = EdgeId(edge.unwrap());
-    let coedge = model.faces[0].outer.coedges.iter_mut();
-    let coedge = coedge.filter(|c| c.edge == edge).next().unwrap();
+    let mut coedge = model.faces[0].outer.coedges.iter_mut();
+    let coedge = coedge.find(|c| c.edge == edge).unwrap();
     for piece in &mut coedge.space_curve.pieces {
         piece[2][0] += 4e-4;
     }
@@ -144,8 +144,13 @@ fn neighbours_share_their_curve_in_every_form() {
             near(&first.evaluate(t), &second.evaluate(t));
         }
         let middle = (from + to) / 2.0;
+        // A plane that is written as one has its edges in it.
+        let back_mm = match entities {
+            Entities::Analytic => 4e-4,
+            _ => 2e-4,
+        };
         let [x, y, z] = raised.evaluate(middle);
-        near(&first.evaluate(middle), &[x, y, z - 2e-4]);
+        near(&first.evaluate(middle), &[x, y, z - back_mm]);
     }
 }
 

@@ -142,7 +142,7 @@ fn a_sphere() {
 }
 
 #[test]
-fn a_torus_but_not_across_its_seam() {
+fn a_torus_also_across_the_seam_of_its_tube() {
     let torus = |axis: Vector3<f64>, centre_mm| {
         let shape = Torus {
             centre_mm,
@@ -174,11 +174,49 @@ fn a_torus_but_not_across_its_seam() {
     // Standing, its outermost circle is amid the face.
     let standing = torus(Vector3::x(), Vector3::new(1.0, 0.0, -30.0));
     let (face, _) = written(standing, Y_MM, 0.0, LengthUnit::Millimetre);
-    assert!(matches!(face.surface, StepSurface::BSpline(_)));
+    assert!(matches!(face.surface, StepSurface::Torus { .. }));
+}
+
+/// They are cut open from one loop to the other.
+#[test]
+fn rings_are_written_by_their_numbers() {
+    for name in [
+        "ring-cone",
+        "hollow-ring-cone",
+        "ring-torus",
+        "hollow-ring-torus",
+    ] {
+        let model = sample::of_shape(name).unwrap();
+        let options = WriteOptions::new("part", "2026-11-21T09:30:00");
+        let mut file = Vec::new();
+        let summary = step::write(&model, &options, &mut file).unwrap();
+        assert!(summary.uncertainty_mm < 1e-3, "{name}: {summary:?}");
+        let read = step::read_model(&file[..]).unwrap();
+        let face = &read.faces[0];
+        let is_it = match face.surface {
+            StepSurface::Cone { .. } => name.ends_with("cone"),
+            StepSurface::Torus { .. } => name.ends_with("torus"),
+            _ => false,
+        };
+        assert!(is_it, "{name}: {:?}", face.surface);
+        assert_eq!(face.same_sense, !name.starts_with("hollow"));
+        // One loop: the outer circle, the seam, the inner circle, and back. Where that has no vertex
+        // opposite to the outer one's, it gets one.
+        let parts = if name.ends_with("torus") { 2 } else { 1 };
+        let uses: Vec<_> = face
+            .outer
+            .iter()
+            .map(|of| (of.edge, !of.reversed))
+            .collect();
+        assert!(face.inner.is_empty() && uses.len() == 3 + parts, "{uses:?}");
+        let (there, back) = (uses[1], uses[2 + parts]);
+        assert_eq!((there, back), ((there.0, true), (there.0, false)));
+        assert_eq!(summary.edges, 2 + parts);
+    }
 }
 
 #[test]
-fn a_face_around_its_axis_stays_a_spline() {
+fn a_face_with_the_apex_of_its_cone_stays_a_spline() {
     let apex_mm = Vector3::new(1.0, 0.5, 4.0);
     let hill = Shape::Cone(Cone {
         apex_mm,
@@ -207,6 +245,9 @@ fn edges_are_put_on_the_surface_unless_they_are_too_far_off() {
     let (face, uncertainty_mm) = written(sphere, Y_MM, 0.02, LengthUnit::Millimetre);
     assert!(matches!(face.surface, StepSurface::Sphere { .. }));
     assert!(uncertainty_mm < 2e-4, "{uncertainty_mm}");
-    let (face, _) = written(sphere, Y_MM, 0.07, LengthUnit::Millimetre);
+    let (face, uncertainty_mm) = written(sphere, Y_MM, 0.9, LengthUnit::Millimetre);
+    assert!(matches!(face.surface, StepSurface::Sphere { .. }));
+    assert!(uncertainty_mm < 2e-4, "{uncertainty_mm}");
+    let (face, _) = written(sphere, Y_MM, 1.3, LengthUnit::Millimetre);
     assert!(matches!(face.surface, StepSurface::BSpline(_)));
 }

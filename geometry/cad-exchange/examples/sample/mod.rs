@@ -45,7 +45,7 @@ pub(crate) fn model() -> Model {
         straight(1, 2, EdgeKind::Crease),
         straight(2, 3, EdgeKind::Silhouette),
         straight(3, 0, EdgeKind::Silhouette),
-        edge(4, 4, EdgeKind::Silhouette, hole()),
+        edge(4, 4, EdgeKind::Silhouette, circle(HOLE, 0)),
         straight(1, 5, EdgeKind::Silhouette),
         edge(5, 6, EdgeKind::Step, side()),
         straight(6, 2, EdgeKind::Silhouette),
@@ -130,13 +130,108 @@ pub(crate) fn rectangle(
     }
 }
 
-/// A rectangle of a cylinder, cone, sphere or torus; `hollow-` of these are seen from within.
+/// What lies between two circles about the z axis of a graph over the x-y plane, said to be of a
+/// shape; the inner one begins so many quarters on.
+pub(crate) fn ring(
+    [inner, outer]: [f64; 2],
+    from: usize,
+    shape: Shape,
+    z_mm: impl Fn(f64, f64) -> f64,
+) -> Model {
+    let paths = [
+        circle(([0.0; 2], outer), 0),
+        circle(([0.0; 2], inner), from),
+    ];
+    let begin = |path: &PiecewiseCubic<2>| {
+        let [x_mm, y_mm] = path.start();
+        Vertex { x_mm, y_mm }
+    };
+    let vertices: Vec<Vertex> = paths.iter().map(begin).collect();
+    let edges: Vec<Edge> = paths
+        .into_iter()
+        .enumerate()
+        .map(|(k, path)| edge(k, k, EdgeKind::Silhouette, path))
+        .collect();
+    let breaks: Vec<f64> = (0..=128)
+        .map(|k| outer * (f64::from(k) / 64.0 - 1.0))
+        .collect();
+    // Within and without, where no border runs, it need not be the shape.
+    let z_mm = |x: f64, y: f64| {
+        let out = libm::hypot(x, y);
+        let kept = out.clamp(0.95 * inner, 1.05 * outer);
+        if out > 0.0 {
+            z_mm(x / out * kept, y / out * kept)
+        } else {
+            z_mm(kept, 0.0)
+        }
+    };
+    let surface = patches(&breaks, &breaks, z_mm);
+    let border = |id: usize, reversed: bool| Loop {
+        coedges: vec![coedge(&surface, &edges, id, reversed, 0.0)],
+    };
+    let face = Face {
+        name: "Ring".to_owned(),
+        region: 1,
+        outer: border(0, false),
+        inner: vec![border(1, true)],
+        surface: Surface::Patches(surface),
+        shape: Some(shape),
+    };
+    Model {
+        vertices,
+        edges,
+        faces: vec![face],
+    }
+}
+
+/// A rectangle of a cylinder, cone, sphere or torus, the outside of a tube that stands
+/// (`standing-torus`), or a ring of a cone or torus (`ring-cone`); `hollow-` of these are seen from
+/// within.
 pub(crate) fn of_shape(name: &str) -> Option<Model> {
     let (family, is_hollow) = match name.strip_prefix("hollow-") {
         Some(family) => (family, true),
         None => (name, false),
     };
+    let torus = |centre_mm: [f64; 3], axis: Vector3<f64>, [radius_mm, tube_mm]: [f64; 2]| {
+        Shape::Torus(Torus {
+            centre_mm: centre_mm.into(),
+            axis,
+            radius_mm,
+            tube_mm,
+            is_hollow,
+        })
+    };
     let axis = Vector3::new(0.2, 1.0, 0.1).normalize();
+    match family {
+        "ring-cone" => {
+            // A frustum, or a countersink.
+            let up = if is_hollow { 1.0 } else { -1.0 };
+            let shape = Shape::Cone(Cone {
+                apex_mm: Vector3::new(0.0, 0.0, -3.0 * up),
+                axis: up * Vector3::z(),
+                half_angle_rad: 0.9,
+                is_hollow,
+            });
+            let slope = up / libm::tan(0.9);
+            let z_mm = |x, y| -3.0 * up + slope * libm::hypot(x, y);
+            return Some(ring([2.0, 9.0], 0, shape, z_mm));
+        }
+        "ring-torus" => {
+            // A round at the top of a boss, or a fillet at its foot.
+            let (up, of_tubes_mm, radii_mm) = if is_hollow {
+                (-1.0, 10.0, [6.8, 9.7])
+            } else {
+                (1.0, 6.0, [6.2, 9.0])
+            };
+            let shape = torus([0.0, 0.0, -4.0 * up], Vector3::z(), [of_tubes_mm, 4.0]);
+            let z_mm = |x, y| {
+                let out = libm::hypot(x, y) - of_tubes_mm;
+                up * ((16.0 - out * out).sqrt() - 4.0)
+            };
+            return Some(ring(radii_mm, 2, shape, z_mm));
+        }
+        _ => {}
+    }
     let shape = match family {
         "cylinder" => Shape::Cylinder(Cylinder {
             point_mm: Vector3::new(1.0, 0.0, 0.5),
@@ -156,13 +251,8 @@ pub(crate) fn of_shape(name: &str) -> Option<Model> {
             is_hollow,
         }),
         // Lying flat, the top of its tube or the bottom of a groove.
-        "torus" => Shape::Torus(Torus {
-            centre_mm: Vector3::new(-24.0, 0.0, 1.0),
-            axis: Vector3::z(),
-            radius_mm: 25.0,
-            tube_mm: 8.0,
-            is_hollow,
-        }),
+        "torus" => torus([-24.0, 0.0, 1.0], Vector3::z(), [25.0, 8.0]),
+        "standing-torus" => torus([1.0, 0.0, -30.0], Vector3::x(), [25.0, 8.0]),
         _ => return None,
     };
     let near_mm = if is_hollow { -20.0 } else { 20.0 };
@@ -177,7 +267,7 @@ pub(crate) fn areas_mm2() -> [f64; 2] {
         let slope = x / 20.0;
         0.5 * (x * (1.0 + slope * slope).sqrt() + 20.0 * slope.asinh())
     };
-    let border = hole();
+    let border = circle(HOLE, 0);
     let steps = 4000;
     let (_, length) = border.domain();
     let hole_area: f64 = (0..steps)
@@ -204,14 +294,14 @@ fn edge(start: usize, end: usize, kind: EdgeKind, path: PiecewiseCubic<2>) -> Ed
     }
 }
 
-/// The hole's border, counter-clockwise from its right-most point.
-fn hole() -> PiecewiseCubic<2> {
-    let ([x, y], r) = HOLE;
+/// A circle, counter-clockwise from its right-most point, or so many quarters on.
+fn circle(([x, y], r): ([f64; 2], f64), from: usize) -> PiecewiseCubic<2> {
     let kappa = 4.0 / 3.0 * (2.0_f64.sqrt() - 1.0) * r;
     let width = r * std::f64::consts::FRAC_PI_2;
     let mut breaks = vec![0.0];
     let mut pieces = Vec::new();
-    for quarter in [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]] {
+    let quarters = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
+    for quarter in quarters.into_iter().cycle().skip(from).take(4) {
         let [c, s]: [f64; 2] = quarter;
         let turned = |a: f64, b: f64| [x + c * a - s * b, y + s * a + c * b];
         let p = [

@@ -2,7 +2,8 @@
 //! `elementary_surface` of ISO 10303-42, in IGES 5.3 entities 192 to 198).
 //!
 //! Their parameters run around axes, so each has a seam where they begin anew. It is put on the
-//! side that a face leaves free; one that leaves none free stays a spline.
+//! side that a face leaves free. A ring, between two loops that both go around, leaves none free: it
+//! is cut open along its seam.
 
 use nalgebra::Vector3;
 use reconstruct::{Face, Loop};
@@ -16,6 +17,9 @@ const LEAST_RADIUS_MM: f64 = 1e-3;
 
 /// Places of each piece of an edge at which its distance from the surface is taken.
 const PROBES: usize = 4;
+
+/// Loops that wind more often are none of a face.
+const MOST_TURNS: f64 = 2.0;
 
 /// A surface by its numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,25 +35,23 @@ pub(crate) struct Analytic {
     pub(crate) angle_rad: Option<f64>,
     /// The surface's own normal, outwards, is that of the face.
     pub(crate) same_sense: bool,
+    /// Two of its loops go around the axis, so that none of them is the outer one.
+    pub(crate) is_ring: bool,
 }
 
 impl Analytic {
-    /// The surface of a face whose shape is known, if its edges lie within `most_mm` of it.
-    pub(super) fn of(face: &Face, most_mm: f64) -> Option<Self> {
+    /// The surface of a face whose shape is known, if its border keeps clear of seam and poles.
+    pub(super) fn of(face: &Face) -> Option<Self> {
         let shape = face.shape.as_ref()?;
-        let places = places(face);
-        let off = places.iter().map(|p| shape.distance_mm(p).abs());
-        let gap_mm = off.fold(0.0, f64::max);
-        if gap_mm.is_nan() || gap_mm > most_mm {
-            return None;
-        }
-        let around = |centre: &Vector3<f64>, axis: &Vector3<f64>| Around::of(&places, centre, axis);
-        let (origin, axis, seam, lengths_mm, angle_rad, is_hollow) = match shape {
+        let loops = loops(face);
+        let places: Vec<Vector3<f64>> = loops.iter().flatten().copied().collect();
+        let around = |centre: &Vector3<f64>, axis: &Vector3<f64>| Around::of(&loops, centre, axis);
+        let (origin, axis, around, lengths_mm, angle_rad, is_hollow) = match shape {
             Shape::Plane(_) => return None,
             Shape::Cylinder(c) => {
                 let around = around(&c.point_mm, &c.axis)?;
                 let lengths = vec![c.radius_mm];
-                (c.point_mm, c.axis, around.seam, lengths, None, c.is_hollow)
+                (c.point_mm, c.axis, around, lengths, None, c.is_hollow)
             }
             Shape::Cone(c) => {
                 let around = around(&c.apex_mm, &c.axis)?;
@@ -60,7 +62,7 @@ impl Analytic {
                 }
                 let origin = c.apex_mm + c.axis * up_mm;
                 let (lengths, angle) = (vec![radius_mm], Some(c.half_angle_rad));
-                (origin, c.axis, around.seam, lengths, angle, c.is_hollow)
+                (origin, c.axis, around, lengths, angle, c.is_hollow)
             }
             Shape::Sphere(s) => {
                 // An axis across the face, so that the poles lie beside it.
@@ -72,69 +74,106 @@ impl Analytic {
                     return None;
                 }
                 let lengths = vec![s.radius_mm];
-                (s.centre_mm, axis, around.seam, lengths, None, s.is_hollow)
+                (s.centre_mm, axis, around, lengths, None, s.is_hollow)
             }
             Shape::Torus(t) => {
                 if t.tube_mm >= t.radius_mm {
                     return None;
                 }
                 let around = around(&t.centre_mm, &t.axis)?;
-                // The seam of the tube is its outermost circle.
                 let both = around.up_mm.iter().zip(&around.out_mm);
-                let mut angles = both.map(|(up, out)| libm::atan2(*up, out - t.radius_mm));
-                if angles.any(|angle| angle.abs() < CLEAR_RAD) {
+                let angles = both.map(|(up, out)| libm::atan2(*up, out - t.radius_mm));
+                if widest_gap(angles.collect())? < 2.0 * CLEAR_RAD {
                     return None;
                 }
                 let lengths = vec![t.radius_mm, t.tube_mm];
-                (t.centre_mm, t.axis, around.seam, lengths, None, t.is_hollow)
+                (t.centre_mm, t.axis, around, lengths, None, t.is_hollow)
             }
         };
         Some(Self {
             shape: *shape,
             origin_mm: origin.into(),
             axis: axis.into(),
-            x: seam.into(),
+            x: around.seam.into(),
             lengths_mm,
             angle_rad,
             same_sense: !is_hollow,
+            is_ring: around.is_ring,
         })
     }
 }
 
 /// Places of a face's border, seen from an axis.
 struct Around {
-    /// Unit vector square to the axis that points away from the face.
+    /// Unit vector square to the axis that points away from the face, if it is no ring.
     seam: Vector3<f64>,
+    /// Two loops go around the axis, one each way.
+    is_ring: bool,
     /// How far along the axis each place lies, and how far off it.
     up_mm: Vec<f64>,
     out_mm: Vec<f64>,
 }
 
 impl Around {
-    /// `None` where the border comes near the seam, or goes around the axis.
-    fn of(places: &[Vector3<f64>], centre: &Vector3<f64>, axis: &Vector3<f64>) -> Option<Self> {
-        let up_mm: Vec<f64> = places.iter().map(|p| (p - centre).dot(axis)).collect();
-        let off: Vec<Vector3<f64>> = places
-            .iter()
-            .zip(&up_mm)
-            .map(|(p, up)| p - centre - axis * *up)
-            .collect();
-        let seam = -mean(off.iter().map(|off| off.normalize()))?;
-        let farthest = libm::cos(CLEAR_RAD);
-        let is_clear = |off: &Vector3<f64>| off.normalize().dot(&seam) < farthest;
-        off.iter().all(is_clear).then(|| Self {
+    /// `None` where the border comes near the seam, unless the face is a ring.
+    fn of(loops: &[Vec<Vector3<f64>>], centre: &Vector3<f64>, axis: &Vector3<f64>) -> Option<Self> {
+        let places = || loops.iter().flatten();
+        let up_mm: Vec<f64> = places().map(|p| (p - centre).dot(axis)).collect();
+        let off = |p: &Vector3<f64>| p - centre - axis * (p - centre).dot(axis);
+        let mut turns: Vec<i32> = Vec::new();
+        for of in loops {
+            let off: Vec<Vector3<f64>> = of.iter().map(off).collect();
+            turns.push(rounds(&off, axis)?);
+        }
+        turns.retain(|&turns| turns != 0);
+        let is_ring = matches!(turns.as_slice(), [1, -1] | [-1, 1]);
+        let seam = if is_ring {
+            across(axis)
+        } else {
+            let seam = -mean(places().map(|p| off(p).normalize()))?;
+            let farthest = libm::cos(CLEAR_RAD);
+            let is_clear = |p: &Vector3<f64>| off(p).normalize().dot(&seam) < farthest;
+            if !places().all(is_clear) {
+                return None;
+            }
+            seam
+        };
+        Some(Self {
             seam,
-            out_mm: off.iter().map(Vector3::norm).collect(),
+            is_ring,
+            out_mm: places().map(|p| off(p).norm()).collect(),
             up_mm,
         })
     }
 }
 
+/// How often a loop goes around the axis that its places are seen from; `None` where it meets that.
+fn rounds(off: &[Vector3<f64>], axis: &Vector3<f64>) -> Option<i32> {
+    let mut angle_rad = 0.0;
+    for (a, b) in off.iter().zip(off.iter().cycle().skip(1)) {
+        if a.norm_squared() <= 0.0 {
+            return None;
+        }
+        angle_rad += libm::atan2(a.cross(b).dot(axis), a.dot(b));
+    }
+    let turns = libm::round(angle_rad / core::f64::consts::TAU);
+    (turns.abs() <= MOST_TURNS).then_some(turns as i32)
+}
+
+/// The widest of the gaps between angles all around, radians.
+fn widest_gap(mut angles: Vec<f64>) -> Option<f64> {
+    angles.sort_by(f64::total_cmp);
+    let across = core::f64::consts::TAU - (angles.last()? - angles.first()?);
+    let between = angles.windows(2).map(|pair| pair[1] - pair[0]);
+    Some(between.fold(across, f64::max))
+}
+
 /// The direction of a mean; `None` where there is none to speak of.
-fn mean(vectors: impl ExactSizeIterator<Item = Vector3<f64>>) -> Option<Vector3<f64>> {
-    let count = vectors.len() as f64;
-    let mean = vectors.sum::<Vector3<f64>>() / count;
-    mean.try_normalize(1e-6)
+fn mean(vectors: impl Iterator<Item = Vector3<f64>>) -> Option<Vector3<f64>> {
+    let (count, sum) = vectors.fold((0.0, Vector3::zeros()), |(count, sum), vector| {
+        (count + 1.0, sum + vector)
+    });
+    (sum / count).try_normalize(1e-6)
 }
 
 /// A unit vector square to another, near y.
@@ -147,12 +186,15 @@ fn across(to: &Vector3<f64>) -> Vector3<f64> {
     (y - to * to.dot(&y)).normalize()
 }
 
-/// Places all along the loops of a face.
-fn places(face: &Face) -> Vec<Vector3<f64>> {
+/// Places all along each loop of a face.
+fn loops(face: &Face) -> Vec<Vec<Vector3<f64>>> {
     let loops = core::iter::once(&face.outer).chain(&face.inner);
-    let curves = loops.flat_map(|border: &Loop| border.coedges.iter().map(|c| &c.space_curve));
+    loops.map(places).collect()
+}
+
+fn places(border: &Loop) -> Vec<Vector3<f64>> {
     let mut places = Vec::new();
-    for curve in curves {
+    for curve in border.coedges.iter().map(|coedge| &coedge.space_curve) {
         for (k, ends) in curve.breaks.windows(2).enumerate() {
             let at = |n: usize| (ends[1] - ends[0]) * n as f64 / PROBES as f64;
             places.extend((0..=PROBES).map(|n| Vector3::from(curve.piece_value(k, at(n), 0))));

@@ -30,13 +30,13 @@ pub(crate) struct Flat {
 }
 
 impl Carrier {
-    /// By its numbers, if the face's edges lie within `most_mm` of that.
-    pub(crate) fn of(face: &Face, most_mm: f64) -> Self {
+    /// By its numbers, if it has some.
+    pub(crate) fn of(face: &Face) -> Self {
         let Surface::Patches(patches) = &face.surface;
         if let Some(flat) = plane(&patches.to_bspline(SMOOTH_MM)) {
             return Self::Plane(flat);
         }
-        Analytic::of(face, most_mm).map_or(Self::Spline, Self::Round)
+        Analytic::of(face).map_or(Self::Spline, Self::Round)
     }
 
     /// The shape that it is.
@@ -49,6 +49,11 @@ impl Carrier {
             Self::Round(analytic) => Some(analytic.shape),
             Self::Spline => None,
         }
+    }
+
+    /// One loop of its faces encloses all the others; else two go around the surface.
+    pub(crate) fn has_outer_loop(&self) -> bool {
+        !matches!(self, Self::Round(analytic) if analytic.is_ring)
     }
 
     /// The surface's own normal is that of the face, which is on the side of +z.

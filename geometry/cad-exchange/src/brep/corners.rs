@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use reconstruct::{Coedge, Model, VertexId};
-use shapes::Shape;
 
 use super::groups::Groups;
 use super::onto;
 use super::seam::Seam;
+use super::support::Support;
 use super::topology::{Place, coedge, loops_of};
 
 /// Ends of edges. A vertex of the model is a place in the x-y plane; each face has it at
@@ -19,11 +19,11 @@ pub(super) struct Corners {
 }
 
 impl Corners {
-    /// `shapes` are those of the faces, where they are known.
+    /// `supports` are those of the faces.
     pub(super) fn new(
         model: &Model,
         seams: &BTreeMap<Place, Seam>,
-        shapes: &[Option<Shape>],
+        supports: &[Support<'_>],
     ) -> Self {
         let mut nodes: BTreeMap<(VertexId, usize), usize> = BTreeMap::new();
         let mut points: Vec<[f64; 3]> = Vec::new();
@@ -58,20 +58,14 @@ impl Corners {
                 number_of[node] = number;
             }
         }
-        // Where all faces are known, their corner is.
-        let mut shapes_at: Vec<Option<Vec<Shape>>> = vec![Some(Vec::new()); groups.len()];
+        let mut of_groups: Vec<Vec<Support<'_>>> = vec![Vec::new(); groups.len()];
         for (&(_, face), &node) in &nodes {
-            let at = &mut shapes_at[number_of[node]];
-            *at = at.take().zip(shapes[face]).map(|(mut of, shape)| {
-                of.push(shape);
-                of
-            });
+            of_groups[number_of[node]].push(supports[face]);
         }
-        let points = groups.iter().zip(&shapes_at).map(|(group, shapes)| {
+        let points = groups.iter().zip(&of_groups).map(|(group, of)| {
             let point = middle(group, &points);
-            let on = shapes
-                .as_ref()
-                .and_then(|shapes| onto::point(point, shapes));
+            let is_put = of.iter().any(Support::is_shape);
+            let on = is_put.then(|| onto::point(point, of)).flatten();
             on.unwrap_or(point)
         });
         Self {

@@ -6,11 +6,15 @@ mod bend;
 mod carrier;
 mod corners;
 mod groups;
+mod meridian;
 mod onto;
 mod seam;
+mod support;
 mod topology;
 
-use reconstruct::Model;
+use reconstruct::{Model, Surface};
+
+use support::Support;
 
 pub(crate) use analytic::Analytic;
 pub(crate) use carrier::{Carrier, Flat};
@@ -35,11 +39,29 @@ pub(crate) struct Brep {
 }
 
 impl Brep {
-    /// Of a checked model, its faces by their numbers where they have some.
+    /// Of a checked model, its faces by their numbers where they have some, and their edges can be
+    /// put there.
     pub(crate) fn by_numbers(model: &Model, sharing: Sharing) -> Self {
-        let faces = model.faces.iter();
-        let carriers = faces.map(|face| Carrier::of(face, sharing.sharing_mm));
-        Self::on(model, carriers.collect(), sharing)
+        let mut carriers: Vec<Carrier> = model.faces.iter().map(Carrier::of).collect();
+        loop {
+            let mut brep = Self::on(model, carriers, sharing);
+            let off_mm = &brep.topology.off_mm;
+            let is_stray = |face: &usize| {
+                let off_mm = off_mm[*face];
+                let is_off = off_mm.is_nan() || off_mm > sharing.sharing_mm;
+                is_off || !meridian::can_be_cut(&brep.topology, *face, &brep.carriers[*face])
+            };
+            let strays: Vec<usize> = (0..off_mm.len()).filter(is_stray).collect();
+            if strays.is_empty() {
+                meridian::cut_rings(&mut brep.topology, &mut brep.carriers);
+                return brep;
+            }
+            // Each round makes splines of some more.
+            carriers = brep.carriers;
+            for face in strays {
+                carriers[face] = Carrier::Spline;
+            }
+        }
     }
 
     /// Of a checked model, each face on its own patches.
@@ -48,9 +70,16 @@ impl Brep {
     }
 
     fn on(model: &Model, carriers: Vec<Carrier>, sharing: Sharing) -> Self {
-        let shapes: Vec<_> = carriers.iter().map(Carrier::shape).collect();
+        let both = model.faces.iter().zip(&carriers);
+        let supports = both.map(|(face, carrier)| {
+            let Surface::Patches(patches) = &face.surface;
+            carrier
+                .shape()
+                .map_or(Support::Patches(patches), Support::Shape)
+        });
+        let supports: Vec<_> = supports.collect();
         Self {
-            topology: topology::topology(model, &shapes, sharing),
+            topology: topology::topology(model, &supports, sharing),
             carriers,
         }
     }

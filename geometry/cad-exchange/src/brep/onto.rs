@@ -1,11 +1,13 @@
-//! Points and curves put on the shapes of the faces that they bound.
+//! Points and curves put on what the faces lie on that they bound.
 //!
 //! A model's curves lie on patches, and so off the cylinder that these stand for by what the
-//! patches are, which is most where the camera sees it edge on.
+//! patches are, which is most where the camera sees it edge on. Where a crease runs there, patches
+//! that are off by little put it where the surfaces do not meet by far more.
 
 use nalgebra::{Matrix3, Vector3};
 use nurbs::PiecewiseCubic;
-use shapes::Shape;
+
+use super::support::Support;
 
 /// Steps of Gauss and Newton.
 const STEPS: usize = 12;
@@ -17,7 +19,7 @@ const CLOSE_MM: f64 = 1e-9;
 const TOLERANCE_MM: f64 = 5e-5;
 
 /// Farthest that a point is moved, millimetres.
-const FARTHEST_MM: f64 = 0.2;
+const FARTHEST_MM: f64 = 1.0;
 
 /// Shapes that meet at a flatter angle than of this sine squared, about 2 degrees, tell no common
 /// place: a point between them is as good.
@@ -31,15 +33,15 @@ const PROBES: usize = 8;
 
 /// The point of all the shapes together that is nearest to a point; where they have none in
 /// common, the one that is least off them. `None` where that is far away.
-pub(super) fn point(start: [f64; 3], shapes: &[Shape]) -> Option<[f64; 3]> {
+pub(super) fn point(start: [f64; 3], supports: &[Support<'_>]) -> Option<[f64; 3]> {
     let start = Vector3::from(start);
-    if is_on(&start, shapes) {
+    if is_on(&start, supports) {
         return Some(start.into());
     }
     let mut place = start;
     for _ in 0..STEPS {
-        let (inverse, normals) = inverse(&place, shapes)?;
-        let off = shapes.iter().map(|shape| shape.distance_mm(&place));
+        let (inverse, normals) = inverse(&place, supports)?;
+        let off = supports.iter().map(|of| of.distance_mm(&place));
         let sum: Vector3<f64> = normals.iter().zip(off).map(|(n, off)| n * off).sum();
         let step = inverse * sum;
         place -= step;
@@ -54,14 +56,17 @@ pub(super) fn point(start: [f64; 3], shapes: &[Shape]) -> Option<[f64; 3]> {
     None
 }
 
-fn is_on(place: &Vector3<f64>, shapes: &[Shape]) -> bool {
-    let mut off = shapes.iter().map(|shape| shape.distance_mm(place));
+fn is_on(place: &Vector3<f64>, supports: &[Support<'_>]) -> bool {
+    let mut off = supports.iter().map(|of| of.distance_mm(place));
     off.all(|off| off.abs() <= CLOSE_MM)
 }
 
 /// The pseudo-inverse of the normal equations at a place, and the unit normals they are of.
-fn inverse(place: &Vector3<f64>, shapes: &[Shape]) -> Option<(Matrix3<f64>, Vec<Vector3<f64>>)> {
-    let normals: Vec<Vector3<f64>> = shapes.iter().map(|shape| shape.normal(place)).collect();
+fn inverse(
+    place: &Vector3<f64>,
+    supports: &[Support<'_>],
+) -> Option<(Matrix3<f64>, Vec<Vector3<f64>>)> {
+    let normals: Vec<Vector3<f64>> = supports.iter().map(|of| of.normal(place)).collect();
     let sum: Matrix3<f64> = normals.iter().map(|n| n * n.transpose()).sum();
     if !sum.iter().all(|v| v.is_finite()) {
         return None;
@@ -81,8 +86,14 @@ fn inverse(place: &Vector3<f64>, shapes: &[Shape]) -> Option<(Matrix3<f64>, Vec<
 }
 
 /// The curve on all the shapes together. `None` where it cannot be put there, or lies there.
-pub(super) fn curve(curve: &PiecewiseCubic<3>, shapes: &[Shape]) -> Option<PiecewiseCubic<3>> {
-    if shapes.iter().all(|shape| off(curve, shape) <= TOLERANCE_MM) {
+pub(super) fn curve(
+    curve: &PiecewiseCubic<3>,
+    supports: &[Support<'_>],
+) -> Option<PiecewiseCubic<3>> {
+    if supports
+        .iter()
+        .all(|support| off(curve, support) <= TOLERANCE_MM)
+    {
         return None;
     }
     let mut out = PiecewiseCubic {
@@ -91,7 +102,7 @@ pub(super) fn curve(curve: &PiecewiseCubic<3>, shapes: &[Shape]) -> Option<Piece
     };
     for k in 0..curve.pieces.len() {
         let width = curve.breaks[k + 1] - curve.breaks[k];
-        let piece = Piece { curve, k, shapes };
+        let piece = Piece { curve, k, supports };
         let [from, to] = [piece.stop(0.0)?, piece.stop(width)?];
         piece.follow(&mut out, (0.0, from), (width, to), MAX_DEPTH)?;
         // The sum of the parts must not move the break.
@@ -101,13 +112,13 @@ pub(super) fn curve(curve: &PiecewiseCubic<3>, shapes: &[Shape]) -> Option<Piece
 }
 
 /// The greatest distance of a curve from a shape, millimetres.
-pub(super) fn off(curve: &PiecewiseCubic<3>, shape: &Shape) -> f64 {
+pub(super) fn off(curve: &PiecewiseCubic<3>, support: &Support<'_>) -> f64 {
     let mut greatest = 0.0_f64;
     for (k, ends) in curve.breaks.windows(2).enumerate() {
         for n in 0..=PROBES {
             let s = (ends[1] - ends[0]) * n as f64 / PROBES as f64;
             let place = Vector3::from(curve.piece_value(k, s, 0));
-            greatest = greatest.max(shape.distance_mm(&place).abs());
+            greatest = greatest.max(support.distance_mm(&place).abs());
         }
     }
     greatest
@@ -119,22 +130,19 @@ type Stop = ([f64; 3], [f64; 3]);
 struct Piece<'a> {
     curve: &'a PiecewiseCubic<3>,
     k: usize,
-    shapes: &'a [Shape],
+    supports: &'a [Support<'a>],
 }
 
 impl Piece<'_> {
     fn stop(&self, s: f64) -> Option<Stop> {
-        let place = point(self.curve.piece_value(self.k, s, 0), self.shapes)?;
+        let place = point(self.curve.piece_value(self.k, s, 0), self.supports)?;
         // Shapes that hardly part, as a fillet and its plane, may have no place in common.
-        let mut off = self
-            .shapes
-            .iter()
-            .map(|shape| shape.distance_mm(&place.into()));
+        let mut off = self.supports.iter().map(|of| of.distance_mm(&place.into()));
         if !off.all(|off| off.abs() <= TOLERANCE_MM) {
             return None;
         }
         // Of the derivative what stays on the shapes.
-        let (inverse, normals) = inverse(&place.into(), self.shapes)?;
+        let (inverse, normals) = inverse(&place.into(), self.supports)?;
         let along = Vector3::from(self.curve.piece_value(self.k, s, 1));
         let sum: Vector3<f64> = normals.iter().map(|n| n * n.dot(&along)).sum();
         Some((place, (along - inverse * sum).into()))
@@ -161,9 +169,9 @@ impl Piece<'_> {
             pieces: vec![piece],
         };
         let is_on = self
-            .shapes
+            .supports
             .iter()
-            .all(|shape| off(&alone, shape) <= TOLERANCE_MM);
+            .all(|of| off(&alone, of) <= TOLERANCE_MM);
         if is_on {
             let begin = self.curve.breaks[self.k];
             out.pieces.push(piece);
@@ -181,22 +189,23 @@ impl Piece<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shapes::{Cylinder, Plane};
+    use nurbs::PatchSurface;
+    use shapes::{Cylinder, Plane, Shape};
 
-    fn cylinder() -> Shape {
-        Shape::Cylinder(Cylinder {
+    fn cylinder() -> Support<'static> {
+        Support::Shape(Shape::Cylinder(Cylinder {
             point_mm: Vector3::zeros(),
             axis: Vector3::y(),
             radius_mm: 10.0,
             is_hollow: false,
-        })
+        }))
     }
 
-    fn tilted() -> Shape {
-        Shape::Plane(Plane {
+    fn tilted() -> Support<'static> {
+        Support::Shape(Shape::Plane(Plane {
             point_mm: Vector3::zeros(),
             normal: Vector3::new(0.0, 0.8, 0.6),
-        })
+        }))
     }
 
     #[test]
@@ -210,9 +219,21 @@ mod tests {
         assert!(cylinder().distance_mm(&both.into()).abs() < 1e-8);
         assert!(tilted().distance_mm(&both.into()).abs() < 1e-8);
         // What is too far away is left alone; the same shape twice is one.
-        assert_eq!(point([6.3, 3.0, 8.4], &[cylinder()]), None);
+        assert_eq!(point([6.7, 3.0, 8.9], &[cylinder()]), None);
         assert!(point([6.06, 3.0, 8.08], &[cylinder(), cylinder()]).is_some());
         assert_eq!(point([0.0, 3.0, 0.0], &[cylinder()]), None);
+    }
+
+    /// A slope that is given as patches, and a cylinder by its numbers.
+    #[test]
+    fn a_point_is_put_on_a_shape_and_on_patches() {
+        let slope = |i: usize, j: usize| -0.5 * i as f64 + 0.25 * j as f64;
+        let slope = PatchSurface::through_thirds(vec![0.0, 9.0], vec![0.0, 9.0], slope).unwrap();
+        let z_mm = |x: f64, y: f64| (-0.5 * x + 0.25 * y) / 3.0;
+        let both = [cylinder(), Support::Patches(&slope)];
+        let [x, y, z] = point([9.8, 4.0, -1.5], &both).unwrap();
+        assert!((x * x + z * z - 100.0).abs() < 1e-7 && (z - z_mm(x, y)).abs() < 1e-8);
+        assert!(both[1].distance_mm(&Vector3::new(3.0, 3.0, 0.0)) > 0.2);
     }
 
     #[test]
@@ -249,10 +270,10 @@ mod tests {
             assert!(super::off(&on, shape) <= TOLERANCE_MM);
         }
         // A plane that touches the cylinder, but for a hundredth, has no curve in common with it.
-        let touching = Shape::Plane(Plane {
+        let touching = Support::Shape(Shape::Plane(Plane {
             point_mm: Vector3::new(0.0, 0.0, 10.01),
             normal: Vector3::z(),
-        });
+        }));
         let top = PiecewiseCubic::line([0.1, 0.0, 10.0], [0.1, 9.0, 10.0], 9.0).unwrap();
         assert_eq!(curve(&top, &[cylinder(), touching]), None);
         // Of what lies there already nothing is changed.

@@ -32,8 +32,6 @@ pub(super) struct Seam {
     pub(super) range: (f64, f64),
     /// Half way between the two, in the first use's sense of travel.
     pub(super) curve: PiecewiseCubic<3>,
-    /// What each face has there, in the same sense.
-    pub(super) sides: [PiecewiseCubic<3>; 2],
     whole: bool,
 }
 
@@ -73,7 +71,6 @@ impl Seam {
             other,
             range: (low, high),
             curve: mean(&sides[0], &sides[1]),
-            sides,
             whole: low == from && high == to,
         })
     }
@@ -144,25 +141,6 @@ fn same_domain(a: &PiecewiseCubic<3>, b: &PiecewiseCubic<3>) -> bool {
     (from - other_from).abs() <= allowed && (to - other_to).abs() <= allowed
 }
 
-/// Largest distance of a curve from the face that another one at equal parameters lies on;
-/// infinite where these differ.
-pub(super) fn distance(
-    curve: &PiecewiseCubic<3>,
-    own: &PiecewiseCubic<3>,
-    facing: impl Fn([f64; 3]) -> f64,
-) -> f64 {
-    if !same_domain(curve, own) {
-        return f64::INFINITY;
-    }
-    places(curve, own)
-        .into_iter()
-        .map(|t| {
-            let on = own.evaluate(t);
-            apart(curve.evaluate(t), on) * facing(on)
-        })
-        .fold(0.0, f64::max)
-}
-
 /// The cosine between z and the normal of a face over a place.
 pub(super) fn facing(face: &Face, [x, y, _]: [f64; 3]) -> f64 {
     let Surface::Patches(patches) = &face.surface;
@@ -217,8 +195,6 @@ mod tests {
         // 0.1485 at the end, where a wall of 72 degrees is 0.046 off.
         assert!(apart(0.309).unwrap().is_whole());
         assert!(!apart(1.0).is_some_and(|seam| seam.is_whole()));
-        let off_mm = distance(&flared(1.0, 0.0015), &line(), |_| 0.309);
-        assert!((off_mm - 0.1485 * 0.309).abs() < 1e-9, "{off_mm}");
     }
 
     #[test]
@@ -228,7 +204,5 @@ mod tests {
             Seam::between(&line(), &longer.reversed(), |_| 1.0, (1, 0, 0), 1.0),
             None
         );
-        assert_eq!(distance(&line(), &longer, |_| 1.0), f64::INFINITY);
-        assert_eq!(distance(&line(), &line(), |_| 1.0), 0.0);
     }
 }

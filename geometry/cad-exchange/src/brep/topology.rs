@@ -9,12 +9,12 @@ use std::collections::BTreeMap;
 
 use nurbs::PiecewiseCubic;
 use reconstruct::{Coedge, EdgeKind, Loop, Model};
-use shapes::Shape;
 
 use super::bend::bent;
 use super::corners::Corners;
 use super::groups::Groups;
-use super::seam::{Seam, distance, facing};
+use super::seam::{Seam, facing};
+use super::support::Support;
 use super::{Sharing, onto};
 use crate::common::{ROUNDING_PART, SMOOTH_MM, without_kinks};
 
@@ -62,19 +62,27 @@ pub(crate) struct Topology {
     pub(crate) partly_shared: usize,
     /// Creases whose two curves are too far apart to be shared.
     pub(crate) parted: usize,
-    /// How far a written curve is from the shape of a face, or from where the face has it if it is
-    /// of none.
+    /// How far a written curve is from what its faces lie on.
     pub(crate) gap_mm: f64,
+    /// Of each face, how far its edges are from its shape if it has one.
+    pub(crate) off_mm: Vec<f64>,
+}
+
+impl Topology {
+    /// The vertex in which the use of an edge begins.
+    pub(super) fn vertex_before(&self, of: Use) -> usize {
+        self.edges[of.edge].ends[usize::from(!of.forward)]
+    }
 }
 
 /// Indices of a face, of a loop of it (the outer one first) and of a coedge of that.
 pub(super) type Place = (usize, usize, usize);
 
-/// The topology of a checked model; `shapes` are those of its faces, where they are known, which
-/// vertices and edges are then put on.
-pub(super) fn topology(model: &Model, shapes: &[Option<Shape>], sharing: Sharing) -> Topology {
+/// The topology of a checked model; `supports` are those of its faces. Vertices and edges of those
+/// that are shapes are put on these.
+pub(super) fn topology(model: &Model, supports: &[Support<'_>], sharing: Sharing) -> Topology {
     let (seams, parted) = seams(model, sharing.sharing_mm);
-    let corners = Corners::new(model, &seams, shapes);
+    let corners = Corners::new(model, &seams, supports);
     let mut hung = Groups::new(model.faces.len());
     for (place, seam) in &seams {
         hung.join(place.0, seam.other.0);
@@ -85,12 +93,12 @@ pub(super) fn topology(model: &Model, shapes: &[Option<Shape>], sharing: Sharing
         shared: seams.len(),
         partly_shared: seams.values().filter(|seam| !seam.is_whole()).count(),
         parted,
+        off_mm: vec![0.0; model.faces.len()],
         ..Topology::default()
     };
     let mut builder = Builder {
         out: &mut out,
-        model,
-        shapes,
+        supports,
         rounding_mm: ROUNDING_PART * sharing.resolution_mm,
         written: BTreeMap::new(),
     };
@@ -147,9 +155,8 @@ fn seams(model: &Model, sharing_mm: f64) -> (BTreeMap<Place, Seam>, usize) {
 /// Writes down strands, shared ones once.
 struct Builder<'a> {
     out: &'a mut Topology,
-    model: &'a Model,
     /// Of each face.
-    shapes: &'a [Option<Shape>],
+    supports: &'a [Support<'a>],
     rounding_mm: f64,
     /// What the second user of a seam has to know.
     written: BTreeMap<Place, Written>,
@@ -175,21 +182,19 @@ impl Builder<'_> {
     ) -> Vec<Use> {
         let (first, last) = curve.domain();
         let (range, edge, forward) = if let Some(seam) = seam {
-            let both = [place.0, seam.other.0].into_iter();
-            let shapes: Option<Vec<Shape>> = both.map(|face| self.shapes[face]).collect();
+            let both = [place.0, seam.other.0].map(|face| self.supports[face]);
+            let is_put = both.iter().any(Support::is_shape);
             let cut = |whole: bool, vertex: usize, at: [f64; 3], out: &mut Topology| {
                 if whole {
                     return vertex;
                 }
-                let on = shapes.as_ref().and_then(|shapes| onto::point(at, shapes));
+                let on = is_put.then(|| onto::point(at, &both)).flatten();
                 out.vertices.push(on.unwrap_or(at));
                 out.vertices.len() - 1
             };
             let start = cut(seam.range.0 == first, ends[0], seam.curve.start(), self.out);
             let end = cut(seam.range.1 == last, ends[1], seam.curve.end(), self.out);
-            let [of_first, of_other] = &seam.sides;
-            let sides = [(place.0, of_first), (seam.other.0, of_other)];
-            let edge = self.strand(&seam.curve, [start, end], &sides);
+            let edge = self.strand(&seam.curve, [start, end], &[place.0, seam.other.0]);
             let mirrored = [
                 (seam.range.1 < last).then_some(seam.range.1),
                 (seam.range.0 > first).then_some(seam.range.0),
@@ -202,7 +207,7 @@ impl Builder<'_> {
             let [from, to] = mirrored;
             ((from.unwrap_or(first), to.unwrap_or(last)), edge, false)
         } else {
-            let edge = self.strand(curve, ends, &[(place.0, curve)]);
+            let edge = self.strand(curve, ends, &[place.0]);
             return vec![Use {
                 edge,
                 forward: true,
@@ -229,7 +234,7 @@ impl Builder<'_> {
         ends: [usize; 2],
     ) -> Option<Use> {
         let part = curve.restricted(from, to)?;
-        let edge = self.strand(&part, ends, &[(face, &part)]);
+        let edge = self.strand(&part, ends, &[face]);
         Some(Use {
             edge,
             forward: true,
@@ -237,29 +242,21 @@ impl Builder<'_> {
     }
 
     /// Adds a curve that is led to its vertices and onto the shapes of its faces, and has no kinks
-    /// for which readers would split it, and notes how far it is from what the faces have.
-    /// `sides` are these faces, with the curves that they make of it.
-    fn strand(
-        &mut self,
-        curve: &PiecewiseCubic<3>,
-        ends: [usize; 2],
-        sides: &[(usize, &PiecewiseCubic<3>)],
-    ) -> usize {
+    /// for which readers would split it, and notes how far it is from what these faces lie on.
+    fn strand(&mut self, curve: &PiecewiseCubic<3>, ends: [usize; 2], faces: &[usize]) -> usize {
         let [start, end] = ends.map(|vertex| self.out.vertices[vertex]);
-        // Between a shape and a spline the mean is the least off both.
-        let shapes: Option<Vec<Shape>> = sides.iter().map(|(face, _)| self.shapes[*face]).collect();
-        let on = shapes.and_then(|shapes| onto::curve(curve, &shapes));
+        let supports: Vec<Support<'_>> = faces.iter().map(|face| self.supports[*face]).collect();
+        let is_put = supports.iter().any(Support::is_shape);
+        let on = is_put.then(|| onto::curve(curve, &supports)).flatten();
         let led = bent(on.as_ref().unwrap_or(curve), start, end);
         let curve = without_kinks(&led, SMOOTH_MM, self.rounding_mm);
-        for (face, side) in sides {
-            let off_mm = match &self.shapes[*face] {
-                Some(shape) => onto::off(&curve, shape),
-                None => distance(&curve, side, |at| {
-                    let face = self.model.faces.get(*face);
-                    face.map_or(1.0, |face| facing(face, at))
-                }),
-            };
+        for (face, support) in faces.iter().zip(&supports) {
+            let off_mm = onto::off(&curve, support);
             self.out.gap_mm = self.out.gap_mm.max(off_mm);
+            if support.is_shape() {
+                let of_face = &mut self.out.off_mm[*face];
+                *of_face = of_face.max(off_mm);
+            }
         }
         self.out.edges.push(Strand { ends, curve });
         self.out.edges.len() - 1

@@ -216,7 +216,7 @@ fn write_face(
                 v.text("");
                 v.ids(&uses);
             });
-            let keyword = if n == 0 {
+            let keyword = if n == 0 && carrier.has_outer_loop() {
                 "FACE_OUTER_BOUND"
             } else {
                 "FACE_BOUND"
