@@ -220,25 +220,32 @@ fn faces_that_part_keep_edges_of_their_own_from_there() {
     assert!(summary.uncertainty_mm < 0.001, "{summary:?}");
     near(&[read.uncertainty_mm], &[summary.uncertainty_mm], 1e-15);
     assert_eq!((read.edges.len(), read.vertices_mm.len()), (8, 7));
-    // The ramp faces the camera more squarely than the barrel beside it: what counts is how far the
-    // curves are off it.
-    let squarer = 1.0 / 1.25_f64.sqrt();
-    // By 0.05 mm off the ramp at y = 21.545, by 0.225 mm in z at its end.
-    let parted_mm = 18.75 + 0.05 / squarer / 0.02;
+    // By 0.225 mm in z at its end, where they still meet near by; outlines are led there.
     let (read, summary) = round_trip(&raised(18.75, 0.02), &options);
+    assert_eq!((summary.shared_edges, summary.partly_shared), (1, 0));
+    assert!(summary.uncertainty_mm < 0.015, "{summary:?}");
+    assert_eq!((read.edges.len(), read.vertices_mm.len()), (8, 7));
+    // By 2.25 mm there. The ramp faces the camera more squarely than the barrel beside it: what
+    // counts is how far the curves are off it, and they are shared to 0.1 mm.
+    let squarer = 1.0 / 1.29_f64.sqrt();
+    let parted_mm = 18.75 + 0.1 / squarer / 0.2;
+    let (read, summary) = round_trip(&raised(18.75, 0.2), &options);
     assert_eq!((summary.shared_edges, summary.partly_shared), (1, 1));
-    assert!(summary.uncertainty_mm >= 0.025 && summary.uncertainty_mm < 0.027);
+    assert!(
+        summary.uncertainty_mm > 0.02 && summary.uncertainty_mm < 0.055,
+        "{summary:?}"
+    );
     assert_eq!((read.edges.len(), read.vertices_mm.len()), (10, 9));
     assert_eq!(read.shells, [[0, 1]]);
     let shared: Vec<f64> = read
         .vertices_mm
         .iter()
         .map(|v| v[1])
-        .filter(|y| (y - parted_mm).abs() < 1e-3)
+        .filter(|y| (y - parted_mm).abs() < 0.1)
         .collect();
     assert_eq!(shared.len(), 1, "one vertex where they part");
-    // By more than 0.05 mm along most of it.
-    let (read, summary) = round_trip(&raised(0.0, 0.02), &options);
+    // By more than 0.1 mm along most of it.
+    let (read, summary) = round_trip(&raised(0.0, 0.2), &options);
     assert_eq!((summary.shared_edges, summary.parted_creases), (0, 1));
     assert_eq!(summary.uncertainty_mm, 1e-4);
     assert_eq!(read.shells, [[0], [1]]);

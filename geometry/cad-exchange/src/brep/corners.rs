@@ -10,6 +10,9 @@ use super::seam::Seam;
 use super::support::Support;
 use super::topology::{Place, coedge, loops_of};
 
+/// Faces that meet but for this, millimetres, have a corner: their edges are led to it.
+const CORNER_MM: f64 = 0.03;
+
 /// Ends of edges. A vertex of the model is a place in the x-y plane; each face has it at
 /// a height of its own, and faces that share an edge have it at one.
 pub(super) struct Corners {
@@ -18,13 +21,18 @@ pub(super) struct Corners {
     pub(super) points: Vec<[f64; 3]>,
 }
 
-impl Corners {
-    /// `supports` are those of the faces.
-    pub(super) fn new(
-        model: &Model,
-        seams: &BTreeMap<Place, Seam>,
-        supports: &[Support<'_>],
-    ) -> Self {
+/// Ends of edges while it is found out which are one.
+pub(super) struct Ends<'a> {
+    model: &'a Model,
+    supports: &'a [Support<'a>],
+    nodes: BTreeMap<(VertexId, usize), usize>,
+    points: Vec<[f64; 3]>,
+    same: Groups,
+}
+
+impl<'a> Ends<'a> {
+    /// Each for itself; `supports` are those of the faces.
+    pub(super) fn new(model: &'a Model, supports: &'a [Support<'a>]) -> Self {
         let mut nodes: BTreeMap<(VertexId, usize), usize> = BTreeMap::new();
         let mut points: Vec<[f64; 3]> = Vec::new();
         for (face, loops) in model.faces.iter().map(loops_of).enumerate() {
@@ -36,47 +44,85 @@ impl Corners {
                 });
             }
         }
-        let mut same = Groups::new(points.len());
-        for (&place, seam) in seams {
-            let Some(coedge) = coedge(model, place) else {
-                continue;
-            };
-            let (start, end) = ends(model, coedge);
-            let (first, last) = coedge.space_curve.domain();
-            let shared = [(start, seam.range.0 == first), (end, seam.range.1 == last)];
-            for (vertex, shared) in shared {
-                let node = |face: usize| nodes.get(&(vertex, face));
-                if let (true, Some(&a), Some(&b)) = (shared, node(place.0), node(seam.other.0)) {
-                    same.join(a, b);
-                }
-            }
+        Self {
+            same: Groups::new(points.len()),
+            model,
+            supports,
+            nodes,
+            points,
         }
-        let groups = same.groups();
-        let mut number_of = vec![0; points.len()];
+    }
+
+    /// The ends that a seam makes one: where it is, and as its two faces have it.
+    fn joints(&self, place: Place, seam: &Seam) -> Vec<([f64; 3], [usize; 2])> {
+        let Some(coedge) = coedge(self.model, place) else {
+            return Vec::new();
+        };
+        let (start, end) = ends(self.model, coedge);
+        let (first, last) = coedge.space_curve.domain();
+        let both = [
+            (start, seam.curve.start(), seam.range.0 == first),
+            (end, seam.curve.end(), seam.range.1 == last),
+        ];
+        let shared = both.into_iter().filter(|(_, _, is_shared)| *is_shared);
+        let joint = |(vertex, at, _): (VertexId, [f64; 3], bool)| {
+            let node = |face: usize| self.nodes.get(&(vertex, face)).copied();
+            Some((at, [node(place.0)?, node(seam.other.0)?]))
+        };
+        shared.filter_map(joint).collect()
+    }
+
+    /// Makes the ends of a seam one for both its faces.
+    pub(super) fn join(&mut self, place: Place, seam: &Seam) {
+        for (_, [a, b]) in self.joints(place, seam) {
+            self.same.join(a, b);
+        }
+    }
+
+    /// Whether at both ends of a seam all the faces that would share it have a point in common.
+    pub(super) fn would_meet(&self, place: Place, seam: &Seam) -> bool {
+        self.joints(place, seam).into_iter().all(|(at, joined)| {
+            let is_of = |node: usize| joined.iter().any(|of| self.same.are_joined(*of, node));
+            let of = self.nodes.iter().filter(|(_, node)| is_of(**node));
+            let of: Vec<Support<'_>> = of.map(|((_, face), _)| self.supports[*face]).collect();
+            onto::point(at, &of).is_some_and(|at| onto::farthest(at, &of) <= CORNER_MM)
+        })
+    }
+
+    /// The ends as they have come to be.
+    pub(super) fn corners(self) -> Corners {
+        let supports = self.supports;
+        let groups = self.same.groups();
+        let mut number_of = vec![0; self.points.len()];
         for (number, group) in groups.iter().enumerate() {
             for &node in group {
                 number_of[node] = number;
             }
         }
         let mut of_groups: Vec<Vec<Support<'_>>> = vec![Vec::new(); groups.len()];
-        for (&(_, face), &node) in &nodes {
+        for (&(_, face), &node) in &self.nodes {
             of_groups[number_of[node]].push(supports[face]);
         }
         let points = groups.iter().zip(&of_groups).map(|(group, of)| {
-            let point = middle(group, &points);
-            let is_put = of.iter().any(Support::is_shape);
-            let on = is_put.then(|| onto::point(point, of)).flatten();
-            on.unwrap_or(point)
+            let point = middle(group, &self.points);
+            // Where not all meet, those that are known best.
+            let shapes: Vec<Support<'_>> = of.iter().copied().filter(Support::is_shape).collect();
+            let common = onto::point(point, of).filter(|at| onto::farthest(*at, of) <= CORNER_MM);
+            let common = common.or_else(|| onto::point(point, &shapes));
+            common.unwrap_or(point)
         });
-        Self {
+        Corners {
             points: points.collect(),
-            numbers: nodes
+            numbers: self
+                .nodes
                 .into_iter()
                 .map(|(key, node)| (key, number_of[node]))
                 .collect(),
         }
     }
+}
 
+impl Corners {
     /// The vertices of a face's coedge, in its sense of travel.
     pub(super) fn ends(&self, model: &Model, face: usize, coedge: &Coedge) -> [usize; 2] {
         let (start, end) = ends(model, coedge);

@@ -23,6 +23,11 @@ impl Groups {
         self.0[a.max(b)] = a.min(b);
     }
 
+    /// Whether two things are in one set.
+    pub(super) fn are_joined(&self, a: usize, b: usize) -> bool {
+        self.least(a) == self.least(b)
+    }
+
     /// The sets, ordered by their least members; members ascend.
     pub(super) fn groups(&self) -> Vec<Vec<usize>> {
         let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
@@ -43,6 +48,7 @@ mod tests {
         groups.join(5, 3);
         groups.join(1, 5);
         groups.join(4, 2);
+        assert!(groups.are_joined(3, 1) && !groups.are_joined(0, 1));
         assert_eq!(groups.groups(), [vec![0], vec![1, 3, 5], vec![2, 4]]);
     }
 }

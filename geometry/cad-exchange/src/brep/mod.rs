@@ -48,7 +48,7 @@ impl Brep {
             let off_mm = &brep.topology.off_mm;
             let is_stray = |face: &usize| {
                 let off_mm = off_mm[*face];
-                let is_off = off_mm.is_nan() || off_mm > sharing.sharing_mm;
+                let is_off = off_mm.is_nan() || off_mm > sharing.sharing_mm / 2.0;
                 is_off || !meridian::can_be_cut(&brep.topology, *face, &brep.carriers[*face])
             };
             let strays: Vec<usize> = (0..off_mm.len()).filter(is_stray).collect();

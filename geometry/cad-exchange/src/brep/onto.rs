@@ -56,6 +56,12 @@ pub(super) fn point(start: [f64; 3], supports: &[Support<'_>]) -> Option<[f64; 3
     None
 }
 
+/// How far a point is from the farthest of them, millimetres.
+pub(super) fn farthest(at: [f64; 3], supports: &[Support<'_>]) -> f64 {
+    let off = supports.iter().map(|of| of.distance_mm(&at.into()).abs());
+    off.fold(0.0, f64::max)
+}
+
 fn is_on(place: &Vector3<f64>, supports: &[Support<'_>]) -> bool {
     let mut off = supports.iter().map(|of| of.distance_mm(place));
     off.all(|off| off.abs() <= CLOSE_MM)

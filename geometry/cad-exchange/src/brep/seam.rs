@@ -7,6 +7,8 @@ use nurbs::PiecewiseCubic;
 use reconstruct::{Face, Surface};
 
 use super::bend::mean;
+use super::onto;
+use super::support::Support;
 use super::topology::Place;
 
 /// Places of each piece of a curve at which it is compared with another.
@@ -18,6 +20,9 @@ const LEAST_PART: f64 = 0.5;
 /// Where a crease is cut, what is left has at least this length, in units of the distance
 /// that is shared; edges that are hardly longer than the uncertainty trouble readers.
 const LEAST_REST: f64 = 20.0;
+
+/// How far a crease may run from where its faces meet, millimetres.
+const MOVED_MM: f64 = 0.5;
 
 /// Halvings of the interval in which two curves part.
 const HALVINGS: usize = 40;
@@ -72,6 +77,33 @@ impl Seam {
             range: (low, high),
             curve: mean(&sides[0], &sides[1]),
             whole: low == from && high == to,
+        })
+    }
+
+    /// All of a crease where its curves are farther apart than what is shared, but the faces meet near
+    /// it all along: so it is before corners, which are drawn where they seem to be. `None` where they
+    /// do not.
+    pub(super) fn where_they_meet(
+        first: &PiecewiseCubic<3>,
+        second: &PiecewiseCubic<3>,
+        faces: &[Support<'_>; 2],
+        other: Place,
+    ) -> Option<Self> {
+        let second = second.reversed();
+        if !same_domain(first, &second) {
+            return None;
+        }
+        let between = mean(first, &second);
+        let met = onto::curve(&between, faces)?;
+        let moved = places(&between, &met)
+            .into_iter()
+            .map(|t| apart(between.evaluate(t), met.evaluate(t)))
+            .fold(0.0, f64::max);
+        (moved <= MOVED_MM).then(|| Self {
+            other,
+            range: first.domain(),
+            curve: met,
+            whole: true,
         })
     }
 

@@ -11,7 +11,7 @@ use nurbs::PiecewiseCubic;
 use reconstruct::{Coedge, EdgeKind, Loop, Model};
 
 use super::bend::bent;
-use super::corners::Corners;
+use super::corners::Ends;
 use super::groups::Groups;
 use super::seam::{Seam, facing};
 use super::support::Support;
@@ -78,11 +78,12 @@ impl Topology {
 /// Indices of a face, of a loop of it (the outer one first) and of a coedge of that.
 pub(super) type Place = (usize, usize, usize);
 
-/// The topology of a checked model; `supports` are those of its faces. Vertices and edges of those
-/// that are shapes are put on these.
+/// The topology of a checked model; `supports` are those of its faces, which vertices and edges are
+/// put on.
 pub(super) fn topology(model: &Model, supports: &[Support<'_>], sharing: Sharing) -> Topology {
-    let (seams, parted) = seams(model, sharing.sharing_mm);
-    let corners = Corners::new(model, &seams, supports);
+    let mut ends = Ends::new(model, supports);
+    let (seams, parted) = seams(model, supports, sharing.sharing_mm, &mut ends);
+    let corners = ends.corners();
     let mut hung = Groups::new(model.faces.len());
     for (place, seam) in &seams {
         hung.join(place.0, seam.other.0);
@@ -120,22 +121,20 @@ pub(super) fn topology(model: &Model, supports: &[Support<'_>], sharing: Sharing
     out
 }
 
-/// The creases whose two curves meet, by the place of their first use, and the number of
-/// those that do not.
-fn seams(model: &Model, sharing_mm: f64) -> (BTreeMap<Place, Seam>, usize) {
+/// The creases whose two curves meet, or whose faces do near them, by the place of their first use,
+/// and the number of those that do not. What they share is joined.
+fn seams(
+    model: &Model,
+    supports: &[Support<'_>],
+    sharing_mm: f64,
+    ends: &mut Ends<'_>,
+) -> (BTreeMap<Place, Seam>, usize) {
     let mut seams = BTreeMap::new();
-    let mut parted = 0;
-    for (edge, places) in places_by_edge(model) {
-        let &[place, other] = places.as_slice() else {
-            continue;
-        };
-        let kind = model.edges.get(edge).map(|edge| edge.kind);
+    let mut rest = Vec::new();
+    for (place, other) in creases(model) {
         let (Some(first), Some(second)) = (coedge(model, place), coedge(model, other)) else {
             continue;
         };
-        if kind != Some(EdgeKind::Crease) || first.reversed == second.reversed {
-            continue;
-        }
         let both = [place, other].map(|place| model.faces.get(place.0));
         let facing = |at: [f64; 3]| {
             let of_faces = both.iter().flatten().map(|face| facing(face, at));
@@ -143,13 +142,45 @@ fn seams(model: &Model, sharing_mm: f64) -> (BTreeMap<Place, Seam>, usize) {
         };
         let (first, second) = (&first.space_curve, &second.space_curve);
         match Seam::between(first, second, facing, other, sharing_mm) {
+            Some(seam) if seam.is_whole() => {
+                ends.join(place, &seam);
+                seams.insert(place, seam);
+            }
+            partly => {
+                let faces = [place.0, other.0].map(|face| supports[face]);
+                let whole = Seam::where_they_meet(first, second, &faces, other);
+                rest.push((place, whole, partly));
+            }
+        }
+    }
+    // Where those that are sure leave it to them.
+    let mut parted = 0;
+    for (place, whole, partly) in rest {
+        let whole = whole.filter(|seam| ends.would_meet(place, seam));
+        match whole.or(partly) {
             Some(seam) => {
+                ends.join(place, &seam);
                 seams.insert(place, seam);
             }
             None => parted += 1,
         }
     }
     (seams, parted)
+}
+
+/// Both uses of each crease.
+fn creases(model: &Model) -> Vec<(Place, Place)> {
+    let crease = |(edge, places): (usize, Vec<Place>)| {
+        let &[place, other] = places.as_slice() else {
+            return None;
+        };
+        let is_crease = model.edges.get(edge)?.kind == EdgeKind::Crease;
+        let both = [place, other].map(|place| coedge(model, place).map(|of| of.reversed));
+        let is_run_both_ways = both[0].is_some() && both[0] != both[1];
+        (is_crease && is_run_both_ways).then_some((place, other))
+    };
+    let edges = places_by_edge(model).into_iter();
+    edges.filter_map(crease).collect()
 }
 
 /// Writes down strands, shared ones once.
@@ -183,12 +214,11 @@ impl Builder<'_> {
         let (first, last) = curve.domain();
         let (range, edge, forward) = if let Some(seam) = seam {
             let both = [place.0, seam.other.0].map(|face| self.supports[face]);
-            let is_put = both.iter().any(Support::is_shape);
             let cut = |whole: bool, vertex: usize, at: [f64; 3], out: &mut Topology| {
                 if whole {
                     return vertex;
                 }
-                let on = is_put.then(|| onto::point(at, &both)).flatten();
+                let on = onto::point(at, &both);
                 out.vertices.push(on.unwrap_or(at));
                 out.vertices.len() - 1
             };
@@ -246,9 +276,11 @@ impl Builder<'_> {
     fn strand(&mut self, curve: &PiecewiseCubic<3>, ends: [usize; 2], faces: &[usize]) -> usize {
         let [start, end] = ends.map(|vertex| self.out.vertices[vertex]);
         let supports: Vec<Support<'_>> = faces.iter().map(|face| self.supports[*face]).collect();
+        // Led first: what is put there with its ends stays there.
+        let led = bent(curve, start, end);
         let is_put = supports.iter().any(Support::is_shape);
-        let on = is_put.then(|| onto::curve(curve, &supports)).flatten();
-        let led = bent(on.as_ref().unwrap_or(curve), start, end);
+        let on = is_put.then(|| onto::curve(&led, &supports)).flatten();
+        let led = on.map_or(led, |on| bent(&on, start, end));
         let curve = without_kinks(&led, SMOOTH_MM, self.rounding_mm);
         for (face, support) in faces.iter().zip(&supports) {
             let off_mm = onto::off(&curve, support);

@@ -66,7 +66,7 @@ impl WriteOptions {
             timestamp: timestamp.into(),
             model_timestamp: None,
             resolution_mm: 1e-4,
-            sharing_mm: 0.05,
+            sharing_mm: 0.1,
             palette: DEFAULT_PALETTE.to_vec(),
         }
     }

@@ -94,7 +94,7 @@ impl WriteOptions {
             organization: String::new(),
             timestamp: timestamp.into(),
             resolution_mm: 1e-4,
-            sharing_mm: 0.05,
+            sharing_mm: 0.1,
             palette: DEFAULT_PALETTE.to_vec(),
         }
     }
