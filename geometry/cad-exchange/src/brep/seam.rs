@@ -21,8 +21,9 @@ const LEAST_PART: f64 = 0.5;
 /// that is shared; edges that are hardly longer than the uncertainty trouble readers.
 const LEAST_REST: f64 = 20.0;
 
-/// How far a crease may run from where its faces meet, millimetres.
-const MOVED_MM: f64 = 0.5;
+/// How far a crease may run from where its faces meet, millimetres. Moved farther, the sides of what
+/// is narrow cross each other.
+const MOVED_MM: f64 = 0.15;
 
 /// Halvings of the interval in which two curves part.
 const HALVINGS: usize = 40;
