@@ -117,17 +117,24 @@ pub(super) fn curve(
     Some(out)
 }
 
-/// The greatest distance of a curve from a shape, millimetres.
+/// The greatest distance of a curve from a surface, millimetres.
 pub(super) fn off(curve: &PiecewiseCubic<3>, support: &Support<'_>) -> f64 {
-    let mut greatest = 0.0_f64;
-    for (k, ends) in curve.breaks.windows(2).enumerate() {
-        for n in 0..=PROBES {
-            let s = (ends[1] - ends[0]) * n as f64 / PROBES as f64;
-            let place = Vector3::from(curve.piece_value(k, s, 0));
-            greatest = greatest.max(support.distance_mm(&place).abs());
-        }
-    }
-    greatest
+    let off = probes(curve).map(|place| support.distance_mm(&place).abs());
+    off.fold(0.0, f64::max)
+}
+
+/// The least cosine between z and the normal of a surface along a curve.
+pub(super) fn least_facing(curve: &PiecewiseCubic<3>, support: &Support<'_>) -> f64 {
+    let facing = probes(curve).map(|place| support.normal(&place).z);
+    facing.fold(1.0, f64::min)
+}
+
+fn probes(curve: &PiecewiseCubic<3>) -> impl Iterator<Item = Vector3<f64>> + '_ {
+    let pieces = curve.breaks.windows(2).enumerate();
+    pieces.flat_map(move |(k, ends)| {
+        let at = move |n: usize| (ends[1] - ends[0]) * n as f64 / PROBES as f64;
+        (0..=PROBES).map(move |n| curve.piece_value(k, at(n), 0).into())
+    })
 }
 
 /// A place and the derivative there.
@@ -275,6 +282,9 @@ mod tests {
         for shape in &shapes {
             assert!(super::off(&on, shape) <= TOLERANCE_MM);
         }
+        // Its ends are at 0.4 and 1.9 radians from x.
+        let facing = least_facing(&on, &shapes[0]);
+        assert!((facing - libm::sin(0.4)).abs() < 1e-3, "{facing}");
         // A plane that touches the cylinder, but for a hundredth, has no curve in common with it.
         let touching = Support::Shape(Shape::Plane(Plane {
             point_mm: Vector3::new(0.0, 0.0, 10.01),

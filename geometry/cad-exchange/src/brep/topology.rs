@@ -18,6 +18,10 @@ use super::support::Support;
 use super::{Sharing, onto};
 use crate::common::{ROUNDING_PART, SMOOTH_MM, without_kinks};
 
+/// Cosine between z and the normal of a shape along its edges: those that run farther around it than
+/// parts are tilted were put on a side that the camera does not see.
+const LEAST_FACING: f64 = -0.2;
+
 /// The use of an edge by a loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Use {
@@ -64,7 +68,8 @@ pub(crate) struct Topology {
     pub(crate) parted: usize,
     /// How far a written curve is from what its faces lie on.
     pub(crate) gap_mm: f64,
-    /// Of each face, how far its edges are from its shape if it has one.
+    /// Of each face, how far its edges are from its shape if it has one; infinite if they are on its
+    /// back.
     pub(crate) off_mm: Vec<f64>,
 }
 
@@ -286,8 +291,9 @@ impl Builder<'_> {
             let off_mm = onto::off(&curve, support);
             self.out.gap_mm = self.out.gap_mm.max(off_mm);
             if support.is_shape() {
+                let is_seen = onto::least_facing(&curve, support) >= LEAST_FACING;
                 let of_face = &mut self.out.off_mm[*face];
-                *of_face = of_face.max(off_mm);
+                *of_face = of_face.max(if is_seen { off_mm } else { f64::INFINITY });
             }
         }
         self.out.edges.push(Strand { ends, curve });
