@@ -288,7 +288,13 @@ fn meridian(round: &Analytic, [from, to]: [[f64; 3]; 2]) -> PiecewiseCubic<3> {
         libm::atan2(out.dot(&axis), out.dot(&x))
     };
     let begin = angle(from);
-    let swept = way(begin, angle(to));
+    let mut swept = way(begin, angle(to));
+    // Of a ridge a little more than half a tube may be seen: the face is on the camera's side.
+    let (sin, cos) = libm::sincos(begin + swept / 2.0);
+    let out = (x * cos + axis * sin).z;
+    if (out < 0.0) == round.same_sense {
+        swept -= core::f64::consts::TAU * swept.signum();
+    }
     let parts = libm::ceil(swept.abs() / WIDEST_RAD).max(1.0) as usize;
     let each = swept / parts as f64;
     let width = radius_mm * each.abs();
