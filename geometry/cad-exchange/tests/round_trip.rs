@@ -10,7 +10,7 @@ use cad_exchange::iges::{
     self, DEFAULT_PALETTE, Entities, SplineCurve, TrimmedCurve, TrimmedModel, TrimmedSurface,
     WriteOptions,
 };
-use reconstruct::{EdgeId, EdgeKind, Loop, Surface};
+use reconstruct::{EdgeId, EdgeKind, Loop, Model, Surface};
 
 const ALL: [Entities; 3] = [
     Entities::Parametric114,
@@ -25,6 +25,10 @@ fn near(a: &[f64], b: &[f64]) {
 }
 
 fn round_trip(entities: Entities) -> TrimmedModel {
+    round_trip_of(&sample::model(), entities)
+}
+
+fn round_trip_of(model: &Model, entities: Entities) -> TrimmedModel {
     let options = WriteOptions {
         entities,
         author: "A. Author".to_owned(),
@@ -32,7 +36,7 @@ fn round_trip(entities: Entities) -> TrimmedModel {
         ..WriteOptions::new("sample", "20261121.093000")
     };
     let mut file = Vec::new();
-    iges::write(&sample::model(), &options, &mut file).unwrap();
+    iges::write(model, &options, &mut file).unwrap();
     iges::read_model(&file[..]).unwrap()
 }
 
@@ -125,13 +129,7 @@ fn neighbours_share_their_curve_in_every_form() {
     }
     let raised = coedge.space_curve.clone();
     for entities in ALL {
-        let options = WriteOptions {
-            entities,
-            ..WriteOptions::new("sample", "20261121.093000")
-        };
-        let mut file = Vec::new();
-        iges::write(&model, &options, &mut file).unwrap();
-        let read = iges::read_model(&file[..]).unwrap();
+        let read = round_trip_of(&model, entities);
         let of = |face: usize| {
             let uses = model.faces[face].outer.coedges.iter();
             let at = uses.clone().position(|c| c.edge == edge).unwrap();

@@ -177,6 +177,23 @@ fn a_torus_also_across_the_seam_of_its_tube() {
     assert!(matches!(face.surface, StepSurface::Torus { .. }));
 }
 
+/// Its underside, which no camera sees: so edges lie that were put there from far away.
+#[test]
+fn a_face_with_edges_on_the_back_of_its_shape_stays_a_spline() {
+    let sphere = Shape::Sphere(Sphere {
+        centre_mm: Vector3::new(1.0, 0.0, 15.0),
+        radius_mm: 15.0,
+        is_hollow: false,
+    });
+    let under = |x: f64, y: f64| 15.0 - (225.0 - (x - 1.0) * (x - 1.0) - y * y).sqrt();
+    let model = sample::rectangle([-3.0, 5.0], [-4.0, 4.0], sphere, under);
+    let mut file = Vec::new();
+    let options = WriteOptions::new("part", "2026-11-21T09:30:00");
+    step::write(&model, &options, &mut file).unwrap();
+    let read = step::read_model(&file[..]).unwrap();
+    assert!(matches!(read.faces[0].surface, StepSurface::BSpline(_)));
+}
+
 /// They are cut open from one loop to the other.
 #[test]
 fn rings_are_written_by_their_numbers() {

@@ -18,9 +18,6 @@ const LEAST_RADIUS_MM: f64 = 1e-3;
 /// Places of each piece of an edge at which its distance from the surface is taken.
 const PROBES: usize = 4;
 
-/// Loops that wind more often are none of a face.
-const MOST_TURNS: f64 = 2.0;
-
 /// A surface by its numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Analytic {
@@ -35,7 +32,7 @@ pub(crate) struct Analytic {
     pub(crate) angle_rad: Option<f64>,
     /// The surface's own normal, outwards, is that of the face.
     pub(crate) same_sense: bool,
-    /// Two of its loops go around the axis, so that none of them is the outer one.
+    /// Two of its loops go around the axis: it is to be cut open between them.
     pub(crate) is_ring: bool,
 }
 
@@ -120,13 +117,12 @@ impl Around {
         let places = || loops.iter().flatten();
         let up_mm: Vec<f64> = places().map(|p| (p - centre).dot(axis)).collect();
         let off = |p: &Vector3<f64>| p - centre - axis * (p - centre).dot(axis);
-        let mut turns: Vec<i32> = Vec::new();
-        for of in loops {
+        let around = loops.iter().map(|of| {
             let off: Vec<Vector3<f64>> = of.iter().map(off).collect();
-            turns.push(rounds(&off, axis)?);
-        }
-        turns.retain(|&turns| turns != 0);
-        let is_ring = matches!(turns.as_slice(), [1, -1] | [-1, 1]);
+            rounds(&off, axis)
+        });
+        let around: Vec<f64> = around.filter(|turns| *turns != 0.0).collect();
+        let is_ring = around == [1.0, -1.0] || around == [-1.0, 1.0];
         let seam = if is_ring {
             across(axis)
         } else {
@@ -147,17 +143,11 @@ impl Around {
     }
 }
 
-/// How often a loop goes around the axis that its places are seen from; `None` where it meets that.
-fn rounds(off: &[Vector3<f64>], axis: &Vector3<f64>) -> Option<i32> {
-    let mut angle_rad = 0.0;
-    for (a, b) in off.iter().zip(off.iter().cycle().skip(1)) {
-        if a.norm_squared() <= 0.0 {
-            return None;
-        }
-        angle_rad += libm::atan2(a.cross(b).dot(axis), a.dot(b));
-    }
-    let turns = libm::round(angle_rad / core::f64::consts::TAU);
-    (turns.abs() <= MOST_TURNS).then_some(turns as i32)
+/// How often a loop goes around the axis that its places are seen from.
+fn rounds(off: &[Vector3<f64>], axis: &Vector3<f64>) -> f64 {
+    let pairs = off.iter().zip(off.iter().cycle().skip(1));
+    let turns = pairs.map(|(a, b)| libm::atan2(a.cross(b).dot(axis), a.dot(b)));
+    libm::round(turns.sum::<f64>() / core::f64::consts::TAU)
 }
 
 /// The widest of the gaps between angles all around, radians.

@@ -51,11 +51,6 @@ impl Carrier {
         }
     }
 
-    /// One loop of its faces encloses all the others; else two go around the surface.
-    pub(crate) fn has_outer_loop(&self) -> bool {
-        !matches!(self, Self::Round(analytic) if analytic.is_ring)
-    }
-
     /// The surface's own normal is that of the face, which is on the side of +z.
     pub(crate) fn same_sense(&self) -> bool {
         match self {

@@ -30,26 +30,25 @@ const HALVINGS: usize = 60;
 /// Widest part of an arc that one cubic stands for, radians: it is off by 2e-6 of the radius.
 const WIDEST_RAD: f64 = 0.15;
 
-/// Whether a face is no ring, or one that can be cut open.
-pub(super) fn can_be_cut(topology: &Topology, face: usize, carrier: &Carrier) -> bool {
-    match carrier {
-        Carrier::Round(round) if round.is_ring => Cut::of(topology, face, round).is_some(),
-        _ => true,
-    }
-}
-
-/// Cuts all rings open that can be. The others keep their two loops.
-pub(super) fn cut_rings(topology: &mut Topology, carriers: &mut [Carrier]) {
+/// Cuts all rings open that can be, and gives the faces of those that cannot.
+pub(super) fn cut_rings(topology: &mut Topology, carriers: &mut [Carrier]) -> Vec<usize> {
+    let mut whole = Vec::new();
     for (face, carrier) in carriers.iter_mut().enumerate() {
-        if let Carrier::Round(round) = carrier
-            && round.is_ring
-            && let Some(cut) = Cut::of(topology, face, round)
-        {
-            round.x = cut.towards.into();
-            round.is_ring = false;
-            cut.apply(topology, face, round);
+        let Carrier::Round(round) = carrier else {
+            continue;
+        };
+        if !round.is_ring {
+            continue;
+        }
+        match Cut::of(topology, face, round) {
+            Some(cut) => {
+                round.x = cut.towards.into();
+                cut.apply(topology, face, round);
+            }
+            None => whole.push(face),
         }
     }
+    whole
 }
 
 /// Where a ring is cut.
@@ -328,5 +327,51 @@ fn straight(from: [f64; 3], to: [f64; 3], length: f64) -> PiecewiseCubic<3> {
     PiecewiseCubic {
         breaks: vec![0.0, length],
         pieces: vec![core::array::from_fn(piece)],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shapes::{Shape, Torus};
+
+    /// A ridge that is seen a little beyond both its sides, and a groove of the same extent.
+    #[test]
+    fn more_than_half_a_tube_is_cut_on_the_side_that_is_seen() {
+        for (is_hollow, up) in [(false, 1.0), (true, -1.0)] {
+            let torus = Torus {
+                centre_mm: Vector3::zeros(),
+                axis: Vector3::z(),
+                radius_mm: 10.0,
+                tube_mm: 3.0,
+                is_hollow,
+            };
+            let round = Analytic {
+                shape: Shape::Torus(torus),
+                origin_mm: [0.0; 3],
+                axis: [0.0, 0.0, 1.0],
+                x: [1.0, 0.0, 0.0],
+                lengths_mm: vec![10.0, 3.0],
+                angle_rad: None,
+                same_sense: !is_hollow,
+                is_ring: true,
+            };
+            let at = |angle: f64| {
+                let (sin, cos) = libm::sincos(angle);
+                [10.0 + 3.0 * cos, 0.0, 3.0 * up * sin]
+            };
+            let (from, to) = (at(-0.1), at(core::f64::consts::PI + 0.15));
+            let arc = meridian(&round, [from, to]);
+            arc.validate().unwrap();
+            let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|d| (a[d] - b[d]).abs() < 1e-9);
+            assert!(near(arc.start(), from) && near(arc.end(), to));
+            let (first, last) = arc.domain();
+            assert!((last - first - 3.0 * (core::f64::consts::PI + 0.25)).abs() < 1e-9);
+            for k in 0..=100 {
+                let place = arc.evaluate(first + (last - first) * f64::from(k) / 100.0);
+                let off_mm = round.shape.distance_mm(&place.into());
+                assert!(off_mm.abs() < 1e-5 && up * place[2] > -0.5, "{place:?}");
+            }
+        }
     }
 }

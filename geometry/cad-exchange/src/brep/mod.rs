@@ -44,20 +44,18 @@ impl Brep {
     pub(crate) fn by_numbers(model: &Model, sharing: Sharing) -> Self {
         let mut carriers: Vec<Carrier> = model.faces.iter().map(Carrier::of).collect();
         loop {
-            let mut brep = Self::on(model, carriers, sharing);
+            let mut brep = Self::on(model, carriers.clone(), sharing);
             let off_mm = &brep.topology.off_mm;
-            let is_stray = |face: &usize| {
-                let off_mm = off_mm[*face];
-                let is_off = off_mm.is_nan() || off_mm > sharing.sharing_mm / 2.0;
-                is_off || !meridian::can_be_cut(&brep.topology, *face, &brep.carriers[*face])
-            };
-            let strays: Vec<usize> = (0..off_mm.len()).filter(is_stray).collect();
+            let is_off =
+                |face: &usize| off_mm[*face].is_nan() || off_mm[*face] > sharing.sharing_mm / 2.0;
+            let mut strays: Vec<usize> = (0..off_mm.len()).filter(is_off).collect();
             if strays.is_empty() {
-                meridian::cut_rings(&mut brep.topology, &mut brep.carriers);
+                strays = meridian::cut_rings(&mut brep.topology, &mut brep.carriers);
+            }
+            if strays.is_empty() {
                 return brep;
             }
             // Each round makes splines of some more.
-            carriers = brep.carriers;
             for face in strays {
                 carriers[face] = Carrier::Spline;
             }

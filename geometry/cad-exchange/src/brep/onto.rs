@@ -8,6 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 use nurbs::PiecewiseCubic;
 
 use super::support::Support;
+use crate::common::largest;
 
 /// Steps of Gauss and Newton.
 const STEPS: usize = 12;
@@ -58,8 +59,7 @@ pub(super) fn point(start: [f64; 3], supports: &[Support<'_>]) -> Option<[f64; 3
 
 /// How far a point is from the farthest of them, millimetres.
 pub(super) fn farthest(at: [f64; 3], supports: &[Support<'_>]) -> f64 {
-    let off = supports.iter().map(|of| of.distance_mm(&at.into()).abs());
-    off.fold(0.0, f64::max)
+    largest(supports.iter().map(|of| of.distance_mm(&at.into()).abs()))
 }
 
 fn is_on(place: &Vector3<f64>, supports: &[Support<'_>]) -> bool {
@@ -119,14 +119,13 @@ pub(super) fn curve(
 
 /// The greatest distance of a curve from a surface, millimetres.
 pub(super) fn off(curve: &PiecewiseCubic<3>, support: &Support<'_>) -> f64 {
-    let off = probes(curve).map(|place| support.distance_mm(&place).abs());
-    off.fold(0.0, f64::max)
+    largest(probes(curve).map(|place| support.distance_mm(&place).abs()))
 }
 
 /// The least cosine between z and the normal of a surface along a curve.
 pub(super) fn least_facing(curve: &PiecewiseCubic<3>, support: &Support<'_>) -> f64 {
     let facing = probes(curve).map(|place| support.normal(&place).z);
-    facing.fold(1.0, f64::min)
+    1.0 - largest(facing.map(|facing| 1.0 - facing))
 }
 
 fn probes(curve: &PiecewiseCubic<3>) -> impl Iterator<Item = Vector3<f64>> + '_ {

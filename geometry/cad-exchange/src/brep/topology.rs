@@ -16,7 +16,7 @@ use super::groups::Groups;
 use super::seam::{Seam, facing};
 use super::support::Support;
 use super::{Sharing, onto};
-use crate::common::{ROUNDING_PART, SMOOTH_MM, without_kinks};
+use crate::common::{ROUNDING_PART, SMOOTH_MM, largest, without_kinks};
 
 /// Cosine between z and the normal of a shape along its edges: those that run farther around it than
 /// parts are tilted were put on a side that the camera does not see.
@@ -289,11 +289,11 @@ impl Builder<'_> {
         let curve = without_kinks(&led, SMOOTH_MM, self.rounding_mm);
         for (face, support) in faces.iter().zip(&supports) {
             let off_mm = onto::off(&curve, support);
-            self.out.gap_mm = self.out.gap_mm.max(off_mm);
+            self.out.gap_mm = largest([self.out.gap_mm, off_mm]);
             if support.is_shape() {
                 let is_seen = onto::least_facing(&curve, support) >= LEAST_FACING;
                 let of_face = &mut self.out.off_mm[*face];
-                *of_face = of_face.max(if is_seen { off_mm } else { f64::INFINITY });
+                *of_face = largest([*of_face, if is_seen { off_mm } else { f64::INFINITY }]);
             }
         }
         self.out.edges.push(Strand { ends, curve });

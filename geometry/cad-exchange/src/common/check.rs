@@ -53,7 +53,7 @@ impl Gaps {
 }
 
 /// The largest of some gaps; unlike `f64::max`, it does not lose what is not a number.
-fn largest(gaps: impl IntoIterator<Item = f64>) -> f64 {
+pub(crate) fn largest(gaps: impl IntoIterator<Item = f64>) -> f64 {
     let worse = |worst: f64, gap: f64| {
         if gap.is_nan() || gap > worst {
             gap

@@ -7,7 +7,7 @@ mod rounding;
 
 pub use defect::FaceDefect;
 
-pub(crate) use check::check;
+pub(crate) use check::{check, largest};
 pub(crate) use decimal::decimal;
 pub(crate) use defect::Defect;
 pub(crate) use rounding::{shifted, without_kinks};

@@ -197,8 +197,8 @@ fn write_face(
     });
     record.pointer(surface);
     record.integer(borders.len());
-    // The first loop is the outer one, if one is.
-    record.integer(usize::from(carrier.has_outer_loop()));
+    // The first loop is the outer one.
+    record.integer(1);
     for border in borders {
         record.pointer(border);
     }

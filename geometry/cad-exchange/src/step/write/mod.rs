@@ -216,7 +216,7 @@ fn write_face(
                 v.text("");
                 v.ids(&uses);
             });
-            let keyword = if n == 0 && carrier.has_outer_loop() {
+            let keyword = if n == 0 {
                 "FACE_OUTER_BOUND"
             } else {
                 "FACE_BOUND"
