@@ -225,6 +225,9 @@ fn faces_that_part_keep_edges_of_their_own_from_there() {
     assert_eq!((summary.shared_edges, summary.partly_shared), (1, 0));
     assert!(summary.uncertainty_mm < 0.015, "{summary:?}");
     assert_eq!((read.edges.len(), read.vertices_mm.len()), (8, 7));
+    // By 0.225 mm they do not.
+    let (_, summary) = round_trip(&raised(18.75, 0.02), &options);
+    assert_eq!((summary.shared_edges, summary.partly_shared), (1, 1));
     // By 2.25 mm there. The ramp faces the camera more squarely than the barrel beside it: what
     // counts is how far the curves are off it, and they are shared to 0.1 mm.
     let squarer = 1.0 / 1.29_f64.sqrt();

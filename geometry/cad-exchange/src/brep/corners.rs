@@ -150,3 +150,93 @@ fn ends(model: &Model, coedge: &Coedge) -> (VertexId, VertexId) {
         (edge.start, edge.end)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+    use nurbs::{PatchSurface, PiecewiseCubic};
+    use reconstruct::{Edge, EdgeId, EdgeKind, EdgeOrigin, Face, Loop, Surface, Vertex};
+    use shapes::{Plane, Shape};
+
+    const TIPS: [[f64; 2]; 4] = [[9.0, 0.0], [0.0, 9.0], [-9.0, 0.0], [0.0, -9.0]];
+
+    /// Four faces around a vertex, as far as their ends go: each between one crease and the next.
+    fn roof() -> Model {
+        let line = |k: usize| PiecewiseCubic::line([0.0; 2], TIPS[k], 9.0).unwrap();
+        let edge = |k: usize| Edge {
+            start: VertexId(0),
+            end: VertexId(k + 1),
+            kind: EdgeKind::Crease,
+            origin: EdgeOrigin::Intersected,
+            path: line(k),
+        };
+        let coedge = |k: usize, reversed: bool| {
+            let path = if reversed {
+                line(k).reversed()
+            } else {
+                line(k)
+            };
+            let pieces = path.pieces.iter().map(|[x, y]| [*x, *y, [0.0; 4]]);
+            let space_curve = PiecewiseCubic::new(path.breaks.clone(), pieces.collect()).unwrap();
+            Coedge {
+                edge: EdgeId(k),
+                reversed,
+                parameter_curve: path,
+                space_curve,
+            }
+        };
+        let flat = || {
+            let side = vec![-9.0, 9.0];
+            PatchSurface::through_thirds(side.clone(), side, |_, _| 0.0).unwrap()
+        };
+        let face = |k: usize| Face {
+            name: format!("Face {k}"),
+            region: 1,
+            surface: Surface::Patches(flat()),
+            shape: None,
+            outer: Loop {
+                coedges: vec![coedge(k, false), coedge((k + 1) % 4, true)],
+            },
+            inner: Vec::new(),
+        };
+        let places = core::iter::once([0.0; 2]).chain(TIPS);
+        Model {
+            vertices: places.map(|[x_mm, y_mm]| Vertex { x_mm, y_mm }).collect(),
+            edges: (0..4).map(edge).collect(),
+            faces: (0..4).map(face).collect(),
+        }
+    }
+
+    #[test]
+    fn a_crease_joins_a_corner_if_its_faces_meet_there() {
+        let model = roof();
+        let would_meet = |raised_mm: f64| {
+            let plane = |k: usize| {
+                let [x, y] = TIPS[k];
+                Support::Shape(Shape::Plane(Plane {
+                    point_mm: Vector3::new(0.0, 0.0, if k == 3 { raised_mm } else { 0.0 }),
+                    normal: Vector3::new(x, y, 9.0).normalize(),
+                }))
+            };
+            let supports: Vec<Support<'_>> = (0..4).map(plane).collect();
+            let mut ends = Ends::new(&model, &supports);
+            // The crease that face k has last, and the next one first.
+            let seam = |k: usize| {
+                let (place, other) = ((k, 0, 1), (k + 1, 0, 0));
+                let curve = |at: Place| &coedge(&model, at).unwrap().space_curve;
+                let seam = Seam::between(curve(place), curve(other), |_| 1.0, other, 0.1);
+                (place, seam.unwrap())
+            };
+            for k in [0, 1] {
+                let (place, seam) = seam(k);
+                assert!(ends.would_meet(place, &seam), "three planes do");
+                ends.join(place, &seam);
+            }
+            let (place, seam) = seam(2);
+            ends.would_meet(place, &seam)
+        };
+        assert!(would_meet(0.0) && would_meet(0.1));
+        assert!(!would_meet(0.3));
+    }
+}
