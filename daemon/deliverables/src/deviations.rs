@@ -178,12 +178,12 @@ impl<'a> Deviations<'a> {
     }
 }
 
-/// Distance of a point from a face along its normal: that from the shape where the face is one, else
+/// Distance of a point from a face along its normal: that from the form where one is known, else
 /// from the plane that touches the free form below the point.
 fn off(face: &Face, [x_mm, y_mm, z_mm]: [f64; 3]) -> f64 {
-    if let Some(shape) = &face.shape {
+    if let Some(form) = &face.form {
         // Positive on the side that was seen, which is that of the camera.
-        return shape.distance_mm(&[x_mm, y_mm, z_mm].into());
+        return form.distance_mm(&[x_mm, y_mm, z_mm].into());
     }
     let Surface::Patches(surface) = &face.surface;
     let [p, q] = [(1, 0), (0, 1)].map(|(u, v)| surface.z_partial(x_mm, y_mm, u, v));

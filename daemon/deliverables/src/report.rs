@@ -234,7 +234,8 @@ pub struct RegionReport {
 /// How far a surface is free to follow the noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FreedomReport {
-    /// Numbers of the shape (3 for a plane to 7 for a torus), or coefficients of splines that were
+    /// Numbers of the shape (3 for a plane to 7 for a torus), of motion and profile of what is swept,
+    /// or coefficients of splines that were
     /// free to follow the nodes.
     pub parameters: usize,
     /// Independent values that determined them: samples for a shape that was fitted to these, else
@@ -245,10 +246,10 @@ pub struct FreedomReport {
 /// The shape of a region.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShapeReport {
-    /// `plane`, `sphere`, `cylinder`, `cone`, `torus` or `free-form`.
+    /// `plane`, `sphere`, `cylinder`, `cone`, `torus`, `extrusion`, `revolution` or `free-form`.
     pub family: String,
-    /// Whether it is seen from within, as a bore or a fillet is; absent for a plane and a
-    /// free form.
+    /// Whether it is seen from within, as a bore or a fillet is; absent for a plane, an extrusion and
+    /// a free form.
     pub hollow: Option<bool>,
     /// Its numbers; absent for a free form, and where the samples were not at hand.
     #[serde(default)]
@@ -262,14 +263,14 @@ pub struct ShapeNumbers {
     pub samples: usize,
     /// Root mean square distance of those samples from the shape, along its normal.
     pub rms_mm: f64,
-    /// A point of a plane amid the samples, or of a cylinder's axis beside them; the centre of
-    /// a sphere or torus; the apex of a cone.
+    /// A point of a plane or extrusion amid the samples, or of the axis of a cylinder or revolution
+    /// beside them; the centre of a sphere or torus; the apex of a cone.
     pub point_mm: [f64; 3],
     /// Standard uncertainty of the point where it is known least, of the ways that count: along
-    /// a plane's normal, across a cylinder's axis, all ways else.
+    /// the normal of a plane or extrusion, across the axis of a cylinder or revolution, all ways else.
     pub point_uncertainty_mm: f64,
-    /// Unit normal of a plane towards the side that was seen; unit axis of a cylinder, cone or
-    /// torus.
+    /// Unit normal of a plane towards the side that was seen; unit direction of an extrusion; unit
+    /// axis of a cylinder, cone, torus or revolution.
     pub direction: Option<[f64; 3]>,
     /// Standard uncertainty of the direction, in the way in which it is known least.
     pub direction_uncertainty_deg: Option<f64>,
@@ -279,6 +280,19 @@ pub struct ShapeNumbers {
     pub tube_radius_mm: Option<Quantity>,
     /// Angle between a cone's axis and surface.
     pub half_angle_deg: Option<Quantity>,
+    /// The profile that an extrusion or a revolution is of; absent for others, and in reports of
+    /// earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<ProfileReport>,
+}
+
+/// A profile that is swept: a cubic spline.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ProfileReport {
+    /// How many coefficients it has.
+    pub coefficients: usize,
+    /// Standard uncertainty along its normal, root mean square beside the samples.
+    pub uncertainty_mm: f64,
 }
 
 /// A quantity, in the unit that its key names.

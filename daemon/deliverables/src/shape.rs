@@ -1,9 +1,9 @@
 //! The shape of a region, for the report.
 
 use pipeline::{Basis, RegionKind};
-use shapes::{Fit, Measured, Numbers, Shape, Verdict};
+use shapes::{Fit, Measured, Motion, Numbers, Shape, SweptFit, Verdict};
 
-use crate::report::{Quantity, ShapeNumbers, ShapeReport};
+use crate::report::{ProfileReport, Quantity, ShapeNumbers, ShapeReport};
 
 /// `None` where a region has too little to tell by.
 pub(crate) fn shape(kind: &RegionKind) -> Option<ShapeReport> {
@@ -13,6 +13,14 @@ pub(crate) fn shape(kind: &RegionKind) -> Option<ShapeReport> {
             family: "free-form".into(),
             hollow: None,
             numbers: None,
+        }),
+        Verdict::Swept(fit) => Some(ShapeReport {
+            family: fit.swept.as_str().into(),
+            hollow: (fit.swept.sweep.motion == Motion::Revolution).then_some(fit.swept.is_hollow),
+            numbers: match kind.basis {
+                Basis::Samples => Some(swept_numbers(fit)),
+                Basis::Nodes => None,
+            },
         }),
         Verdict::Shape(fit) => kind.told().map(|(shape, told)| ShapeReport {
             family: shape.family().as_str().into(),
@@ -55,5 +63,29 @@ fn numbers(fit: &Fit, shape: &Shape, told: &Numbers) -> ShapeNumbers {
         radius_mm: told.radius_mm.map(mm),
         tube_radius_mm: told.tube_mm.map(mm),
         half_angle_deg: told.half_angle_rad.map(deg),
+        profile: None,
+    }
+}
+
+fn swept_numbers(fit: &SweptFit) -> ShapeNumbers {
+    let sweep = &fit.swept.sweep;
+    let (point, uncertainty_mm) = match &fit.place_mm {
+        Some(place) => (sweep.origin_mm, place.most()),
+        None => (fit.swept.point_mm(), fit.profile_deviation_mm),
+    };
+    ShapeNumbers {
+        samples: fit.held,
+        rms_mm: fit.rms_mm,
+        point_mm: point.into(),
+        point_uncertainty_mm: uncertainty_mm,
+        direction: Some(sweep.axis.into()),
+        direction_uncertainty_deg: Some(fit.direction_rad.most().to_degrees()),
+        radius_mm: None,
+        tube_radius_mm: None,
+        half_angle_deg: None,
+        profile: Some(ProfileReport {
+            coefficients: fit.freedom - sweep.freedom(),
+            uncertainty_mm: fit.profile_deviation_mm,
+        }),
     }
 }

@@ -131,7 +131,7 @@ fn regions(outcome: &Outcome) -> RegionsReport {
             let shape = kinds.find(|k| k.label.get() == fit.label).and_then(shape);
             // A face that is its shape follows the samples that this was fitted to.
             let numbers = shape.as_ref().and_then(|shape| shape.numbers.as_ref());
-            let is_shape = own().next().is_some_and(|face| face.shape.is_some());
+            let is_shape = own().next().is_some_and(|face| face.form.is_some());
             let samples = numbers.filter(|_| is_shape).map(|numbers| numbers.samples);
             RegionReport {
                 label: fit.label,
@@ -194,8 +194,8 @@ fn crumbs(outcome: &Outcome) -> CrumbsReport {
 }
 
 fn kind(face: &Face) -> &'static str {
-    match (&face.shape, &face.surface) {
-        (Some(shape), _) => shape.family().as_str(),
+    match (&face.form, &face.surface) {
+        (Some(form), _) => form.as_str(),
         (None, Surface::Patches(_)) => "bicubic patches",
     }
 }

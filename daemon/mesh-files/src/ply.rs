@@ -8,10 +8,10 @@ use ply_rs_bw::ply::{
 use ply_rs_bw::writer::Writer;
 use tessellate::Mesh;
 
+use crate::MeshDetails;
 use crate::error::MeshFileError;
 use crate::points::{Census, Point, Points};
 use crate::scan::ScanDetails;
-use crate::{MeshDetails, threemf};
 
 /// A vertex of a mesh, or a point.
 struct Vertex {
@@ -158,7 +158,7 @@ pub(crate) fn write_mesh(
         mesh.faces
             .iter()
             .enumerate()
-            .map(|(k, face)| comment(&format!("face {k}: {}, {}", face.name, threemf::kind(face)))),
+            .map(|(k, face)| comment(&format!("face {k}: {}, {}", face.name, face.form))),
     );
     let header = header(comments, &[&vertices, &facets]);
     Writer::<Vertex>::new().write_header(&mut sink, &header)?;

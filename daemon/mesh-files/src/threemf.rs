@@ -5,7 +5,7 @@
 use std::fmt::Write as _;
 use std::io::{self, Cursor, Write};
 
-use tessellate::{Mesh, MeshFace};
+use tessellate::Mesh;
 use zip::ZipWriter;
 use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
@@ -32,11 +32,6 @@ const RELATIONSHIPS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
  <Relationship Target="/3D/3dmodel.model" Id="rel0" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>
 </Relationships>
 "#;
-
-/// What the surface of a face is, in words.
-pub(crate) fn kind(face: &MeshFace) -> &'static str {
-    face.family.map_or("free form", shapes::Family::as_str)
-}
 
 pub(crate) fn write(
     mesh: &Mesh,
@@ -99,7 +94,7 @@ fn model(mesh: &Mesh, details: &MeshDetails<'_>, out: &mut impl Write) -> io::Re
             text,
             r##"   <base name="{} ({})" displaycolor="#{red:02X}{green:02X}{blue:02X}"/>"##,
             escaped(&face.name),
-            kind(face)
+            face.form
         );
     }
     // A surface is no solid, which would have to be closed.

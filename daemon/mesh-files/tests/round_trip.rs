@@ -7,16 +7,15 @@ use std::io::Cursor;
 use mesh_files::{
     MeshDetails, MeshFormat, Point, PointFormat, Points, ScanDetails, write_mesh, write_points,
 };
-use shapes::Family;
 use tessellate::{Accuracy, Corner, Mesh, MeshFace};
 
 /// Two squares that meet at a right angle along x = 10, of one triangle pair each.
 fn mesh() -> Mesh {
     let corner = |vertex: u32, normal: [f64; 3]| Corner { vertex, normal };
-    let face = |name: &str, region, family, vertices: [u32; 4], normal| MeshFace {
+    let face = |name: &str, region, form, vertices: [u32; 4], normal| MeshFace {
         name: name.to_owned(),
         region,
-        family,
+        form,
         corners: vertices.map(|vertex| corner(vertex, normal)).to_vec(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
     };
@@ -31,14 +30,8 @@ fn mesh() -> Mesh {
             [20.0, 5.0, 0.0],
         ],
         faces: vec![
-            face(
-                "R1",
-                1,
-                Some(Family::Plane),
-                [0, 1, 2, 3],
-                [-half, 0.0, half],
-            ),
-            face("R2", 12, None, [1, 4, 5, 2], [half, 0.0, half]),
+            face("R1", 1, "plane", [0, 1, 2, 3], [-half, 0.0, half]),
+            face("R2", 12, "free form", [1, 4, 5, 2], [half, 0.0, half]),
         ],
         accuracy: Accuracy::default(),
     }

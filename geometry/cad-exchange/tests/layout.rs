@@ -68,7 +68,7 @@ fn square(name: &str) -> Model {
             name: name.to_owned(),
             region: 3,
             surface: Surface::Patches(surface),
-            shape: None,
+            form: None,
             outer: Loop { coedges },
             inner: Vec::new(),
         }],

@@ -3,10 +3,9 @@
 use faces::{Divided, Observations};
 use range_image::{Cancelled, Column, RangeImage, RegionMap};
 use reconstruct::metrics::compare;
-use reconstruct::{Evidence, Fitted, Method, ReconstructError, Reconstruction};
+use reconstruct::{Evidence, Fitted, Known, Method, ReconstructError, Reconstruction};
 use regrid::RegridError;
 use segment::SegmentError;
-use shapes::Shape;
 
 use crate::columns::{Columns, InMemory, ReadAgainError, Within};
 use crate::kinds::samples::{OnRegion, of_regions};
@@ -298,12 +297,12 @@ fn in_view(
     let (fitted, (tied, beside)) = (fitted?, of_samples?);
     let are_too_many = beside.is_none();
     let beside = beside.unwrap_or_default();
-    let mut shapes: Vec<Option<Shape>> = Vec::new();
+    let mut forms: Vec<Option<Known>> = Vec::new();
     if has_kinds {
-        shapes.extend(tied.kinds.iter().map(RegionKind::shape));
+        forms.extend(tied.kinds.iter().map(RegionKind::known));
     }
     let evidence = Evidence {
-        shapes: &shapes,
+        forms: &forms,
         outline_samples: &beside,
     };
     let mut reconstruction = fitted.reconstruct(evidence, observer)?;

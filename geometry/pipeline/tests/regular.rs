@@ -89,7 +89,7 @@ fn a_roof_is_made_square_if_asked_and_its_faces_with_it() {
         .zip(&outcome.reconstruction.model.faces)
     {
         let (shape, numbers) = kind.told().unwrap();
-        assert_eq!(face.shape, Some(shape));
+        assert_eq!(face.form, Some(shape.into()));
         let Verdict::Shape(fit) = &kind.evidence.verdict else {
             panic!("it is a shape");
         };

@@ -9,7 +9,7 @@ use pipeline::{
 };
 use range_image::{Column, Lattice, Monitor, RangeImage, Sample, Unmonitored};
 use reconstruct::Surface;
-use shapes::Family;
+use shapes::{Family, Form, Shape};
 
 /// A roof of two planes that meet at x = 0, 24 mm square, columns 0.5 mm apart.
 fn roof() -> Vec<Column> {
@@ -248,13 +248,13 @@ fn surfaces_that_are_known_are_the_faces_themselves() {
     let faces = &outcome.reconstruction.model.faces;
     let families: Vec<_> = faces
         .iter()
-        .map(|face| face.shape.as_ref().map(|shape| shape.family()))
+        .map(|face| face.form.as_ref().and_then(Form::shape).map(Shape::family))
         .collect();
     assert!(families.contains(&Some(Family::Sphere)), "{families:?}");
     assert!(families.contains(&Some(Family::Plane)), "{families:?}");
     for face in faces {
         let Surface::Patches(patches) = &face.surface;
-        let shape = face.shape.as_ref().unwrap();
+        let shape = face.form.as_ref().and_then(Form::shape).unwrap();
         if shape.family() == Family::Plane {
             assert_eq!(patches.patches.len(), 1);
         }
@@ -273,7 +273,7 @@ fn surfaces_that_are_known_are_the_faces_themselves() {
     };
     let (_, outcome) = process_columns(&dome(), &settings, &Unmonitored).unwrap();
     let faces = &outcome.reconstruction.model.faces;
-    assert!(faces.iter().all(|face| face.shape.is_none()));
+    assert!(faces.iter().all(|face| face.form.is_none()));
     assert!(outcome.kinds.iter().any(|kind| kind.shape().is_some()));
 }
 
@@ -324,7 +324,7 @@ fn a_dented_plane_is_not_made_flat() {
         assert!((depth_mm - 0.2).abs() < 0.04, "{depth_mm}");
         assert!(outcome.kinds[0].shape().is_some(), "most of it is a plane");
         if smooth_joins == SmoothJoins::Keep {
-            assert!(outcome.reconstruction.model.faces[0].shape.is_none());
+            assert!(outcome.reconstruction.model.faces[0].form.is_none());
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use nurbs::{PatchSurface, PiecewiseCubic};
 use range_image::RangeImage;
-use shapes::Shape;
+use shapes::Form;
 
 use crate::border::cracks::{Chain, CrackMap};
 use crate::border::map::{MapEdge, PlanarMap};
@@ -102,7 +102,7 @@ pub(crate) struct Carrier {
     pub(crate) name: String,
     pub(crate) surface: PatchSurface,
     /// What the surface is, where that is known.
-    pub(crate) shape: Option<Shape>,
+    pub(crate) form: Option<Form>,
     /// Root mean square residual, millimetres.
     pub(crate) rms_mm: f64,
 }
@@ -211,7 +211,7 @@ pub(crate) fn model(
                 name: carrier.name,
                 region: carrier.region,
                 surface: Surface::Patches(carrier.surface),
-                shape: carrier.shape,
+                form: carrier.form,
                 outer,
                 inner,
             });

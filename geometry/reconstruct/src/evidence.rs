@@ -1,15 +1,25 @@
 //! What samples tell beside the nodes.
 
-use shapes::Shape;
+use shapes::Form;
 
 /// What is known of the regions besides their nodes. By the letter of the paper it is not asked.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Evidence<'a> {
-    /// The shape of a region, by label from 1 on, where one is known.
-    pub shapes: &'a [Option<Shape>],
+    /// The form of a region, by label from 1 on, where one is known, and the numbers that the samples
+    /// gave it.
+    pub forms: &'a [Option<Known>],
     /// The samples beside the outlines of regions, which tell better than nodes where those and
     /// the steps between regions run.
     pub outline_samples: &'a [OutlineSample],
+}
+
+/// What a region is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Known {
+    /// Its surface.
+    pub form: Form,
+    /// How many free numbers that has.
+    pub freedom: usize,
 }
 
 /// A sample beside an outline, or the place of one that is missing.

@@ -1,105 +1,105 @@
 //! Patches of surfaces that are known.
 //!
-//! A model is a graph over the x-y plane, so a known shape becomes patches, too: fitted to the
-//! shape itself at the nodes of its region, and a little beyond for borders to run on.
+//! A model is a graph over the x-y plane, so a known form becomes patches, too: fitted to the
+//! form itself at the nodes of its region, and a little beyond for borders to run on.
 
 use nalgebra::Vector3;
 use nurbs::{Observation, PatchSurface};
 use range_image::RangeImage;
-use shapes::Shape;
+use shapes::{Form, Shape};
 
 use crate::fit::Domain;
-use crate::model::SHAPE_TOLERANCE_MM;
+use crate::model::FORM_TOLERANCE_MM;
 use crate::refine::{self, Demand};
 use crate::run::{Node, SURFACE_MARGIN};
 
 /// Places along each side of its domain that determine a plane, and more.
 const PLANE_SIDE: usize = 5;
 
-/// What a fit to a shape leaves is no noise: this is far below what is worth a coefficient,
+/// What a fit to a form leaves is no noise: this is far below what is worth a coefficient,
 /// square millimetres.
 const NO_NOISE_MM2: f64 = 1e-14;
 
 /// Part of the tolerance at which nothing more is refined.
 const AIM: f64 = 0.1;
 
-/// Share of the nodes at which the shape has to be there.
+/// Share of the nodes at which the form has to be there.
 const MET: f64 = 0.98;
 
-/// Around the nodes the shape goes on where it faces the camera so squarely at least, of the
+/// Around the nodes the form goes on where it faces the camera so squarely at least, of the
 /// least squarely that it does at a node: what is steeper needs many patches and bounds nothing.
 const LEAST_FACING: f64 = 0.75;
 
-/// Narrowest span, in the distance of the places that the shape is fitted at; half of that of a fit to
+/// Narrowest span, in the distance of the places that the form is fitted at; half of that of a fit to
 /// nodes, since nothing is made up between them.
 const LEAST_SPAN: f64 = 1.0;
 
 /// Places to a pitch, tried one after the other: narrow rings that end steeply need many.
 const FINENESS: [usize; 3] = [1, 2, 4];
 
-/// How far a node may lie off the shape along its normal, pitches: what is found farther away is
+/// How far a node may lie off the form along its normal, pitches: what is found farther away is
 /// another sheet of it.
 const NEAR: f64 = 2.0;
 
-/// Patches of a shape over a domain with so many spans along a side at most; `None` where they
-/// do not come within [`SHAPE_TOLERANCE_MM`], or it is not seen at the nodes.
+/// Patches of a form over a domain with so many spans along a side at most; `None` where they
+/// do not come within [`FORM_TOLERANCE_MM`], or it is not seen at the nodes.
 pub(crate) fn patches(
-    shape: &Shape,
+    form: &Form,
     image: &RangeImage,
     nodes: &[Node],
     domain: &Domain,
     most_spans: usize,
 ) -> Option<PatchSurface> {
     let patches = |fineness: usize| {
-        let observations = match shape {
-            Shape::Plane(_) => over(shape, domain)?,
-            _ => around(shape, image, nodes, (domain, fineness))?,
+        let observations = match form {
+            Form::Shape(Shape::Plane(_)) => over(form, domain)?,
+            _ => around(form, image, nodes, (domain, fineness))?,
         };
         let demand = Demand {
-            tolerance_mm: AIM * SHAPE_TOLERANCE_MM,
+            tolerance_mm: AIM * FORM_TOLERANCE_MM,
             noise_density_mm2: NO_NOISE_MM2,
             least_span_mm: LEAST_SPAN * image.pitch_mm() / fineness as f64,
             most_spans,
         };
         let (spline, _) = refine::fit(&observations, domain, &demand).ok()?;
         let surface = spline.to_patches().ok()?;
-        is_that(shape, &surface, image, nodes).then_some(surface)
+        is_that(form, &surface, image, nodes).then_some(surface)
     };
     FINENESS.into_iter().find_map(patches)
 }
 
-/// Whether a surface is a shape at the nodes at which that is, to its tolerance. Of the few at which it
+/// Whether a surface is a form at the nodes at which that is, to its tolerance. Of the few at which it
 /// is not, which are of a wall beside it, nothing is asked.
-fn is_that(shape: &Shape, surface: &PatchSurface, image: &RangeImage, nodes: &[Node]) -> bool {
+fn is_that(form: &Form, surface: &PatchSurface, image: &RangeImage, nodes: &[Node]) -> bool {
     let (mut squares_mm2, mut count) = (0.0, 0.0_f64);
     for node in nodes {
         let (x, y) = (image.x_mm(node.column), image.y_mm(node.row));
-        if met(shape, (x, y), node.z_mm, image.pitch_mm()).is_some() {
-            let off_mm = shape.distance_mm(&Vector3::new(x, y, surface.z(x, y)));
+        if met(form, (x, y), node.z_mm, image.pitch_mm()).is_some() {
+            let off_mm = form.distance_mm(&Vector3::new(x, y, surface.z(x, y)));
             squares_mm2 += off_mm * off_mm;
             count += 1.0;
         }
     }
-    count > 0.0 && (squares_mm2 / count).sqrt() <= SHAPE_TOLERANCE_MM
+    count > 0.0 && (squares_mm2 / count).sqrt() <= FORM_TOLERANCE_MM
 }
 
-/// z of a shape over a place, and the cosine between z and its normal there; `None` where it is
+/// z of a form over a place, and the cosine between z and its normal there; `None` where it is
 /// not there, or another sheet of it is.
-fn met(shape: &Shape, (x_mm, y_mm): (f64, f64), near_mm: f64, pitch_mm: f64) -> Option<(f64, f64)> {
-    let z_mm = shape.z_mm(x_mm, y_mm, near_mm)?;
-    let facing = shape.normal(&Vector3::new(x_mm, y_mm, z_mm)).z;
+fn met(form: &Form, (x_mm, y_mm): (f64, f64), near_mm: f64, pitch_mm: f64) -> Option<(f64, f64)> {
+    let z_mm = form.z_mm(x_mm, y_mm, near_mm)?;
+    let facing = form.normal(&Vector3::new(x_mm, y_mm, z_mm)).z;
     ((z_mm - near_mm).abs() * facing <= NEAR * pitch_mm).then_some((z_mm, facing))
 }
 
-/// A shape that is seen all over a domain, at a few places.
-fn over(shape: &Shape, domain: &Domain) -> Option<Vec<Observation>> {
+/// A form that is seen all over a domain, at a few places.
+fn over(form: &Form, domain: &Domain) -> Option<Vec<Observation>> {
     let at =
         |(low, high): (f64, f64), k: usize| low + (high - low) * k as f64 / (PLANE_SIDE - 1) as f64;
     let places = (0..PLANE_SIDE).flat_map(|i| (0..PLANE_SIDE).map(move |j| (i, j)));
     places
         .map(|(i, j)| {
             let (u, v) = (at(domain.x_mm, i), at(domain.y_mm, j));
-            let value = shape.z_mm(u, v, 0.0)?;
+            let value = form.z_mm(u, v, 0.0)?;
             Some(Observation {
                 u,
                 v,
@@ -110,10 +110,10 @@ fn over(shape: &Shape, domain: &Domain) -> Option<Vec<Observation>> {
         .collect()
 }
 
-/// A shape at the nodes of a region, around them as far as borders may run, and between them, at so
+/// A form at the nodes of a region, around them as far as borders may run, and between them, at so
 /// many places to a pitch. Distances count along the normal.
 fn around(
-    shape: &Shape,
+    form: &Form,
     image: &RangeImage,
     nodes: &[Node],
     (domain, fineness): (&Domain, usize),
@@ -140,7 +140,7 @@ fn around(
     let mut count = 0;
     for node in nodes {
         let (i, j) = (node.column - columns.0 + margin, node.row - rows.0 + margin);
-        known[i * height + j] = met(shape, (x_mm(i), y_mm(j)), node.z_mm, pitch_mm);
+        known[i * height + j] = met(form, (x_mm(i), y_mm(j)), node.z_mm, pitch_mm);
         count += usize::from(known[i * height + j].is_some());
     }
     if (count as f64) < MET * nodes.len() as f64 {
@@ -156,7 +156,7 @@ fn around(
                     .flat_map(|i| (j.saturating_sub(1)..(j + 2).min(height)).map(move |j| (i, j)));
                 let near = beside.filter_map(|(i, j)| known[i * height + j]);
                 let near = near.map(|(z_mm, _)| z_mm).reduce(f64::min);
-                let found = near.and_then(|near| met(shape, (x_mm(i), y_mm(j)), near, pitch_mm));
+                let found = near.and_then(|near| met(form, (x_mm(i), y_mm(j)), near, pitch_mm));
                 if let Some(found) = found.filter(|(_, facing)| *facing >= least_facing) {
                     next.push((i * height + j, found));
                 }
@@ -172,11 +172,11 @@ fn around(
         let part = |k: usize| k as f64 * pitch_mm / fineness as f64;
         let (u, v) = (x_mm(i) + part(k), y_mm(j) + part(l));
         if (k, l) != (0, 0) {
-            // Only between places at which the shape is.
+            // Only between places at which the form is.
             let beyond = (i + k.min(1), j + l.min(1));
             let is_inside = beyond.0 < width && beyond.1 < height;
             let (there, _) = is_inside.then(|| known[beyond.0 * height + beyond.1])??;
-            (value, facing) = met(shape, (u, v), value.min(there), pitch_mm)?;
+            (value, facing) = met(form, (u, v), value.min(there), pitch_mm)?;
         }
         (is_within(domain.x_mm, u) && is_within(domain.y_mm, v)).then_some(Observation {
             u,
@@ -196,11 +196,11 @@ fn around(
 mod tests {
     use super::*;
     use range_image::Lattice;
-    use shapes::{Sphere, Torus};
+    use shapes::{Shape, Sphere, Torus};
 
     /// The nodes at which a shape's upper sheet faces the camera so squarely at least.
     fn seen(
-        shape: &Shape,
+        shape: &Form,
         top_mm: f64,
         least_facing: f64,
         is_part: impl Fn(f64, f64) -> bool,
@@ -230,11 +230,11 @@ mod tests {
 
     #[test]
     fn a_sphere_becomes_patches_to_the_tolerance() {
-        let shape = Shape::Sphere(Sphere {
+        let shape = Form::Shape(Shape::Sphere(Sphere {
             centre_mm: Vector3::zeros(),
             radius_mm: 25.0,
             is_hollow: false,
-        });
+        }));
         for least_facing in [0.3, 0.6] {
             let (image, nodes) = seen(&shape, 25.0, least_facing, |_, _| true);
             let surface = patches(&shape, &image, &nodes, &whole(), 256).unwrap();
@@ -255,13 +255,13 @@ mod tests {
     #[test]
     fn a_narrow_ring_becomes_patches_of_its_shape() {
         let (radius_mm, tube_mm) = (8.0, 3.0);
-        let shape = Shape::Torus(Torus {
+        let shape = Form::Shape(Shape::Torus(Torus {
             centre_mm: Vector3::zeros(),
             axis: Vector3::z(),
             radius_mm,
             tube_mm,
             is_hollow: false,
-        });
+        }));
         let (image, nodes) = seen(&shape, tube_mm, 0.1, |_, _| true);
         let domain = Domain {
             x_mm: (-12.0, 12.0),
@@ -281,13 +281,13 @@ mod tests {
     #[test]
     fn another_sheet_of_a_groove_has_no_say() {
         let (radius_mm, tube_mm) = (20.0, 6.0);
-        let shape = Shape::Torus(Torus {
+        let shape = Form::Shape(Shape::Torus(Torus {
             centre_mm: Vector3::zeros(),
             axis: Vector3::y(),
             radius_mm,
             tube_mm,
             is_hollow: true,
-        });
+        }));
         // The groove of a pulley: the inner half of the tube, on the side of the camera.
         let exact = |x: f64, y: f64| {
             let out = radius_mm - (tube_mm * tube_mm - y * y).sqrt();
@@ -314,13 +314,13 @@ mod tests {
     #[test]
     fn a_few_nodes_of_a_wall_do_not_keep_a_fillet_from_being_one() {
         let (radius_mm, tube_mm) = (11.6, 2.6);
-        let shape = Shape::Torus(Torus {
+        let shape = Form::Shape(Shape::Torus(Torus {
             centre_mm: Vector3::zeros(),
             axis: Vector3::z(),
             radius_mm,
             tube_mm,
             is_hollow: true,
-        });
+        }));
         let image = RangeImage::masked(Lattice { pitch_mm: 0.42 }, -60, -60, 120, 120);
         let places = (0..120).flat_map(|column| (0..120).map(move |row| (column, row)));
         let mut of_wall = 0;
@@ -358,11 +358,11 @@ mod tests {
 
     #[test]
     fn a_shape_that_is_not_there_is_none() {
-        let shape = Shape::Sphere(Sphere {
+        let shape = Form::Shape(Shape::Sphere(Sphere {
             centre_mm: Vector3::zeros(),
             radius_mm: 25.0,
             is_hollow: false,
-        });
+        }));
         let (image, mut nodes) = seen(&shape, 25.0, 0.5, |_, _| true);
         let many = nodes.len() / 20;
         for node in &mut nodes[..many] {

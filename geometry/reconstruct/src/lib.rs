@@ -33,7 +33,7 @@ mod run;
 mod testing;
 mod trim;
 
-pub use evidence::{Evidence, OutlineSample, Seen};
+pub use evidence::{Evidence, Known, OutlineSample, Seen};
 pub use metrics::Metrics;
 pub use model::{
     Coedge, Edge, EdgeId, EdgeKind, EdgeOrigin, Face, Loop, Model, Surface, Vertex, VertexId,

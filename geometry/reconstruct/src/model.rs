@@ -6,7 +6,7 @@
 //! surface, and the two lifted curves of a crease meet as well as the surfaces do.
 
 use nurbs::{PatchSurface, PiecewiseCubic};
-use shapes::Shape;
+use shapes::Form;
 
 /// Index into [`Model::vertices`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -84,9 +84,9 @@ pub struct Face {
     pub region: u16,
     /// The untrimmed surface; its normal points towards the camera (+z).
     pub surface: Surface,
-    /// What the surface is, where it is of a kind that engineers know by its numbers: the patches
-    /// are this shape to [`SHAPE_TOLERANCE_MM`]. `None` for a free form.
-    pub shape: Option<Shape>,
+    /// What the surface is, where it is of a kind that engineers know: the patches
+    /// are this form to [`FORM_TOLERANCE_MM`]. `None` for a free form.
+    pub form: Option<Form>,
     /// Counter-clockwise in the parameter plane.
     pub outer: Loop,
     /// Holes, clockwise in the parameter plane.
@@ -125,6 +125,6 @@ pub struct Coedge {
 /// How far a coedge's space curve may lie off its surface, millimetres.
 pub const SPACE_CURVE_TOLERANCE_MM: f64 = 1e-4;
 
-/// How far the patches of a face lie off its shape at the nodes of its region, root mean square
+/// How far the patches of a face lie off its form at the nodes of its region, root mean square
 /// along the normal, millimetres.
-pub const SHAPE_TOLERANCE_MM: f64 = 5e-3;
+pub const FORM_TOLERANCE_MM: f64 = 5e-3;

@@ -56,7 +56,7 @@ mod tests {
             region: 1,
             name: "face".into(),
             surface,
-            shape: None,
+            form: None,
             rms_mm: 0.01,
         });
         let mut map = crease_and_outline();

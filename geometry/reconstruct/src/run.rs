@@ -3,7 +3,7 @@
 use nurbs::{Observation, PatchSurface};
 use range_image::{Monitor, RangeImage, RegionMap};
 use rayon::prelude::*;
-use shapes::Shape;
+use shapes::Form;
 
 use crate::accept::is_as_good;
 use crate::account::{Freedom, residuals, tally};
@@ -12,7 +12,7 @@ use crate::border::cracks::trace;
 use crate::border::intersection::intersections;
 use crate::border::map::{BorderSettings, PlanarMap, build};
 use crate::border::settle::{Outlines, Placed};
-use crate::evidence::Evidence;
+use crate::evidence::{Evidence, Known};
 use crate::fit::{Demand, Domain, FitError, patches_from_spline, patches_through_nodes};
 use crate::known;
 use crate::meeting::part;
@@ -169,7 +169,7 @@ impl<'a> Fitted<'a> {
         Ok(all)
     }
 
-    /// Draws the borders, and makes the model. Regions of which a shape is known get that in
+    /// Draws the borders, and makes the model. Regions of which a form is known get that in
     /// place of the free-form surface, where their nodes are met by it as well, and outlines run
     /// where the samples beside them say.
     ///
@@ -181,7 +181,7 @@ impl<'a> Fitted<'a> {
         monitor: &dyn Monitor,
     ) -> Result<Reconstruction, ReconstructError> {
         let (image, settings) = (self.image, self.settings);
-        let shapes = self.take_over(evidence.shapes, monitor)?;
+        let forms = self.take_over(evidence.forms, monitor)?;
         let borders = BorderSettings {
             literal: settings.method == Method::ShimLee,
             corner_cosine: libm::cos(settings.corner_angle_rad),
@@ -216,12 +216,12 @@ impl<'a> Fitted<'a> {
         let mut fits: Vec<RegionFit> = Vec::new();
         for (k, domain) in domains(&planar, placement).into_iter().enumerate() {
             monitor.check()?;
-            let (surface, shape, parameters) = self.surface(k, domain, shapes[k])?;
+            let (surface, form, parameters) = self.surface(k, domain, forms[k].as_ref())?;
             let region = self.pieces.regions[k];
             let freedom = Freedom {
                 parameters,
-                // Pieces of one shape have its numbers in common.
-                is_shared: shape.is_some(),
+                // Pieces of one form have its numbers in common.
+                is_shared: form.is_some(),
                 independent: self.noise.independent(self.nodes[k].len()),
             };
             let rms_mm = tally(
@@ -235,7 +235,7 @@ impl<'a> Fitted<'a> {
                 region,
                 name: names[k].clone(),
                 surface,
-                shape,
+                form,
                 rms_mm,
             });
             monitor.progress(0.4 + 0.4 * (k + 1) as f64 / self.nodes.len() as f64);
@@ -270,20 +270,20 @@ impl<'a> Fitted<'a> {
         })
     }
 
-    /// Puts shapes in the place of free-form surfaces; gives those taken, of each piece. A region
-    /// is of its shape with all its pieces, or with none.
+    /// Puts forms in the place of free-form surfaces; gives those taken, of each piece. A region
+    /// is of its form with all its pieces, or with none.
     fn take_over(
         &mut self,
-        shapes: &[Option<Shape>],
+        forms: &[Option<Known>],
         monitor: &dyn Monitor,
-    ) -> Result<Vec<Option<Shape>>, ReconstructError> {
-        let of_piece = |piece: usize| -> Option<(Shape, PatchSurface)> {
+    ) -> Result<Vec<Option<Known>>, ReconstructError> {
+        let of_piece = |piece: usize| -> Option<(Known, PatchSurface)> {
             let free = self.surfaces.get(piece)?;
             let label = usize::from(self.pieces.regions[piece]);
-            let shape = *shapes.get(label - 1)?.as_ref()?;
-            let surface = self.known(piece, &shape, None)?;
+            let known = forms.get(label - 1)?.as_ref()?;
+            let surface = self.known(piece, &known.form, None)?;
             let nodes = &self.nodes[piece];
-            is_as_good(self.image, nodes, &surface, free).then_some((shape, surface))
+            is_as_good(self.image, nodes, &surface, free).then(|| (known.clone(), surface))
         };
         let found = (0..self.nodes.len()).into_par_iter().map(|piece| {
             monitor.check()?;
@@ -300,43 +300,44 @@ impl<'a> Fitted<'a> {
         let whole: Vec<bool> = (0..found.len()).map(holds).collect();
         let mut taken = vec![None; found.len()];
         for (piece, found) in found.into_iter().enumerate() {
-            if let Some((shape, surface)) = found.filter(|_| whole[piece]) {
-                taken[piece] = Some(shape);
+            if let Some((known, surface)) = found.filter(|_| whole[piece]) {
                 self.surfaces[piece] = surface;
-                self.parameters[piece] = shape.family().freedom();
+                self.parameters[piece] = known.freedom;
+                taken[piece] = Some(known);
             }
         }
         Ok(taken)
     }
 
-    /// The surface of a piece over the domain that its border asks for, the shape that it is, and
+    /// The surface of a piece over the domain that its border asks for, the form that it is, and
     /// the numbers that it was given.
     fn surface(
         &self,
         piece: usize,
         domain: Option<Domain>,
-        shape: Option<Shape>,
-    ) -> Result<(PatchSurface, Option<Shape>, usize), ReconstructError> {
+        known: Option<&Known>,
+    ) -> Result<(PatchSurface, Option<Form>, usize), ReconstructError> {
+        let form = || known.map(|known| known.form.clone());
         let fits = |surface: &&PatchSurface| domain.is_some_and(|domain| domain.is_within(surface));
         if let Some(surface) = self.surfaces.get(piece).filter(fits) {
-            return Ok((surface.clone(), shape, self.parameters[piece]));
+            return Ok((surface.clone(), form(), self.parameters[piece]));
         }
-        if let Some(shape) = shape
-            && let Some(surface) = self.known(piece, &shape, domain)
+        if let Some(known) = known
+            && let Some(surface) = self.known(piece, &known.form, domain)
         {
-            return Ok((surface, Some(shape), shape.family().freedom()));
+            return Ok((surface, form(), known.freedom));
         }
         let (surface, parameters) = self.free_form(piece, domain)?;
         Ok((surface, None, parameters))
     }
 
-    /// Patches of a shape over the nodes of a piece, and over a domain besides.
-    fn known(&self, piece: usize, shape: &Shape, besides: Option<Domain>) -> Option<PatchSurface> {
+    /// Patches of a form over the nodes of a piece, and over a domain besides.
+    fn known(&self, piece: usize, form: &Form, besides: Option<Domain>) -> Option<PatchSurface> {
         let (image, nodes) = (self.image, &self.nodes[piece]);
         let own = around(image, nodes)?;
         let domain = besides.map_or(own, |besides| own.with(&besides));
         let most_spans = self.settings.knots_per_side - 1;
-        known::patches(shape, image, nodes, &domain, most_spans)
+        known::patches(form, image, nodes, &domain, most_spans)
     }
 
     /// A free-form surface of a piece over a domain, and the numbers that it was given.

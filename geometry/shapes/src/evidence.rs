@@ -12,12 +12,16 @@ use crate::fit::{ACROSS, Fit, Sample, finished, found};
 use crate::robust;
 use crate::shape::Family;
 use crate::start::{Frame, Middle};
+use crate::sweep::SweptFit;
 
 /// What the samples speak for.
 #[derive(Debug, Clone)]
 pub enum Verdict {
     /// A surface of one of the families.
     Shape(Box<Fit>),
+    /// None of them, but one profile that is swept over it; [`decide`] does not look for these,
+    /// [`crate::swept`] does.
+    Swept(Box<SweptFit>),
     /// None of them.
     FreeForm,
     /// The samples are too few to tell, or lie on a line.
@@ -51,7 +55,7 @@ impl Evidence {
     pub fn fit(&self) -> Option<&Fit> {
         match &self.verdict {
             Verdict::Shape(fit) => Some(fit),
-            Verdict::FreeForm | Verdict::Unknown => None,
+            Verdict::Swept(_) | Verdict::FreeForm | Verdict::Unknown => None,
         }
     }
 
@@ -60,7 +64,7 @@ impl Evidence {
     pub fn into_fit(self) -> Option<Fit> {
         match self.verdict {
             Verdict::Shape(fit) => Some(*fit),
-            Verdict::FreeForm | Verdict::Unknown => None,
+            Verdict::Swept(_) | Verdict::FreeForm | Verdict::Unknown => None,
         }
     }
 }
@@ -77,7 +81,7 @@ const DOUBT: f64 = 5.0;
 const HOPELESS: f64 = 3.0;
 /// What each number costs above its price, so that of a hundred planes not one gets a radius
 /// from its noise.
-const CAUTION: f64 = 4.0;
+pub(crate) const CAUTION: f64 = 4.0;
 
 /// Decides what kind of surface the samples are of. `area` is that of [`fit`].
 #[must_use]
@@ -211,7 +215,7 @@ pub(crate) struct Surface {
 }
 
 impl Surface {
-    fn deviation(&self) -> f64 {
+    pub(crate) fn deviation(&self) -> f64 {
         robust::deviation(self.off.iter().copied())
     }
 

@@ -10,7 +10,7 @@ use known::{NOISE_MM, Random, cases, samples};
 fn family(evidence: &Evidence) -> Option<Family> {
     match &evidence.verdict {
         Verdict::Shape(fit) => Some(fit.shape.family()),
-        Verdict::FreeForm | Verdict::Unknown => None,
+        Verdict::Swept(_) | Verdict::FreeForm | Verdict::Unknown => None,
     }
 }
 

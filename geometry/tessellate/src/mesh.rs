@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use shapes::Family;
-
 use crate::vector::{Point3, cross, minus, norm};
 
 /// Triangles of a model, millimetres, part frame. All of them turn counter-clockwise as the
@@ -25,8 +23,8 @@ pub struct MeshFace {
     pub name: String,
     /// The region that it came from.
     pub region: u16,
-    /// What its surface is; `None` for a free form.
-    pub family: Option<Family>,
+    /// What its surface is, in words.
+    pub form: &'static str,
     /// Its vertices.
     pub corners: Vec<Corner>,
     /// Indices into [`MeshFace::corners`], three to a triangle.

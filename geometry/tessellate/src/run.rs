@@ -6,7 +6,7 @@ use nurbs::PatchSurface;
 use range_image::{Cancelled, Monitor};
 use rayon::prelude::*;
 use reconstruct::{Face, Model, Surface};
-use shapes::Shape;
+use shapes::Form;
 
 use crate::divide::Division;
 use crate::error::TessellateError;
@@ -241,7 +241,7 @@ fn assemble(model: &Model, sewn: Sewn, refined: &[Patch<'_>]) -> Mesh {
         mesh.faces.push(MeshFace {
             name: face.name.clone(),
             region: face.region,
-            family: face.shape.as_ref().map(Shape::family),
+            form: face.form.as_ref().map_or("free form", Form::as_str),
             corners,
             triangles: patch.net.triangles.clone(),
         });

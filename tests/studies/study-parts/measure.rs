@@ -190,6 +190,7 @@ fn found(
     let verdict = own.map(|kind| &kind.evidence.verdict);
     let kind = match verdict {
         Some(Verdict::Shape(fit)) => Some(Kind::Of(fit.shape.family())),
+        Some(Verdict::Swept(_)) => Some(Kind::Swept),
         Some(Verdict::FreeForm) => Some(Kind::FreeForm),
         Some(Verdict::Unknown) | None => None,
     };

@@ -17,16 +17,19 @@ use crate::surface::TrueSurface;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Kind {
     Of(Family),
+    /// An extrusion or a revolution; none of the parts has one that is no simpler.
+    Swept,
     FreeForm,
 }
 
 impl Kind {
-    pub(crate) const ALL: [Self; 6] = [
+    pub(crate) const ALL: [Self; 7] = [
         Self::Of(Family::Plane),
         Self::Of(Family::Cylinder),
         Self::Of(Family::Cone),
         Self::Of(Family::Sphere),
         Self::Of(Family::Torus),
+        Self::Swept,
         Self::FreeForm,
     ];
 }
@@ -35,6 +38,7 @@ impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
             Self::Of(family) => family.as_str(),
+            Self::Swept => "swept",
             Self::FreeForm => "free-form",
         })
     }

@@ -153,7 +153,7 @@ pub(crate) mod tests {
             surface: Surface::Patches(
                 PatchSurface::new(u.to_vec(), v.to_vec(), vec![level]).unwrap(),
             ),
-            shape: None,
+            form: None,
             outer: looped(half, turns),
             inner: hole.map(|half| looped(half, turns)).into_iter().collect(),
         }

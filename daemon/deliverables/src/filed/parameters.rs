@@ -74,7 +74,8 @@ fn of_shape(family: &str, numbers: &ShapeNumbers) -> Vec<[Line; 4]> {
     }
     let (point, direction) = match family {
         "plane" => ("point", "normal"),
-        "cylinder" => ("point of the axis", "axis"),
+        "cylinder" | "revolution" => ("point of the axis", "axis"),
+        "extrusion" => ("point", "direction"),
         "cone" => ("apex", "axis"),
         _ => ("centre", "axis"),
     };
@@ -101,6 +102,14 @@ fn of_shape(family: &str, numbers: &ShapeNumbers) -> Vec<[Line; 4]> {
         uncertain(uncertainty, " mm"),
         within(uncertainty, " mm"),
     ]);
+    if let Some(profile) = numbers.profile {
+        rows.push([
+            "profile".into(),
+            Line::new().text(format!("spline of {} coefficients", profile.coefficients)),
+            uncertain(profile.uncertainty_mm, " mm"),
+            within(profile.uncertainty_mm, " mm"),
+        ]);
+    }
     rows
 }
 

@@ -17,7 +17,7 @@ use nurbs::{PatchSurface, PiecewiseCubic};
 use reconstruct::{
     Coedge, Edge, EdgeId, EdgeKind, EdgeOrigin, Face, Loop, Model, Surface, Vertex, VertexId,
 };
-use shapes::{Cone, Cylinder, Shape, Sphere, Torus};
+use shapes::{Cone, Cylinder, Form, Shape, Sphere, Torus};
 
 /// Centre and radius of the hole; its border is four cubics, round to 3e-4 of the radius.
 const HOLE: ([f64; 2], f64) = ([10.0, 15.0], 5.0);
@@ -69,7 +69,7 @@ pub(crate) fn model() -> Model {
             outer: border(&barrel, &[(0, false), (1, false), (2, false), (3, false)]),
             inner: vec![border(&barrel, &[(4, true)])],
             surface: Surface::Patches(barrel),
-            shape: None,
+            form: None,
         },
         Face {
             name: "Ramp".to_owned(),
@@ -77,7 +77,7 @@ pub(crate) fn model() -> Model {
             outer: border(&ramp, &[(5, false), (6, false), (7, false), (1, true)]),
             inner: Vec::new(),
             surface: Surface::Patches(ramp),
-            shape: None,
+            form: None,
         },
     ];
     let vertices = vertices
@@ -95,7 +95,7 @@ pub(crate) fn model() -> Model {
 pub(crate) fn rectangle(
     x_mm: [f64; 2],
     y_mm: [f64; 2],
-    shape: Shape,
+    form: impl Into<Form>,
     z_mm: impl Fn(f64, f64) -> f64,
 ) -> Model {
     let corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[i, j]| [x_mm[i], y_mm[j]]);
@@ -121,7 +121,7 @@ pub(crate) fn rectangle(
         },
         inner: Vec::new(),
         surface: Surface::Patches(surface),
-        shape: Some(shape),
+        form: Some(form.into()),
     };
     Model {
         vertices: corners.map(|[x_mm, y_mm]| Vertex { x_mm, y_mm }).to_vec(),
@@ -135,7 +135,7 @@ pub(crate) fn rectangle(
 pub(crate) fn ring(
     [inner, outer]: [f64; 2],
     from: usize,
-    shape: Shape,
+    form: impl Into<Form>,
     z_mm: impl Fn(f64, f64) -> f64,
 ) -> Model {
     let paths = [
@@ -175,7 +175,7 @@ pub(crate) fn ring(
         outer: border(0, false),
         inner: vec![border(1, true)],
         surface: Surface::Patches(surface),
-        shape: Some(shape),
+        form: Some(form.into()),
     };
     Model {
         vertices,

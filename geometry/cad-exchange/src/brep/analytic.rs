@@ -39,7 +39,7 @@ pub(crate) struct Analytic {
 impl Analytic {
     /// The surface of a face whose shape is known, if its border keeps clear of seam and poles.
     pub(super) fn of(face: &Face) -> Option<Self> {
-        let shape = face.shape.as_ref()?;
+        let shape = face.form.as_ref()?.shape()?;
         let loops = loops(face);
         let places: Vec<Vector3<f64>> = loops.iter().flatten().copied().collect();
         let around = |centre: &Vector3<f64>, axis: &Vector3<f64>| Around::of(&loops, centre, axis);

@@ -194,7 +194,7 @@ mod tests {
             name: format!("Face {k}"),
             region: 1,
             surface: Surface::Patches(flat()),
-            shape: None,
+            form: None,
             outer: Loop {
                 coedges: vec![coedge(k, false), coedge((k + 1) % 4, true)],
             },

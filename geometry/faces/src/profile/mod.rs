@@ -24,7 +24,6 @@ mod refine;
 mod rounding;
 mod smooth;
 mod stations;
-mod sweep;
 mod swept;
 mod touching;
 

@@ -1,10 +1,9 @@
 //! A motion made to fit: that which leaves samples the least off the profile it sweeps.
 
 use nalgebra::{SMatrix, SVector};
-use shapes::Sample;
+use shapes::{MOST_FREE, Sample, Sweep};
 
 use super::stations::Profile;
-use super::sweep::{MOST_FREE, Sweep};
 
 /// Most of a turn in one step, radians: farther, slopes are others.
 const MOST_TURN: f64 = 0.1;

@@ -1,8 +1,6 @@
 //! A profile as it is seen: the means of samples in bins along it.
 
-use shapes::Sample;
-
-use super::sweep::{MOST_FREE, Placed, Sweep};
+use shapes::{MOST_FREE, Placed, Sample, Sweep};
 
 /// Samples count in full up to about so many deviations (Cauchy's weights), and are left out beyond
 /// as many as fits hold.

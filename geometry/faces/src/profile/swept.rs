@@ -1,6 +1,6 @@
 //! A region as what a motion sweeps.
 
-use shapes::{Sample, spread};
+use shapes::{Motion, Sample, Sweep, spread};
 
 use super::FAR;
 use super::chain::Chain;
@@ -10,7 +10,6 @@ use super::refine::refined;
 use super::rounding::rounded;
 use super::smooth::smooth;
 use super::stations::{Profile, Station};
-use super::sweep::{Motion, Sweep};
 use super::touching::touching;
 use crate::field::{Field, Set};
 use crate::split::NO_CREASE;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector2;
 use range_image::{RangeImage, RegionMap};
-use shapes::{Evidence, Fit, Sample, Shape, decide};
+use shapes::{Evidence, Fit, Sample, Shape, SweptFit, decide, swept};
 
 use super::joins::{Joining, LEAST_JOINING};
 use super::samples::OnRegion;
@@ -47,6 +47,15 @@ impl Bearing {
     /// The verdict by the samples within.
     pub(super) fn decide(&self) -> Evidence {
         decide(&self.samples, self.area)
+    }
+
+    /// The surface of extrusion or revolution that the samples within speak for, if they do, with a
+    /// profile that goes on to the border.
+    pub(super) fn swept(&self) -> Option<SweptFit> {
+        let found = swept(&self.samples, self.area)?;
+        let beside = self.beside.iter().flat_map(|(_, beside)| beside);
+        let all: Vec<Sample> = self.samples.iter().chain(beside).copied().collect();
+        found.again(&all, self.area)
     }
 
     /// The samples near the border that are of the shape as well: beside what is of no region, beside

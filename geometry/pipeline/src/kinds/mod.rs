@@ -11,8 +11,9 @@ use core::num::NonZeroU16;
 
 use range_image::{Cancelled, Monitor, RangeImage, RegionMap};
 use rayon::prelude::*;
+use reconstruct::Known;
 use regularize::Adjusted;
-use shapes::{Evidence, Fit, Numbers, Shape, Verdict};
+use shapes::{Evidence, Fit, Numbers, Shape, SweptFit, Verdict};
 
 use bearing::Bearing;
 pub use policy::{Kinds, SmoothJoins, UnknownKinds};
@@ -48,8 +49,23 @@ impl RegionKind {
         match (&self.evidence.verdict, &self.adjusted) {
             (Verdict::Shape(_), Some(adjusted)) => Some((adjusted.shape, adjusted.numbers)),
             (Verdict::Shape(fit), None) => Some((fit.shape, fit.numbers)),
-            (Verdict::FreeForm | Verdict::Unknown, _) => None,
+            (Verdict::Swept(_) | Verdict::FreeForm | Verdict::Unknown, _) => None,
         }
+    }
+
+    /// The surface that the samples speak for, if they do for one.
+    #[must_use]
+    pub fn known(&self) -> Option<Known> {
+        if let Verdict::Swept(fit) = &self.evidence.verdict {
+            return Some(Known {
+                form: fit.swept.clone().into(),
+                freedom: fit.freedom,
+            });
+        }
+        self.shape().map(|shape| Known {
+            form: shape.into(),
+            freedom: shape.family().freedom(),
+        })
     }
 }
 
@@ -105,6 +121,17 @@ pub(crate) fn kinds(
     let mut decided = decided.into_iter().collect::<Result<Vec<_>, _>>()?;
     for island in islands::islands(&decided, &bearings) {
         decided[island].evidence.verdict = Verdict::FreeForm;
+    }
+    let swept = decided.par_iter().zip(&bearings).map(|(kind, bearing)| {
+        monitor.check()?;
+        let is_free_form = matches!(kind.evidence.verdict, Verdict::FreeForm);
+        Ok(is_free_form.then(|| bearing.swept()).flatten())
+    });
+    let swept: Vec<Result<Option<SweptFit>, Cancelled>> = swept.collect();
+    for (kind, swept) in decided.iter_mut().zip(swept) {
+        if let Some(fit) = swept? {
+            kind.evidence.verdict = Verdict::Swept(Box::new(fit));
+        }
     }
     if smooth_joins == SmoothJoins::Keep {
         // What lies beside a border may be of a surface that joins this one.

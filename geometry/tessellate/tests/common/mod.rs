@@ -100,7 +100,7 @@ impl Builder {
             name: format!("face-{number}"),
             region: number as u16,
             surface: Surface::Patches(surface.clone()),
-            shape: None,
+            form: None,
             outer: loops.remove(0),
             inner: loops,
         });

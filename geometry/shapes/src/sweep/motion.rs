@@ -5,11 +5,11 @@ use core::f64::consts::FRAC_1_SQRT_2;
 use nalgebra::Vector3;
 
 /// Free numbers of a motion, at most.
-pub(super) const MOST_FREE: usize = 4;
+pub const MOST_FREE: usize = 4;
 
 /// How a profile is swept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Motion {
+pub enum Motion {
     /// Shifted along a direction.
     Extrusion,
     /// Turned about an axis.
@@ -23,38 +23,43 @@ pub(super) enum Motion {
 /// | extrusion | across, in the image plane | height square to both |
 /// | revolution, axis flat in the image | along the axis | radius |
 /// | revolution, axis towards the scanner | radius | along the axis |
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Sweep {
-    pub(super) motion: Motion,
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sweep {
+    /// How it is swept.
+    pub motion: Motion,
     /// A point of the axis.
-    pub(super) origin_mm: Vector3<f64>,
+    pub origin_mm: Vector3<f64>,
     /// Unit direction of the axis, or of the extrusion.
-    pub(super) axis: Vector3<f64>,
+    pub axis: Vector3<f64>,
     /// Unit vectors square to it: the one across the other in the image plane, and up.
     across: Vector3<f64>,
     up: Vector3<f64>,
 }
 
 /// A point in the profile plane.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Placed {
-    pub(super) s_mm: f64,
-    pub(super) t_mm: f64,
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placed {
+    /// Along the profile, millimetres.
+    pub s_mm: f64,
+    /// Across it, millimetres: towards the side that a scanner sees, but for hollow revolutions.
+    pub t_mm: f64,
     /// Unit directions in which s and t grow there.
     s_way: Vector3<f64>,
     t_way: Vector3<f64>,
 }
 
 impl Placed {
-    /// Unit normal of the surface there, of a profile with this slope.
-    pub(super) fn normal(&self, slope: f64) -> Vector3<f64> {
+    /// Unit normal of the surface there, on the side on which t grows, of a profile with this slope.
+    #[must_use]
+    pub fn normal(&self, slope: f64) -> Vector3<f64> {
         (self.t_way - self.s_way * slope) / (1.0 + slope * slope).sqrt()
     }
 }
 
 impl Sweep {
     /// `None` where the scanner looks along the extrusion: it does not see what it sweeps.
-    pub(super) fn new(motion: Motion, origin_mm: Vector3<f64>, axis: Vector3<f64>) -> Option<Self> {
+    #[must_use]
+    pub fn new(motion: Motion, origin_mm: Vector3<f64>, axis: Vector3<f64>) -> Option<Self> {
         let axis = axis.try_normalize(0.0)?;
         let axis = if axis.z < 0.0 { -axis } else { axis };
         if motion == Motion::Extrusion && axis.z > FRAC_1_SQRT_2 {
@@ -74,18 +79,58 @@ impl Sweep {
     }
 
     /// How many numbers of it are free: turns across and up, and shifts of an axis.
-    pub(super) fn freedom(&self) -> usize {
+    #[must_use]
+    pub fn freedom(&self) -> usize {
         match self.motion {
             Motion::Extrusion => 2,
             Motion::Revolution => MOST_FREE,
         }
     }
 
-    fn is_flat(&self) -> bool {
+    /// Unit vectors square to the axis and to each other, the ways of its free shifts: the one in the
+    /// image plane, and up.
+    #[must_use]
+    pub fn across(&self) -> [Vector3<f64>; 2] {
+        [self.across, self.up]
+    }
+
+    /// The axis lies flat in the image, rather than towards the scanner.
+    #[must_use]
+    pub fn is_flat(&self) -> bool {
         self.axis.z <= FRAC_1_SQRT_2
     }
 
-    pub(super) fn place(&self, point_mm: &Vector3<f64>) -> Placed {
+    /// s is a radius.
+    #[must_use]
+    pub fn has_radius_along(&self) -> bool {
+        self.motion == Motion::Revolution && !self.is_flat()
+    }
+
+    /// The same motion, told by the point of the axis nearest to another one.
+    #[must_use]
+    pub fn beside(&self, point_mm: &Vector3<f64>) -> Self {
+        let along = (point_mm - self.origin_mm).dot(&self.axis);
+        Self {
+            origin_mm: self.origin_mm + self.axis * along,
+            ..*self
+        }
+    }
+
+    /// The point of the profile plane in the half plane from the axis towards a unit vector square to
+    /// it; of an extrusion the one plane there is, whatever that vector.
+    #[must_use]
+    pub fn point_mm(&self, [s_mm, t_mm]: [f64; 2], towards: &Vector3<f64>) -> Vector3<f64> {
+        let (s_way, t_way) = match self.motion {
+            Motion::Extrusion => (self.across, self.up),
+            Motion::Revolution if self.is_flat() => (self.axis, *towards),
+            Motion::Revolution => (*towards, self.axis),
+        };
+        self.origin_mm + s_way * s_mm + t_way * t_mm
+    }
+
+    /// Where a point lies in the profile plane.
+    #[must_use]
+    pub fn place(&self, point_mm: &Vector3<f64>) -> Placed {
         let from = point_mm - self.origin_mm;
         let (s, t) = match self.motion {
             Motion::Extrusion => (
@@ -114,7 +159,8 @@ impl Sweep {
     }
 
     /// By how much s and t of a point change with each free number, from its origin on.
-    pub(super) fn changes(&self, point_mm: &Vector3<f64>) -> [(f64, f64); MOST_FREE] {
+    #[must_use]
+    pub fn changes(&self, point_mm: &Vector3<f64>) -> [(f64, f64); MOST_FREE] {
         let from = point_mm - self.origin_mm;
         let along = from.dot(&self.axis);
         match self.motion {
@@ -139,7 +185,8 @@ impl Sweep {
     }
 
     /// The motion after a step of its free numbers.
-    pub(super) fn moved(&self, step: &[f64; MOST_FREE]) -> Option<Self> {
+    #[must_use]
+    pub fn moved(&self, step: &[f64; MOST_FREE]) -> Option<Self> {
         let axis = self.axis + self.across * step[0] + self.up * step[1];
         let origin_mm = self.origin_mm + self.across * step[2] + self.up * step[3];
         Self::new(self.motion, origin_mm, axis)
