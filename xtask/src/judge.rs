@@ -47,8 +47,8 @@ pub(crate) struct Options {
 /// schema and unit, and a name with every kind of character.
 const STEP_SAMPLES: [&str; 2] = ["sample_ap242.step", "sample_ap214_inch.step"];
 
-/// Shapes that files know by their numbers, from either side; no simulated object has them all.
-const SHAPES: [&str; 13] = [
+/// Shapes that files know by their numbers or their profiles, from either side; no simulated object has them all.
+const SHAPES: [&str; 17] = [
     "cylinder",
     "hollow-cylinder",
     "cone",
@@ -62,6 +62,10 @@ const SHAPES: [&str; 13] = [
     "hollow-ring-cone",
     "ring-torus",
     "hollow-ring-torus",
+    "extrusion",
+    "revolution",
+    "hollow-revolution",
+    "ring-revolution",
 ];
 
 /// The IGES entities that know their neighbours without sewing.

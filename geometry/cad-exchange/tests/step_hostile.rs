@@ -158,7 +158,7 @@ fn other_files_are_told_what_they_are() {
         "{told}"
     );
     assert!(refusal(&changed(&whole, "OPEN_SHELL", "CLOSED_SHELL")).contains("CLOSED_SHELL (#"));
-    let told = refusal(&changed(&whole, "PLANE(", "SURFACE_OF_REVOLUTION("));
+    let told = refusal(&changed(&whole, "PLANE(", "OFFSET_SURFACE("));
     assert!(
         told.contains("expected B_SPLINE_SURFACE_WITH_KNOTS") && told.contains("TOROIDAL_SURFACE"),
         "{told}"
@@ -168,12 +168,12 @@ fn other_files_are_told_what_they_are() {
     let kept = changed(
         &whole,
         "ENDSEC;\nEND",
-        "#9999=SURFACE_OF_REVOLUTION('',#1,#2);\nENDSEC;\nEND",
+        "#9999=OFFSET_SURFACE('',#1,#2);\nENDSEC;\nEND",
     );
     let unknown = read(&kept).unwrap().unknown;
     assert_eq!(
         unknown.into_iter().collect::<Vec<_>>(),
-        [("SURFACE_OF_REVOLUTION".to_owned(), 1)]
+        [("OFFSET_SURFACE".to_owned(), 1)]
     );
 }
 

@@ -17,7 +17,7 @@ use nurbs::{PatchSurface, PiecewiseCubic};
 use reconstruct::{
     Coedge, Edge, EdgeId, EdgeKind, EdgeOrigin, Face, Loop, Model, Surface, Vertex, VertexId,
 };
-use shapes::{Cone, Cylinder, Form, Shape, Sphere, Torus};
+use shapes::{Cone, Cylinder, Form, Motion, Shape, Sphere, Sweep, Swept, Torus};
 
 /// Centre and radius of the hole; its border is four cubics, round to 3e-4 of the radius.
 const HOLE: ([f64; 2], f64) = ([10.0, 15.0], 5.0);
@@ -186,7 +186,7 @@ pub(crate) fn ring(
 
 /// A rectangle of a cylinder, cone, sphere or torus, the outside of a tube that stands
 /// (`standing-torus`), or a ring of a cone or torus (`ring-cone`); `hollow-` of these are seen from
-/// within.
+/// within. An `extrusion`, a `revolution`, hollow or not, and a ring of one (`ring-revolution`).
 pub(crate) fn of_shape(name: &str) -> Option<Model> {
     let (family, is_hollow) = match name.strip_prefix("hollow-") {
         Some(family) => (family, true),
@@ -253,11 +253,61 @@ pub(crate) fn of_shape(name: &str) -> Option<Model> {
         // Lying flat, the top of its tube or the bottom of a groove.
         "torus" => torus([-24.0, 0.0, 1.0], Vector3::z(), [25.0, 8.0]),
         "standing-torus" => torus([1.0, 0.0, -30.0], Vector3::x(), [25.0, 8.0]),
-        _ => return None,
+        _ => return of_profile(family, is_hollow),
     };
     let near_mm = if is_hollow { -20.0 } else { 20.0 };
     let z_mm = |x, y| shape.z_mm(x, y, near_mm).unwrap();
     Some(rectangle([-3.0, 5.0], [-4.0, 4.0], shape, z_mm))
+}
+
+/// Two cubics that bend alike where they meet, raised by so much, from -8 to 8 mm or beside the axis
+/// from 1 mm on.
+fn profile(raised_mm: f64, is_radial: bool) -> PiecewiseCubic<1> {
+    let breaks = if is_radial {
+        vec![1.0, 5.0, 11.0]
+    } else {
+        vec![-8.0, 0.0, 8.0]
+    };
+    let width = breaks[1] - breaks[0];
+    let second = [
+        raised_mm + 0.2 * width + 0.03 * width * width,
+        0.2 + 0.06 * width,
+        0.03,
+        -0.003,
+    ];
+    let pieces = vec![[[raised_mm, 0.2, 0.03, 0.0]], [second]];
+    PiecewiseCubic::new(breaks, pieces).unwrap()
+}
+
+/// What is extruded or turned, seen from within where it is hollow.
+fn of_profile(name: &str, is_hollow: bool) -> Option<Model> {
+    let (motion, axis) = match name {
+        "extrusion" => (Motion::Extrusion, Vector3::new(0.3, 1.0, 0.2)),
+        "revolution" => (Motion::Revolution, Vector3::new(0.2, 1.0, 0.1)),
+        "ring-revolution" => (Motion::Revolution, Vector3::z()),
+        _ => return None,
+    };
+    let is_ring = name.starts_with("ring");
+    let raised_mm = if name == "revolution" { 12.0 } else { -1.0 };
+    let swept = Swept {
+        sweep: Sweep::new(motion, Vector3::new(0.0, 0.5, 0.0), axis)?,
+        profile: profile(raised_mm, is_ring),
+        is_hollow: is_hollow && name == "revolution",
+    };
+    if is_ring {
+        // An axis in the middle of the rings.
+        let sweep = Sweep::new(motion, Vector3::zeros(), axis)?;
+        let swept = Swept { sweep, ..swept };
+        let graph = swept.clone();
+        return Some(ring([2.0, 9.0], 1, swept, move |x, y| {
+            graph.z_mm(x, y, 0.0).unwrap()
+        }));
+    }
+    let near_mm = if swept.is_hollow { -20.0 } else { 20.0 };
+    let graph = swept.clone();
+    Some(rectangle([-3.0, 5.0], [-4.0, 4.0], swept, move |x, y| {
+        graph.z_mm(x, y, near_mm).unwrap()
+    }))
 }
 
 /// Areas of the faces in the order of [`model`], square millimetres: by Green's theorem,

@@ -101,19 +101,23 @@ impl Analytic {
 }
 
 /// Places of a face's border, seen from an axis.
-struct Around {
+pub(super) struct Around {
     /// Unit vector square to the axis that points away from the face, if it is no ring.
-    seam: Vector3<f64>,
+    pub(super) seam: Vector3<f64>,
     /// Two loops go around the axis, one each way.
-    is_ring: bool,
+    pub(super) is_ring: bool,
     /// How far along the axis each place lies, and how far off it.
     up_mm: Vec<f64>,
-    out_mm: Vec<f64>,
+    pub(super) out_mm: Vec<f64>,
 }
 
 impl Around {
     /// `None` where the border comes near the seam, unless the face is a ring.
-    fn of(loops: &[Vec<Vector3<f64>>], centre: &Vector3<f64>, axis: &Vector3<f64>) -> Option<Self> {
+    pub(super) fn of(
+        loops: &[Vec<Vector3<f64>>],
+        centre: &Vector3<f64>,
+        axis: &Vector3<f64>,
+    ) -> Option<Self> {
         let places = || loops.iter().flatten();
         let up_mm: Vec<f64> = places().map(|p| (p - centre).dot(axis)).collect();
         let off = |p: &Vector3<f64>| p - centre - axis * (p - centre).dot(axis);
@@ -177,7 +181,7 @@ fn across(to: &Vector3<f64>) -> Vector3<f64> {
 }
 
 /// Places all along each loop of a face.
-fn loops(face: &Face) -> Vec<Vec<Vector3<f64>>> {
+pub(super) fn loops(face: &Face) -> Vec<Vec<Vector3<f64>>> {
     let loops = core::iter::once(&face.outer).chain(&face.inner);
     loops.map(places).collect()
 }

@@ -1,10 +1,13 @@
 //! What a face lies on, as formats know it.
 
+use nalgebra::Vector3;
 use nurbs::BSplineSurface;
 use reconstruct::{Face, Surface};
-use shapes::{Plane, Shape};
+use shapes::{Form, Plane, Shape};
 
 use super::analytic::Analytic;
+use super::support::Support;
+use super::swept::{By, Generated};
 use crate::common::SMOOTH_MM;
 
 /// A surface whose control points are this near to one plane is that plane.
@@ -17,6 +20,8 @@ pub(crate) enum Carrier {
     Plane(Flat),
     /// A cylinder, cone, sphere or torus.
     Round(Analytic),
+    /// What is extruded or turned.
+    Swept(Generated),
     /// Any other: the face's own patches.
     Spline,
 }
@@ -36,18 +41,56 @@ impl Carrier {
         if let Some(flat) = plane(&patches.to_bspline(SMOOTH_MM)) {
             return Self::Plane(flat);
         }
-        Analytic::of(face).map_or(Self::Spline, Self::Round)
+        let known = match &face.form {
+            Some(Form::Swept(swept)) => Generated::of(face, swept).map(Self::Swept),
+            _ => Analytic::of(face).map(Self::Round),
+        };
+        known.unwrap_or(Self::Spline)
     }
 
-    /// The shape that it is.
-    pub(crate) fn shape(&self) -> Option<Shape> {
+    /// What edges of the face are put on.
+    pub(super) fn support<'a>(&'a self, face: &'a Face) -> Support<'a> {
         match self {
-            Self::Plane(flat) => Some(Shape::Plane(Plane {
+            Self::Plane(flat) => Support::Shape(Shape::Plane(Plane {
                 point_mm: flat.origin_mm.into(),
                 normal: flat.normal.into(),
             })),
-            Self::Round(analytic) => Some(analytic.shape),
-            Self::Spline => None,
+            Self::Round(analytic) => Support::Shape(analytic.shape),
+            Self::Swept(generated) => Support::Swept(&generated.swept),
+            Self::Spline => {
+                let Surface::Patches(patches) = &face.surface;
+                Support::Patches(patches)
+            }
+        }
+    }
+
+    /// A point of the axis that the face is a ring about, and the axis; `None` where it is no ring.
+    pub(super) fn ring(&self) -> Option<[Vector3<f64>; 2]> {
+        match self {
+            Self::Round(round) if round.is_ring => {
+                Some([round.origin_mm.into(), round.axis.into()])
+            }
+            Self::Swept(generated) => match &generated.by {
+                By::Turn { is_ring: true, .. } => {
+                    let sweep = &generated.swept.sweep;
+                    Some([sweep.origin_mm, sweep.axis])
+                }
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// Puts the seam of a ring elsewhere: towards a unit vector square to its axis.
+    pub(super) fn turn(&mut self, towards: Vector3<f64>) {
+        match self {
+            Self::Round(round) => round.x = towards.into(),
+            Self::Swept(generated) => {
+                if let By::Turn { x, .. } = &mut generated.by {
+                    *x = towards;
+                }
+            }
+            Self::Plane(_) | Self::Spline => {}
         }
     }
 
@@ -55,7 +98,7 @@ impl Carrier {
     pub(crate) fn same_sense(&self) -> bool {
         match self {
             Self::Round(analytic) => analytic.same_sense,
-            Self::Plane(_) | Self::Spline => true,
+            Self::Plane(_) | Self::Swept(_) | Self::Spline => true,
         }
     }
 }

@@ -106,7 +106,7 @@ impl<'a> Ends<'a> {
         let points = groups.iter().zip(&of_groups).map(|(group, of)| {
             let point = middle(group, &self.points);
             // Where not all meet, those that are known best.
-            let shapes: Vec<Support<'_>> = of.iter().copied().filter(Support::is_shape).collect();
+            let shapes: Vec<Support<'_>> = of.iter().copied().filter(Support::is_known).collect();
             let common = onto::point(point, of).filter(|at| onto::farthest(*at, of) <= CORNER_MM);
             let common = common.or_else(|| onto::point(point, &shapes));
             common.unwrap_or(point)

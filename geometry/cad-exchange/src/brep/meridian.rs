@@ -34,16 +34,13 @@ const WIDEST_RAD: f64 = 0.15;
 pub(super) fn cut_rings(topology: &mut Topology, carriers: &mut [Carrier]) -> Vec<usize> {
     let mut whole = Vec::new();
     for (face, carrier) in carriers.iter_mut().enumerate() {
-        let Carrier::Round(round) = carrier else {
+        let Some(around) = carrier.ring() else {
             continue;
         };
-        if !round.is_ring {
-            continue;
-        }
-        match Cut::of(topology, face, round) {
+        match Cut::of(topology, face, around) {
             Some(cut) => {
-                round.x = cut.towards.into();
-                cut.apply(topology, face, round);
+                carrier.turn(cut.towards);
+                cut.apply(topology, face, carrier);
             }
             None => whole.push(face),
         }
@@ -65,9 +62,8 @@ struct Cut {
 impl Cut {
     /// Where the meridian through a vertex of one loop meets both but once, so that it does not
     /// leave the face between them.
-    fn of(topology: &Topology, face: usize, round: &Analytic) -> Option<Self> {
+    fn of(topology: &Topology, face: usize, [origin, axis]: [Vector3<f64>; 2]) -> Option<Self> {
         let loops = &topology.uses[face];
-        let (origin, axis) = (Vector3::from(round.origin_mm), Vector3::from(round.axis));
         let off = |place: [f64; 3]| {
             let from = Vector3::from(place) - origin;
             from - axis * from.dot(&axis)
@@ -130,7 +126,7 @@ impl Cut {
             .next()
     }
 
-    fn apply(&self, topology: &mut Topology, face: usize, round: &Analytic) {
+    fn apply(&self, topology: &mut Topology, face: usize, carrier: &Carrier) {
         let ((a, k), (b, at, t)) = (self.from, self.to);
         let near = topology.vertex_before(topology.uses[face][a][k]);
         let crossed = topology.uses[face][b][at];
@@ -142,7 +138,7 @@ impl Cut {
         let ends = [near, far].map(|vertex| topology.vertices[vertex]);
         topology.edges.push(Strand {
             ends: [near, far],
-            curve: meridian(round, ends),
+            curve: meridian(carrier, ends),
         });
         let seam = |forward: bool| Use {
             edge: topology.edges.len() - 1,
@@ -271,15 +267,24 @@ fn crossings(
 }
 
 /// The curve of a surface that lies in one half-plane with its axis, between two points of it.
-fn meridian(round: &Analytic, [from, to]: [[f64; 3]; 2]) -> PiecewiseCubic<3> {
+fn meridian(carrier: &Carrier, ends: [[f64; 3]; 2]) -> PiecewiseCubic<3> {
+    let curve = match carrier {
+        Carrier::Round(round) => Some(arc(round, ends)),
+        Carrier::Swept(generated) => generated.meridian(ends),
+        Carrier::Plane(_) | Carrier::Spline => None,
+    };
+    curve.unwrap_or_else(|| straight(ends[0], ends[1]))
+}
+
+/// The same of a shape.
+fn arc(round: &Analytic, [from, to]: [[f64; 3]; 2]) -> PiecewiseCubic<3> {
     let (origin, axis) = (Vector3::from(round.origin_mm), Vector3::from(round.axis));
     let x = Vector3::from(round.x);
-    let length = (Vector3::from(to) - Vector3::from(from)).norm();
     let (centre, radius_mm) = match round.shape.family() {
         Family::Sphere => (origin, round.lengths_mm[0]),
         Family::Torus => (origin + x * round.lengths_mm[0], round.lengths_mm[1]),
         Family::Plane | Family::Cylinder | Family::Cone => {
-            return straight(from, to, length);
+            return straight(from, to);
         }
     };
     let angle = |place: [f64; 3]| {
@@ -298,7 +303,7 @@ fn meridian(round: &Analytic, [from, to]: [[f64; 3]; 2]) -> PiecewiseCubic<3> {
     let each = swept / parts as f64;
     let width = radius_mm * each.abs();
     if width.is_nan() || width <= 0.0 {
-        return straight(from, to, length);
+        return straight(from, to);
     }
     // With this the middle of each piece is on the arc, too.
     let speed = 4.0 * libm::tan(each.abs() / 4.0) / each.abs();
@@ -322,7 +327,8 @@ fn meridian(round: &Analytic, [from, to]: [[f64; 3]; 2]) -> PiecewiseCubic<3> {
     bent(&PiecewiseCubic { breaks, pieces }, from, to)
 }
 
-fn straight(from: [f64; 3], to: [f64; 3], length: f64) -> PiecewiseCubic<3> {
+fn straight(from: [f64; 3], to: [f64; 3]) -> PiecewiseCubic<3> {
+    let length = (Vector3::from(to) - Vector3::from(from)).norm();
     let piece = |d: usize| [from[d], (to[d] - from[d]) / length, 0.0, 0.0];
     PiecewiseCubic {
         breaks: vec![0.0, length],
@@ -361,7 +367,7 @@ mod tests {
                 [10.0 + 3.0 * cos, 0.0, 3.0 * up * sin]
             };
             let (from, to) = (at(-0.1), at(core::f64::consts::PI + 0.15));
-            let arc = meridian(&round, [from, to]);
+            let arc = arc(&round, [from, to]);
             arc.validate().unwrap();
             let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|d| (a[d] - b[d]).abs() < 1e-9);
             assert!(near(arc.start(), from) && near(arc.end(), to));

@@ -10,14 +10,14 @@ mod meridian;
 mod onto;
 mod seam;
 mod support;
+mod swept;
 mod topology;
 
-use reconstruct::{Model, Surface};
-
-use support::Support;
+use reconstruct::Model;
 
 pub(crate) use analytic::Analytic;
 pub(crate) use carrier::{Carrier, Flat};
+pub(crate) use swept::{By, Generated};
 pub(crate) use topology::{Strand, Topology, Use};
 
 /// What a file asks of the edges that its faces share.
@@ -69,13 +69,7 @@ impl Brep {
 
     fn on(model: &Model, carriers: Vec<Carrier>, sharing: Sharing) -> Self {
         let both = model.faces.iter().zip(&carriers);
-        let supports = both.map(|(face, carrier)| {
-            let Surface::Patches(patches) = &face.surface;
-            carrier
-                .shape()
-                .map_or(Support::Patches(patches), Support::Shape)
-        });
-        let supports: Vec<_> = supports.collect();
+        let supports: Vec<_> = both.map(|(face, carrier)| carrier.support(face)).collect();
         Self {
             topology: topology::topology(model, &supports, sharing),
             carriers,

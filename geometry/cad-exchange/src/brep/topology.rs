@@ -283,14 +283,14 @@ impl Builder<'_> {
         let supports: Vec<Support<'_>> = faces.iter().map(|face| self.supports[*face]).collect();
         // Led first: what is put there with its ends stays there.
         let led = bent(curve, start, end);
-        let is_put = supports.iter().any(Support::is_shape);
+        let is_put = supports.iter().any(Support::is_known);
         let on = is_put.then(|| onto::curve(&led, &supports)).flatten();
         let led = on.map_or(led, |on| bent(&on, start, end));
         let curve = without_kinks(&led, SMOOTH_MM, self.rounding_mm);
         for (face, support) in faces.iter().zip(&supports) {
             let off_mm = onto::off(&curve, support);
             self.out.gap_mm = largest([self.out.gap_mm, off_mm]);
-            if support.is_shape() {
+            if support.is_known() {
                 let is_seen = onto::least_facing(&curve, support) >= LEAST_FACING;
                 let of_face = &mut self.out.off_mm[*face];
                 *of_face = largest([*of_face, if is_seen { off_mm } else { f64::INFINITY }]);

@@ -1,12 +1,13 @@
-//! Surfaces by their numbers: entities 190 to 198.
+//! Surfaces by their numbers: entities 190 to 198; and by their profiles: 120 and 122.
 
 use super::error::ReadError;
 use super::file::{Entity, File, Record};
+use super::model::{SplineCurve, curve};
 
 /// What a face may lie on.
-pub(super) const SURFACES: [u32; 7] = [114, 128, 190, 192, 194, 196, 198];
+pub(super) const SURFACES: [u32; 9] = [114, 120, 122, 128, 190, 192, 194, 196, 198];
 
-/// A surface by its numbers. Millimetres and radians.
+/// A surface by its numbers or its profile. Millimetres and radians.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnalyticSurface {
     /// Entity 190; the axis of its frame is its normal.
@@ -46,6 +47,22 @@ pub enum AnalyticSurface {
         /// Radius of the tube.
         tube_mm: f64,
     },
+    /// Entity 122.
+    Extrusion {
+        /// What is shifted.
+        profile: SplineCurve<3>,
+        /// Where its start comes to.
+        end_mm: [f64; 3],
+    },
+    /// Entity 120.
+    Revolution {
+        /// What is turned.
+        profile: SplineCurve<3>,
+        /// Two points of the axis, which leads from the first to the second.
+        axis_mm: [[f64; 3]; 2],
+        /// From the profile's place on so far to so far, radians.
+        angles_rad: [f64; 2],
+    },
 }
 
 /// Where a surface lies, and from where its angles count.
@@ -60,7 +77,36 @@ pub struct SurfaceFrame {
 }
 
 pub(super) fn is_analytic(entity: &Entity) -> bool {
-    (190..=198).contains(&entity.entity)
+    matches!(entity.entity, 120 | 122 | 190..=198)
+}
+
+/// Entity 122 or 120.
+pub(super) fn swept(
+    file: &File,
+    entity: &Entity,
+    record: &mut Record<'_>,
+) -> Result<AnalyticSurface, ReadError> {
+    if entity.entity == 122 {
+        let profile = curve(file, record.pointer("its directrix", &[112, 126])?)?;
+        let end_mm = record.reals("the end of its generatrix")?;
+        return Ok(AnalyticSurface::Extrusion { profile, end_mm });
+    }
+    let line = record.pointer("its axis", &[110])?;
+    if line.transformation != 0 {
+        return Err(file.defect(line, "transformed axes are not read"));
+    }
+    let mut of_line = file.record(line)?;
+    let axis_mm = [
+        of_line.reals("a coordinate of its start")?,
+        of_line.reals("a coordinate of its end")?,
+    ];
+    let profile = curve(file, record.pointer("its generatrix", &[112, 126])?)?;
+    let angles_rad = record.reals("an angle")?;
+    Ok(AnalyticSurface::Revolution {
+        profile,
+        axis_mm,
+        angles_rad,
+    })
 }
 
 /// One of entities 190 to 198 in its parameterised form.

@@ -5,7 +5,7 @@ use std::io::Read;
 
 use nurbs::{BSplineCurve, BSplineSurface, KnotVector, PatchSurface, PiecewiseCubic};
 
-use super::analytic::{AnalyticSurface, SURFACES, analytic, is_analytic};
+use super::analytic::{AnalyticSurface, SURFACES, analytic, is_analytic, swept};
 use super::error::ReadError;
 use super::file::{Entity, File, Record};
 use super::shell::{Shell, shells};
@@ -359,6 +359,7 @@ pub(super) fn surface(file: &File, entity: &Entity) -> Result<TrimmedSurface, Re
     match entity.entity {
         114 => patches(&mut record).map(TrimmedSurface::Patches),
         128 => bspline_surface(&mut record).map(TrimmedSurface::BSpline),
+        120 | 122 => swept(file, entity, &mut record).map(TrimmedSurface::Analytic),
         _ => analytic(file, entity, &mut record).map(TrimmedSurface::Analytic),
     }
 }

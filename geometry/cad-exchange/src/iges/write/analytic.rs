@@ -1,11 +1,15 @@
-//! Surfaces by their numbers: planes, cylinders, cones, spheres and tori (entities 190 to 198).
+//! Surfaces by their numbers: planes, cylinders, cones, spheres and tori (entities 190 to 198); and by
+//! their profiles: extrusions (122) and revolutions (120).
+
+use core::f64::consts::TAU;
 
 use shapes::Family;
 
+use super::Style;
 use super::error::WriteError;
-use super::shapes::plain_entry;
+use super::shapes::{Joined, curve, plain_entry};
 use super::sheet::{Entry, Pointer, Sheet, Status};
-use crate::brep::{Analytic, Flat};
+use crate::brep::{Analytic, By, Flat, Generated};
 
 /// Entity 190.
 pub(super) fn plane(sheet: &mut Sheet, level: u16, flat: &Flat) -> Result<Pointer, WriteError> {
@@ -50,6 +54,46 @@ pub(super) fn round_surface(
     }
     record.pointer(reference);
     record.finish()
+}
+
+/// Entities 120 and 122.
+pub(super) fn swept(
+    sheet: &mut Sheet,
+    style: Style,
+    of: &Generated,
+) -> Result<Pointer, WriteError> {
+    let profile = of.curve();
+    let joined = Joined {
+        curve: &profile,
+        end: profile.end(),
+        closed: false,
+        flat_mm: style.resolution_mm,
+    };
+    let generatrix = curve(sheet, style.entities, style.level, &joined)?;
+    match &of.by {
+        By::Shift { along_mm, .. } => {
+            let mut record = sheet.begin(plain_entry(122, style.level, Status::Dependent));
+            record.pointer(generatrix);
+            // Where the start of the curve comes to.
+            let start = profile.start();
+            let end: [f64; 3] = core::array::from_fn(|d| start[d] + along_mm[d]);
+            record.reals(&end);
+            record.finish()
+        }
+        By::Turn { .. } => {
+            let sweep = &of.swept.sweep;
+            let mut record = sheet.begin(plain_entry(110, style.level, Status::Dependent));
+            record.reals(sweep.origin_mm.as_slice());
+            // Its parameters come in the other order than in STEP, and so does its normal.
+            record.reals((sweep.origin_mm - sweep.axis).as_slice());
+            let axis = record.finish()?;
+            let mut record = sheet.begin(plain_entry(120, style.level, Status::Dependent));
+            record.pointer(axis);
+            record.pointer(generatrix);
+            record.reals(&[0.0, TAU]);
+            record.finish()
+        }
+    }
 }
 
 /// A surface with a direction from which its parameters count (form 1).

@@ -1,6 +1,6 @@
 //! The surface of a face, and its borders on the edges that it shares.
 //!
-//! On a surface by its numbers curves are given in space alone: a reader's parameters of it are its
+//! On a surface by its numbers or its profile curves are given in space alone: a reader's parameters of it are its
 //! own affair. On patches over x and y they are given as x and y, too.
 
 use nurbs::PiecewiseCubic;
@@ -46,6 +46,7 @@ pub(super) fn carrier_surface(
     let Surface::Patches(patches) = &face.surface;
     Ok(match carrier {
         Carrier::Plane(flat) => (analytic::plane(sheet, style.level, flat)?, false),
+        Carrier::Swept(generated) => (analytic::swept(sheet, style, generated)?, false),
         Carrier::Round(round) => (analytic::round_surface(sheet, style.level, round)?, false),
         Carrier::Spline => (surface(sheet, style.entities, style.level, patches)?, true),
     })

@@ -135,6 +135,23 @@ pub enum StepSurface {
         /// Radius of the tube.
         tube_mm: f64,
     },
+    /// `SURFACE_OF_LINEAR_EXTRUSION`, its normal the tangent of the profile times the direction.
+    Extrusion {
+        /// What is shifted.
+        profile: BSplineCurve<3>,
+        /// How far and where to.
+        along_mm: [f64; 3],
+    },
+    /// `SURFACE_OF_REVOLUTION`, its normal the velocity about the axis times the tangent of the
+    /// profile.
+    Revolution {
+        /// What is turned.
+        profile: BSplineCurve<3>,
+        /// A point of the axis.
+        origin_mm: [f64; 3],
+        /// The axis.
+        axis: [f64; 3],
+    },
     /// `B_SPLINE_SURFACE_WITH_KNOTS`.
     BSpline(BSplineSurface),
 }

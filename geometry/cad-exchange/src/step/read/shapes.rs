@@ -6,12 +6,14 @@ use super::exchange::{Exchange, Fields};
 use super::{ReadError, StepFrame, StepSurface};
 
 /// Surfaces that are read.
-pub(super) const SURFACES: [&str; 6] = [
+pub(super) const SURFACES: [&str; 8] = [
     "B_SPLINE_SURFACE_WITH_KNOTS",
     "CONICAL_SURFACE",
     "CYLINDRICAL_SURFACE",
     "PLANE",
     "SPHERICAL_SURFACE",
+    "SURFACE_OF_LINEAR_EXTRUSION",
+    "SURFACE_OF_REVOLUTION",
     "TOROIDAL_SURFACE",
 ];
 
@@ -73,6 +75,23 @@ impl Shapes<'_, '_> {
             return self.spline(fields).map(StepSurface::BSpline);
         }
         fields.skip("its name")?;
+        if keyword == "SURFACE_OF_LINEAR_EXTRUSION" {
+            return Ok(StepSurface::Extrusion {
+                profile: self.curve(fields.id("its curve")?)?,
+                along_mm: self.vector(fields.id("its direction")?)?,
+            });
+        }
+        if keyword == "SURFACE_OF_REVOLUTION" {
+            let profile = self.curve(fields.id("its curve")?)?;
+            let axis = fields.id("its axis")?;
+            let mut axis = self.exchange.fields(axis, &["AXIS1_PLACEMENT"])?;
+            axis.skip("its name")?;
+            return Ok(StepSurface::Revolution {
+                profile,
+                origin_mm: self.point(axis.id("its location")?)?,
+                axis: self.triple(axis.id("its direction")?, "DIRECTION", 1.0)?,
+            });
+        }
         let frame = self.frame(fields.id("its placement")?)?;
         let mut radius_mm = |what| self.length_mm(&mut fields, what);
         Ok(match keyword {
@@ -100,6 +119,14 @@ impl Shapes<'_, '_> {
                 x: frame.x,
             },
         })
+    }
+
+    fn vector(&self, id: u64) -> Result<[f64; 3], ReadError> {
+        let mut fields = self.exchange.fields(id, &["VECTOR"])?;
+        fields.skip("its name")?;
+        let direction = self.triple(fields.id("its direction")?, "DIRECTION", 1.0)?;
+        let length_mm = self.length_mm(&mut fields, "its length")?;
+        Ok(direction.map(|c| c * length_mm))
     }
 
     fn frame(&self, placement: u64) -> Result<StepFrame, ReadError> {

@@ -1,12 +1,12 @@
 //! Points, curves and surfaces (ISO 10303-42, clause 4).
 
-use nurbs::{KnotVector, PatchSurface};
+use nurbs::{KnotVector, PatchSurface, PiecewiseCubic};
 use reconstruct::Surface;
 use shapes::Family;
 
 use super::data::{Data, Id, Values};
 use super::options::LengthUnit;
-use crate::brep::{Analytic, Carrier, Strand};
+use crate::brep::{Analytic, By, Carrier, Generated, Strand};
 use crate::common::SMOOTH_MM;
 
 /// Writes shapes in the unit of the file.
@@ -54,7 +54,8 @@ impl Shapes {
         })
     }
 
-    /// What a face lies on: an `elementary_surface`, or `B_SPLINE_SURFACE_WITH_KNOTS`.
+    /// What a face lies on: an `elementary_surface`, a `swept_surface`, or
+    /// `B_SPLINE_SURFACE_WITH_KNOTS`.
     pub(super) fn surface(&self, data: &mut Data, carrier: &Carrier, surface: &Surface) -> Id {
         let Surface::Patches(patches) = surface;
         match carrier {
@@ -66,6 +67,7 @@ impl Shapes {
                 })
             }
             Carrier::Round(analytic) => self.analytic(data, analytic),
+            Carrier::Swept(generated) => self.swept(data, generated),
             Carrier::Spline => self.patches(data, patches),
         }
     }
@@ -91,6 +93,49 @@ impl Shapes {
                 .into_iter()
                 .for_each(|angle| v.real(angle));
         })
+    }
+
+    /// A surface by its profile.
+    fn swept(&self, data: &mut Data, carrier: &Generated) -> Id {
+        let curve = carrier.curve();
+        let profile = self.spline(data, &curve, [curve.start(), curve.end()]);
+        let direction = |data: &mut Data, along: [f64; 3]| {
+            data.add("DIRECTION", |v| {
+                v.text("");
+                v.reals(&along);
+            })
+        };
+        match &carrier.by {
+            By::Shift { along_mm, .. } => {
+                let length_mm = along_mm.norm();
+                let direction = direction(data, (along_mm / length_mm).into());
+                let vector = data.add("VECTOR", |v| {
+                    v.text("");
+                    v.id(direction);
+                    v.real(length_mm / self.unit.mm());
+                });
+                data.add("SURFACE_OF_LINEAR_EXTRUSION", |v| {
+                    v.text("");
+                    v.id(profile);
+                    v.id(vector);
+                })
+            }
+            By::Turn { .. } => {
+                let sweep = &carrier.swept.sweep;
+                let origin = self.point(data, "", sweep.origin_mm.into());
+                let axis = direction(data, sweep.axis.into());
+                let axis = data.add("AXIS1_PLACEMENT", |v| {
+                    v.text("");
+                    v.id(origin);
+                    v.id(axis);
+                });
+                data.add("SURFACE_OF_REVOLUTION", |v| {
+                    v.text("");
+                    v.id(profile);
+                    v.id(axis);
+                })
+            }
+        }
     }
 
     fn patches(&self, data: &mut Data, patches: &PatchSurface) -> Id {
@@ -119,7 +164,11 @@ impl Shapes {
 
     /// `B_SPLINE_CURVE_WITH_KNOTS`, from vertex to vertex.
     pub(super) fn curve(&self, data: &mut Data, strand: &Strand, ends_mm: [[f64; 3]; 2]) -> Id {
-        let spline = strand.curve.to_bspline(SMOOTH_MM);
+        self.spline(data, &strand.curve, ends_mm)
+    }
+
+    fn spline(&self, data: &mut Data, curve: &PiecewiseCubic<3>, ends_mm: [[f64; 3]; 2]) -> Id {
+        let spline = curve.to_bspline(SMOOTH_MM);
         let last = spline.points().len().saturating_sub(1);
         let points: Vec<Id> = spline
             .points()
