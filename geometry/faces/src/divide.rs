@@ -2,7 +2,7 @@
 
 use range_image::{Cancelled, Monitor, RangeImage, RegionMap};
 use rayon::prelude::*;
-use shapes::{Fit, decide};
+use shapes::{Fit, decide, swept};
 
 use crate::compete::{NONE, Pieces};
 use crate::field::{Field, Set, places};
@@ -16,6 +16,8 @@ use crate::strain::is_strained;
 const SAMPLES: usize = 4000;
 /// Samples by which regions are told where only their borders are at stake.
 const SOME: usize = 1000;
+/// Samples by which a region is told to be swept.
+const SWEPT: usize = 6000;
 
 /// What becomes of the regions of an image.
 #[derive(Debug, Clone)]
@@ -52,6 +54,7 @@ pub fn divide(
         }
         let (pieces, swept) = match split_profile(&field, monitor)? {
             Some(parted) => (parted.pieces, parted.swept),
+            None if is_swept(&field) => (Vec::new(), 0),
             None => (split(&field, monitor)?.unwrap_or_default(), 0),
         };
         let of_image = |set: &Set| {
@@ -207,6 +210,12 @@ fn is_one(field: &Field<'_>) -> bool {
     let all = field.all();
     let fit = field.fit(&all, 2, SAMPLES);
     fit.is_some_and(|fit| !is_strained(field, &fit, &all))
+}
+
+/// Whether a region is of one profile that is swept, no chain of lines and arcs but as smooth as a
+/// spline.
+fn is_swept(field: &Field<'_>) -> bool {
+    swept(&field.samples(&field.all(), 2, SWEPT), field.area()).is_some()
 }
 
 #[cfg(test)]

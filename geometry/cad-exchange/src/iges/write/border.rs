@@ -113,6 +113,8 @@ pub(super) fn plan(curve: &PiecewiseCubic<3>) -> PiecewiseCubic<2> {
             let mut both = on.iter().zip([x, y]);
             both.all(|(on, c)| {
                 let apart = on.iter().zip(c).map(|(a, b)| (a - b).abs());
+                // Slopes agree as well, however short the piece is: readers split curves at kinks.
+                let width = width.max(1.0);
                 let powers = [1.0, width, width * width, width * width * width];
                 apart.zip(powers).all(|(off, by)| off * by <= SAME_PIECE_MM)
             })
