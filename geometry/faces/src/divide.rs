@@ -18,6 +18,11 @@ const SAMPLES: usize = 4000;
 const SOME: usize = 1000;
 /// Samples by which a region is told to be swept.
 const SWEPT: usize = 6000;
+/// Fewest pieces that may be shards of what is swept, how many times as many numbers they have, and
+/// how many a piece of no shape counts for.
+const FEWEST_SHARDS: usize = 3;
+const SHARDS: usize = 2;
+const FREE: usize = 10;
 
 /// What becomes of the regions of an image.
 #[derive(Debug, Clone)]
@@ -54,8 +59,11 @@ pub fn divide(
         }
         let (pieces, swept) = match split_profile(&field, monitor)? {
             Some(parted) => (parted.pieces, parted.swept),
-            None if is_swept(&field) => (Vec::new(), 0),
-            None => (split(&field, monitor)?.unwrap_or_default(), 0),
+            None => {
+                let pieces = split(&field, monitor)?;
+                let pieces = pieces.filter(|pieces| !are_shards(&field, pieces));
+                (pieces.unwrap_or_default(), 0)
+            }
         };
         let of_image = |set: &Set| {
             let nodes = places(set)
@@ -212,10 +220,20 @@ fn is_one(field: &Field<'_>) -> bool {
     fit.is_some_and(|fit| !is_strained(field, &fit, &all))
 }
 
-/// Whether a region is of one profile that is swept, no chain of lines and arcs but as smooth as a
-/// spline.
-fn is_swept(field: &Field<'_>) -> bool {
-    swept(&field.samples(&field.all(), 2, SWEPT), field.area()).is_some()
+/// Whether shapes are many that one profile explains, as smooth as a spline, when it is swept: they
+/// have far more numbers than that.
+fn are_shards(field: &Field<'_>, pieces: &[Set]) -> bool {
+    if pieces.len() < FEWEST_SHARDS {
+        return false;
+    }
+    let Some(one) = swept(&field.samples(&field.all(), 2, SWEPT), field.area()) else {
+        return false;
+    };
+    let freedom = |piece: &Set| {
+        let fit = field.fit(piece, 1, SOME);
+        fit.map_or(FREE, |fit| fit.shape.family().freedom())
+    };
+    pieces.iter().map(freedom).sum::<usize>() >= SHARDS * one.freedom
 }
 
 #[cfg(test)]
