@@ -242,7 +242,8 @@ fn freedom(report: &Report) -> Section {
                 " independent samples. Each parameter takes up the noise of one sample, whatever \
                  the surface: with p parameters and n samples, about the square root of p / n of \
                  the noise of a single sample is in the surface. A face that is a plane, sphere, \
-                 cylinder, cone or torus has 3 to 7 parameters; a free form has as many as its \
+                 cylinder, cone or torus has 3 to 7 parameters, an extrusion or a revolution 2 or \
+                 4 and those of its profile; a free form has as many as its \
                  nodes gave reason for.",
             ),
     )];
