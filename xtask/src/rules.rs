@@ -169,7 +169,8 @@ const EVERYTHING: [&str; 15] = [
     "storage",
 ];
 
-const STUDIES: [&str; 16] = [
+const STUDIES: [&str; 17] = [
+    "cad-exchange",
     "deliverables",
     "nurbs",
     "pipeline",

@@ -1,9 +1,11 @@
-//! Edges of a model where two surfaces meet, against the true edges.
+//! Edges of the STEP file that two faces share, against the true edges.
 
 use std::collections::BTreeMap;
 
+use anyhow::{Context, Result};
+use cad_exchange::step;
 use nalgebra::Vector3;
-use reconstruct::model::{EdgeKind, Model, Surface};
+use reconstruct::model::{Face, Model, Surface};
 
 use crate::grid::Matched;
 use crate::part::TrueEdge;
@@ -15,14 +17,16 @@ const SEEN_MM: f64 = 1.0;
 const NEAR_MM: f64 = 0.5;
 /// Surfaces meet where they are no farther apart than this.
 pub(crate) const MEETS_MM: f64 = 0.01;
-/// Points to a piece of an edge's path.
+/// Points to a piece of an edge.
 const PER_PIECE: usize = 16;
+/// A section that leads on beyond a free end by more than this, of its distance, is not beside it.
+const BEYOND: f64 = 0.5;
 
 /// Lengths of true edges between faces that are seen, and what stands for them.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Edges {
     pub(crate) true_mm: f64,
-    /// A crease of the model between the two faces' regions is near.
+    /// An edge that the two faces' regions share is near.
     pub(crate) near_mm: f64,
     /// And the two surfaces meet in it.
     pub(crate) met_mm: f64,
@@ -43,8 +47,10 @@ impl Edges {
     }
 }
 
-/// A point of a crease, and how far apart the surfaces are there.
+/// A point of a shared edge, and how far the two surfaces are off it, taken together.
 type CreasePoint = (Vector3<f64>, f64);
+/// Polylines of the edges that two true faces' regions share.
+type Creases = BTreeMap<[usize; 2], Vec<Vec<CreasePoint>>>;
 
 /// Lengths of sharp true edges, and of those where faces join smoothly.
 pub(crate) fn compare(
@@ -52,8 +58,11 @@ pub(crate) fn compare(
     model: &Model,
     truth: &TruthGrid,
     matched: &Matched,
-) -> (Edges, Edges) {
-    let creases = creases(model, matched);
+) -> Result<(Edges, Edges)> {
+    Ok(lengths(edges, &creases(model, matched)?, truth))
+}
+
+fn lengths(edges: &[TrueEdge], creases: &Creases, truth: &TruthGrid) -> (Edges, Edges) {
     let (mut sharp, mut smooth) = (Edges::default(), Edges::default());
     for edge in edges {
         let told = if edge.is_smooth {
@@ -84,21 +93,31 @@ pub(crate) fn compare(
     (sharp, smooth)
 }
 
-/// Distance from the nearest of the polylines, and the gap there.
+/// Distance from the nearest of the polylines, and the gap there; `None` where the nearest place is an
+/// end, and the way there leads along the edge: that does not reach so far.
 fn nearest(creases: &[Vec<CreasePoint>], point: &Vector3<f64>) -> Option<(f64, f64)> {
-    let sections = creases.iter().flat_map(|crease| crease.windows(2));
-    let each = sections.map(|section| {
+    let sections = creases.iter().flat_map(|crease| {
+        let last = crease.len().saturating_sub(2);
+        let of = crease.windows(2).enumerate();
+        of.map(move |(k, pair)| (pair, [k == 0, k == last]))
+    });
+    let each = sections.map(|(section, is_end)| {
         let ((a, gap_a), (b, gap_b)) = (section[0], section[1]);
         let along = b - a;
         let squared = along.norm_squared();
         let share = if squared > 0.0 {
-            ((point - a).dot(&along) / squared).clamp(0.0, 1.0)
+            (point - a).dot(&along) / squared
         } else {
             0.0
         };
-        ((a + along * share - point).norm(), gap_a.max(gap_b))
+        let way = a + along * share.clamp(0.0, 1.0) - point;
+        let is_beyond = (is_end[0] && share < 0.0) || (is_end[1] && share > 1.0);
+        let beyond = way.dot(&along).abs() / squared.sqrt().max(f64::MIN_POSITIVE);
+        let is_beside = !is_beyond || beyond <= BEYOND * way.norm();
+        (way.norm(), is_beside.then_some(gap_a.max(gap_b)))
     });
-    each.min_by(|a, b| a.0.total_cmp(&b.0))
+    let (distance_mm, gap_mm) = each.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some((distance_mm, gap_mm?))
 }
 
 /// Edges between two faces on which these do not meet, for who looks for the cause.
@@ -142,103 +161,176 @@ pub(crate) fn apart(model: &Model) -> Vec<String> {
     found
 }
 
-/// The creases of a model by the true faces that their regions stand for.
-fn creases(model: &Model, matched: &Matched) -> BTreeMap<[usize; 2], Vec<Vec<CreasePoint>>> {
-    let mut users: Vec<Vec<usize>> = vec![Vec::new(); model.edges.len()];
-    for (index, face) in model.faces.iter().enumerate() {
-        let loops = core::iter::once(&face.outer).chain(&face.inner);
-        for coedge in loops.flat_map(|l| &l.coedges) {
-            if let Some(users) = users.get_mut(coedge.edge.0) {
-                users.push(index);
-            }
+/// The edges that two faces of the written file share, by the true faces that their regions stand for.
+fn creases(model: &Model, matched: &Matched) -> Result<Creases> {
+    let mut file = Vec::new();
+    let options = step::WriteOptions::new("part", "2026-01-01T00:00:00");
+    step::write(model, &options, &mut file).context("no STEP file of it can be written")?;
+    let read = step::read_model(&file[..]).context("its STEP file cannot be read")?;
+    let by_name: BTreeMap<&str, &Face> = model.faces.iter().map(|f| (&*f.name, f)).collect();
+    let mut users: Vec<Vec<&Face>> = vec![Vec::new(); read.edges.len()];
+    for face in &read.faces {
+        let of = by_name.get(&*face.name).context("a face has no name")?;
+        for border in core::iter::once(&face.outer).chain(&face.inner).flatten() {
+            users[border.edge].push(of);
         }
     }
-    let mut found: BTreeMap<_, Vec<_>> = BTreeMap::new();
-    for (edge, users) in model.edges.iter().zip(&users) {
-        let (EdgeKind::Crease, &[first, second]) = (edge.kind, users.as_slice()) else {
+    let mut found = Creases::new();
+    for (edge, users) in read.edges.iter().zip(&users) {
+        let &[first, second] = users.as_slice() else {
             continue;
         };
-        let faces = [&model.faces[first], &model.faces[second]];
+        // A face that closes on itself has its seam twice.
+        let faces = [first, second];
         let real = faces.map(|face| matched.face_of_region.get(&face.region).copied());
-        let [Some(a), Some(b)] = real else { continue };
-        let points = edge.path.sampled(PER_PIECE).into_iter().map(|[x, y]| {
-            let z = faces.map(|face| {
-                let Surface::Patches(surface) = &face.surface;
-                surface.z(x, y)
-            });
-            let at = Vector3::new(x, y, (z[0] + z[1]) / 2.0);
-            (at, (z[0] - z[1]).abs())
-        });
+        let ([Some(a), Some(b)], false) = (real, first.name == second.name) else {
+            continue;
+        };
+        let breaks = edge.curve.knots().breaks();
+        let mut points = Vec::new();
+        for (k, ends) in breaks.windows(2).enumerate() {
+            let at = |n: usize| ends[0] + (ends[1] - ends[0]) * n as f64 / PER_PIECE as f64;
+            points.extend((usize::from(k > 0)..=PER_PIECE).map(|n| {
+                let at = Vector3::from(edge.curve.evaluate(at(n)));
+                (at, faces.iter().map(|face| off(face, &at)).sum::<f64>())
+            }));
+        }
         let own = found.entry([a.min(b), a.max(b)]).or_default();
-        own.push(points.collect());
+        own.push(points);
     }
-    found
+    Ok(found)
+}
+
+/// How far a place is off the surface of a face, millimetres.
+fn off(face: &Face, at: &Vector3<f64>) -> f64 {
+    if let Some(form) = &face.form {
+        return form.distance_mm(at).abs();
+    }
+    let Surface::Patches(surface) = &face.surface;
+    let [_, _, facing] = surface.normal(at.x, at.y);
+    ((at.z - surface.z(at.x, at.y)) * facing).abs()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trims::tests::square;
     use crate::truth_grid::tests::step;
-    use nurbs::PiecewiseCubic;
-    use reconstruct::model::{Edge, EdgeId, VertexId};
+    use nurbs::{PatchSurface, PiecewiseCubic};
+    use reconstruct::model::{Coedge, Edge, EdgeId, EdgeKind, Loop, Vertex, VertexId};
 
     /// Two level faces with a crease along x = `x`, one `gap` above the other.
     fn model(x: f64, gap: f64) -> Model {
-        let mut faces = vec![
-            square(1, [-10.0, 0.0], 10.0, None, 0.0),
-            square(2, [10.0, 0.0], 10.0, None, gap),
+        let places = [
+            [-20.0, -10.0],
+            [x, -10.0],
+            [x, 10.0],
+            [-20.0, 10.0],
+            [20.0, -10.0],
+            [20.0, 10.0],
         ];
-        // The first side of either is the shared one.
-        for face in &mut faces {
-            face.outer.coedges[0].edge = EdgeId(0);
-            for (k, coedge) in face.outer.coedges.iter_mut().enumerate().skip(1) {
-                coedge.edge = EdgeId(usize::from(face.region) * 10 + k);
+        // The first is the shared one.
+        let ends = [[1, 2], [0, 1], [2, 3], [3, 0], [1, 4], [4, 5], [5, 2]];
+        let line = |[from, to]: [usize; 2]| {
+            let (p, q): ([f64; 2], [f64; 2]) = (places[from], places[to]);
+            let length = (q[0] - p[0]).abs() + (q[1] - p[1]).abs();
+            PiecewiseCubic::line(p, q, length).unwrap()
+        };
+        let edge = |(k, ends): (usize, [usize; 2])| Edge {
+            start: VertexId(ends[0]),
+            end: VertexId(ends[1]),
+            kind: if k == 0 {
+                EdgeKind::Crease
+            } else {
+                EdgeKind::Silhouette
+            },
+            origin: reconstruct::EdgeOrigin::Intersected,
+            path: line(ends),
+        };
+        let face = |region: u16, uses: [(usize, bool); 4], z: f64| {
+            let coedge = |(edge, reversed): (usize, bool)| {
+                let path = line(ends[edge]);
+                let parameter_curve = if reversed { path.reversed() } else { path };
+                let up = |piece: &[[f64; 4]; 2]| [piece[0], piece[1], [z, 0.0, 0.0, 0.0]];
+                let pieces = parameter_curve.pieces.iter().map(up).collect();
+                Coedge {
+                    edge: EdgeId(edge),
+                    reversed,
+                    space_curve: PiecewiseCubic::new(parameter_curve.breaks.clone(), pieces)
+                        .unwrap(),
+                    parameter_curve,
+                }
+            };
+            let side = vec![-30.0, 30.0];
+            let surface = PatchSurface::through_thirds(side.clone(), side, |_, _| z).unwrap();
+            Face {
+                name: format!("R{region}"),
+                region,
+                surface: Surface::Patches(surface),
+                form: None,
+                outer: Loop {
+                    coedges: uses.map(coedge).to_vec(),
+                },
+                inner: Vec::new(),
             }
-        }
+        };
         Model {
-            vertices: Vec::new(),
-            edges: vec![Edge {
-                start: VertexId(0),
-                end: VertexId(1),
-                kind: EdgeKind::Crease,
-                origin: reconstruct::EdgeOrigin::Intersected,
-                path: PiecewiseCubic::line([x, -10.0], [x, 10.0], 20.0).unwrap(),
-            }],
-            faces,
+            vertices: places.map(|[x_mm, y_mm]| Vertex { x_mm, y_mm }).to_vec(),
+            edges: ends.into_iter().enumerate().map(edge).collect(),
+            faces: vec![
+                face(1, [(1, false), (0, false), (2, false), (3, false)], 0.0),
+                face(2, [(4, false), (5, false), (6, false), (0, true)], gap),
+            ],
         }
     }
 
-    fn told(x: f64, gap: f64) -> (Edges, Edges) {
+    /// A true edge along x = 0 from y = -5 to so far.
+    fn told(x: f64, gap: f64, to: f64) -> (Edges, Edges) {
         let (_, truth) = step(0.0);
-        let edge = |is_smooth| TrueEdge {
+        let edge = TrueEdge {
             faces: [0, 1],
-            is_smooth,
-            points_mm: (0..=20)
-                .map(|k| [0.0, f64::from(k) * 0.5 - 5.0, 0.0])
+            is_smooth: false,
+            points_mm: (0..=100)
+                .map(|k| [0.0, -5.0 + (to + 5.0) * f64::from(k) / 100.0, 0.0])
                 .collect(),
         };
         let matched = Matched {
             face_of_region: [(1, 0), (2, 1)].into(),
             found_faces: vec![0, 1],
         };
-        compare(&[edge(false)], &model(x, gap), &truth, &matched)
+        compare(&[edge], &model(x, gap), &truth, &matched).unwrap()
     }
 
     #[test]
     fn a_crease_is_as_far_off_as_it_was_moved() {
-        let (sharp, smooth) = told(0.03, 0.0);
+        let (sharp, smooth) = told(0.03, 0.0, 5.0);
         assert!((sharp.true_mm - 10.0).abs() < 1e-9);
         assert!((sharp.met_mm - 10.0).abs() < 1e-9);
         assert!((sharp.rms_mm() - 0.03).abs() < 1e-9);
         assert_eq!(smooth, Edges::default());
-        assert_eq!(told(0.7, 0.0).0.near_mm, 0.0);
+        assert_eq!(told(0.7, 0.0, 5.0).0.near_mm, 0.0);
     }
 
     #[test]
     fn where_surfaces_do_not_meet_nothing_is_intersected() {
-        let (sharp, _) = told(0.0, 0.05);
+        let (sharp, _) = told(0.0, 0.05, 5.0);
         assert!((sharp.near_mm - 10.0).abs() < 1e-9);
         assert_eq!(sharp.met_mm, 0.0);
+    }
+
+    #[test]
+    fn beyond_its_end_an_edge_is_not_near() {
+        let crease = |x: f64| -> Vec<CreasePoint> {
+            let at = |k: u32| (Vector3::new(x, f64::from(k), 0.0), 0.0);
+            (0..=3).map(at).collect()
+        };
+        let near = |x: f64, y: f64| nearest(&[crease(0.1)], &Vector3::new(x, y, 0.0));
+        let (distance_mm, _) = near(0.0, 1.5).unwrap();
+        assert!((distance_mm - 0.1).abs() < 1e-12);
+        assert_eq!(near(0.0, 3.2), None);
+        assert_eq!(near(0.0, -0.2), None);
+        // Hardly beyond it, but aside.
+        let (distance_mm, _) = near(0.0, 3.01).unwrap();
+        assert!((0.1..0.102).contains(&distance_mm));
+        assert_eq!(nearest(&[], &Vector3::zeros()), None);
     }
 }

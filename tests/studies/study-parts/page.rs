@@ -148,11 +148,12 @@ fn trims(totals: &Totals) -> String {
 fn edges(totals: &Totals) -> String {
     let (sharp, smooth) = totals.edges();
     let mut out = format!(
-        "True edges of two faces that are both seen beside them. An edge is intersected where a \
-         crease between the two faces' regions lies within half a millimetre, and their surfaces \
-         are no more than {MEETS_MM} mm apart in it; smooth ones are those where the faces have \
-         one tangent plane.\n\n\
-         | edges | length, mm | with a crease near, % | intersected, % | rms distance of these, mm \
+        "True edges of two faces that are both seen beside them, against those of the STEP file. An \
+         edge is intersected where one that the two faces' regions share lies within half a \
+         millimetre, beside it and not beyond its end, and their surfaces are no more than \
+         {MEETS_MM} mm off it together; smooth ones are those where the faces have one tangent \
+         plane.\n\n\
+         | edges | length, mm | with a shared one near, % | intersected, % | rms distance of these, mm \
          |\n| --- | ---: | ---: | ---: | ---: |\n"
     );
     for (what, edges) in [("sharp", sharp), ("smooth", smooth)] {
