@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 
 use super::fit::{Fitted, STEPS, SweptFit};
+use super::motion::Sweep;
 use super::motions::{Normal, motions};
 use crate::evidence::{CAUTION, Scale, Surface, polynomials_of};
 use crate::fit::Sample;
@@ -81,26 +82,7 @@ pub fn swept(samples: &[Sample], area: f64) -> Option<SweptFit> {
         if first.spline.deviation() > MOST_LEFT * least {
             continue;
         }
-        let mut sweep = first.sweep;
-        let (mut least, mut worse) = (f64::INFINITY, 0);
-        for spans in SPANS {
-            let Some(fitted) = Fitted::of(&sweep, &many, spans, STEPS) else {
-                continue;
-            };
-            sweep = fitted.sweep;
-            scale.surfaces.push(Surface {
-                off: fitted.spline.offs.clone(),
-                freedom: fitted.freedom(),
-                fit: None,
-            });
-            found.push(fitted);
-            let score = scale.scored().last().map(|(own, _)| own.score)?;
-            worse = if score < least { 0 } else { worse + 1 };
-            least = least.min(score);
-            if worse == ENOUGH_WORSE {
-                break;
-            }
-        }
+        found.extend(with_spans(first.sweep, &many, &mut scale));
     }
     let scored = scale.scored();
     let score = |k: usize| scored[k].0.score;
@@ -116,6 +98,32 @@ pub fn swept(samples: &[Sample], area: f64) -> Option<SweptFit> {
     let fitted = found.swap_remove(good);
     let told = fitted.told(&many, area)?;
     (told.direction_rad.most() <= LEAST_KNOWN_RAD).then_some(told)
+}
+
+/// A motion with profiles of ever more spans, as long as these are better; all come onto the scale.
+fn with_spans(mut sweep: Sweep, samples: &[Sample], scale: &mut Scale) -> Vec<Fitted> {
+    let mut found = Vec::new();
+    let (mut least, mut worse) = (f64::INFINITY, 0);
+    for spans in SPANS {
+        let Some(fitted) = Fitted::of(&sweep, samples, spans, STEPS) else {
+            continue;
+        };
+        sweep = fitted.sweep;
+        scale.surfaces.push(Surface {
+            off: fitted.spline.offs.clone(),
+            freedom: fitted.freedom(),
+            fit: None,
+        });
+        found.push(fitted);
+        let own = scale.scored().pop();
+        let score = own.map_or(f64::INFINITY, |(own, _)| own.score);
+        worse = if score < least { 0 } else { worse + 1 };
+        least = least.min(score);
+        if worse == ENOUGH_WORSE {
+            break;
+        }
+    }
+    found
 }
 
 /// The best of each kind of motion that normals tell, held against some of the samples.
