@@ -36,6 +36,20 @@ fn stepped(model: &Model, unit: LengthUnit) -> step::StepModel {
     read
 }
 
+/// What is said of a sample's STEP file in which some text is another.
+fn refusal(name: &str, from: &str, to: &str) -> String {
+    let model = sample::of_shape(name).unwrap();
+    let options = step::WriteOptions::new("part", "2026-11-21T09:30:00");
+    let mut file = Vec::new();
+    step::write(&model, &options, &mut file).unwrap();
+    let text = String::from_utf8(file).unwrap();
+    assert!(text.contains(from), "{from}");
+    let changed = text.replacen(from, to, 1);
+    step::read_model(changed.as_bytes())
+        .unwrap_err()
+        .to_string()
+}
+
 fn igesed(model: &Model, entities: Entities) -> iges::TrimmedModel {
     let options = iges::WriteOptions {
         entities,
@@ -209,4 +223,21 @@ fn what_cannot_be_written_by_its_profile_is_a_spline() {
         let is_spline = matches!(read.faces[0].surface, StepSurface::BSpline(_));
         assert_eq!(is_spline, !is_written, "{of:?}");
     }
+}
+
+#[test]
+fn what_is_damaged_is_told() {
+    let told = refusal("extrusion", "=VECTOR('',", "=VECTOR('',$,");
+    assert!(told.contains("VECTOR (#"), "{told}");
+    let told = refusal("revolution", "=AXIS1_PLACEMENT(", "=AXIS2_PLACEMENT_3D(");
+    assert!(told.contains("expected AXIS1_PLACEMENT"), "{told}");
+    let told = refusal(
+        "revolution",
+        "=B_SPLINE_CURVE_WITH_KNOTS('',3,",
+        "=LINE('',3,",
+    );
+    assert!(
+        told.contains("expected B_SPLINE_CURVE_WITH_KNOTS"),
+        "{told}"
+    );
 }
