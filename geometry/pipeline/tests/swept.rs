@@ -49,7 +49,10 @@ fn swept(outcome: &Outcome) -> Swept {
     let kind = &outcome.kinds[usize::from(face.region) - 1];
     assert!(matches!(&kind.evidence.verdict, Verdict::Swept(fit) if fit.swept == **swept));
     let fits = &outcome.reconstruction.regions;
-    let fit = fits.iter().find(|fit| fit.label == face.region).unwrap();
+    let fit = fits
+        .iter()
+        .find(|fit| fit.label == face.region)
+        .expect("it has a fit");
     assert_eq!(
         Some(fit.parameters),
         kind.known().map(|known| known.freedom)
