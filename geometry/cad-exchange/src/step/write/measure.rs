@@ -2,11 +2,16 @@
 //!
 //! By Green's theorem the integral of a function over a face is that of its antiderivative
 //! in x along the loops. Both integrals are sums of Gauss rules over parts in which the
-//! surface is smooth: the curves of the model are cut where they cross the borders of
+//! surface is smooth: the curves of the file are cut where they cross the borders of
 //! patches.
+//!
+//! The edge of two faces lies between them. Readers trim each by the foot of the edge on it, so
+//! what is between the edge and its foot counts, too.
 
-use nurbs::PatchSurface;
-use reconstruct::{Face, Loop, Model, Surface};
+use nurbs::{PatchSurface, PiecewiseCubic};
+use reconstruct::{Model, Surface};
+
+use crate::brep::{Topology, Use};
 
 /// Abscissae and weights of Gauss's rule of six points over -1 to 1, one half of them
 /// (Abramowitz & Stegun 1964, table 25.4).
@@ -34,35 +39,25 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    /// Of all faces together.
-    pub(super) fn of(model: &Model) -> Self {
-        model.faces.iter().fold(Self::default(), |sum, face| {
-            let face = of_face(face);
-            Self {
-                area_mm2: sum.area_mm2 + face.area_mm2,
-                first_mm3: core::array::from_fn(|d| sum.first_mm3[d] + face.first_mm3[d]),
+    /// Of all faces together, within their edges.
+    pub(super) fn of(model: &Model, topology: &Topology) -> Self {
+        let mut sum = Self::default();
+        for (face, loops) in model.faces.iter().zip(&topology.uses) {
+            let Surface::Patches(surface) = &face.surface;
+            for &Use { edge, forward } in loops.iter().flatten() {
+                let curve = topology.edges[edge].directed(forward);
+                sum.add_edge(surface, &curve);
             }
-        })
+        }
+        sum
     }
 
     pub(super) fn centroid_mm(&self) -> [f64; 3] {
         self.first_mm3.map(|moment| moment / self.area_mm2)
     }
-}
 
-fn of_face(face: &Face) -> Moments {
-    match &face.surface {
-        Surface::Patches(surface) => std::iter::once(&face.outer)
-            .chain(&face.inner)
-            .fold(Moments::default(), |sum, border| {
-                add_loop(sum, surface, border)
-            }),
-    }
-}
-
-fn add_loop(mut sum: Moments, surface: &PatchSurface, border: &Loop) -> Moments {
-    for coedge in &border.coedges {
-        let curve = &coedge.space_curve;
+    /// What an edge contributes to the integrals over a face that it bounds, which is on its left.
+    fn add_edge(&mut self, surface: &PatchSurface, curve: &PiecewiseCubic<3>) {
         for (k, pair) in curve.breaks.windows(2).enumerate() {
             let width = pair[1] - pair[0];
             let middle = curve.piece_value(k, width / 2.0, 0)[1];
@@ -70,17 +65,21 @@ fn add_loop(mut sum: Moments, surface: &PatchSurface, border: &Loop) -> Moments 
             let rise = curve.piece_value(k, width, 0)[1] - curve.piece_value(k, 0.0, 0)[1];
             let parts = (PARTS_PER_PATCH * rise.abs() / height).ceil();
             for (s, weight) in nodes(0.0, width, parts) {
-                let [x, y, _] = curve.piece_value(k, s, 0);
-                let dy = weight * curve.piece_value(k, s, 1)[1];
+                let [x, y, z] = curve.piece_value(k, s, 0);
+                let [dx, dy, _] = curve.piece_value(k, s, 1);
                 let [area, of_x, of_z] = row(surface, x, y);
-                sum.area_mm2 += area * dy;
-                sum.first_mm3[0] += of_x * dy;
-                sum.first_mm3[1] += area * y * dy;
-                sum.first_mm3[2] += of_z * dy;
+                // Moved along the normal onto the surface, which is longer than what is seen of it
+                // by the cosine in `z`: that cancels out of the distance.
+                let [to_x, to_y, _] = surface.normal(x, y);
+                let on = surface.z(x, y);
+                let beside = (on - z) * (to_x * dy - to_y * dx);
+                self.area_mm2 += weight * (area * dy + beside);
+                self.first_mm3[0] += weight * (of_x * dy + beside * x);
+                self.first_mm3[1] += weight * y * (area * dy + beside);
+                self.first_mm3[2] += weight * (of_z * dy + beside * on);
             }
         }
     }
-    sum
 }
 
 fn index(breaks: &[f64], at: f64) -> usize {
@@ -170,6 +169,27 @@ mod tests {
             let [got, got_x, _] = row(&surface, x, 2.0);
             assert!((got / length - 1.0).abs() < 1e-9, "{x}: {got} {length}");
             assert!((got_x / of_x - 1.0).abs() < 1e-9, "{x}: {got_x} {of_x}");
+        }
+    }
+
+    #[test]
+    fn an_edge_off_the_face_bounds_it_by_its_foot() {
+        // A slope of 3 in 4 from x = 0 to 20, whose right edge is lifted by 0.1 along the normal.
+        let breaks = [vec![0.0, 10.0, 20.0], vec![0.0, 10.0]];
+        let [u, v] = breaks;
+        let slope = PatchSurface::through_thirds(u, v, |i, _| 0.75 * 10.0 * i as f64 / 3.0);
+        let slope = slope.unwrap();
+        let lifted = |y: f64| [20.0 - 0.06, y, 15.0 + 0.08];
+        let corners = [[0.0; 3], lifted(0.0), lifted(10.0), [0.0, 10.0, 0.0]];
+        let mut sum = Moments::default();
+        for (k, start) in corners.into_iter().enumerate() {
+            let edge = PiecewiseCubic::line(start, corners[(k + 1) % 4], 1.0).unwrap();
+            sum.add_edge(&slope, &edge);
+        }
+        // Of second order in the lift is what the strip's middle is beside.
+        assert!((sum.area_mm2 - 250.0).abs() < 1e-9, "{}", sum.area_mm2);
+        for (got, expected) in sum.centroid_mm().into_iter().zip([10.0, 5.0, 7.5]) {
+            assert!((got - expected).abs() < 1e-4, "{got} {expected}");
         }
     }
 

@@ -84,7 +84,7 @@ pub fn write(
         resolution_mm: options.resolution_mm,
     };
     let Brep { carriers, topology } = Brep::by_numbers(model, sharing);
-    let moments = Moments::of(model);
+    let moments = Moments::of(model, &topology);
     let uncertainty_mm = (gap_mm + topology.gap_mm).max(options.resolution_mm);
 
     let mut data = Data::default();
