@@ -40,7 +40,7 @@ pub(crate) fn list(parts: &[Measured]) -> String {
                 }
             }
             for number in found.iter().flat_map(|found| &found.numbers) {
-                if number.error.abs() > 3.0 * number.bound {
+                if number.error.abs() > 3.0 * number.bound || !number.is_covered() {
                     let _ = writeln!(
                         out,
                         "  face {}, {} nodes: {} {} off by {:.5}; bound {:.5}, stated {:.5}",
