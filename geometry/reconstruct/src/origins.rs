@@ -9,7 +9,7 @@ use crate::meeting::{loosen, meet};
 use crate::model::{EdgeKind, EdgeOrigin};
 
 /// Rounds in which creases are cut loose from what keeps them from their line.
-const LOOSENINGS: usize = 2;
+const LOOSENINGS: usize = 4;
 
 /// Puts creases where their surfaces intersect; gives what each edge is, and how it is known where
 /// it runs.

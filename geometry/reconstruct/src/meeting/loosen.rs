@@ -16,9 +16,9 @@ use crate::border::map::{MapEdge, PlanarMap};
 /// What is cut loose is no shorter than this, pitches.
 const LEAST_LENGTH: f64 = 4.0;
 
-/// What is cut off at a vertex is no shorter than this, pitches; and so far from where the surfaces
-/// cease to meet is the cut.
-const TIP: f64 = 2.0;
+/// What is cut off at a vertex is no shorter than this, pitches: where that is too little, the next
+/// round cuts off as much again. And so far from where the surfaces cease to meet is the cut.
+const TIP: f64 = 1.0;
 const MARGIN: f64 = 0.5;
 
 /// Stretches shorter than this, pitches, along which the line is lost are no reason to cut.
