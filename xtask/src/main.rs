@@ -133,6 +133,9 @@ fn full() -> anyhow::Result<()> {
         options: Vec::new(),
     })?;
     study::program("soak", &["--minutes".into(), "60".into()])?;
+    study::run(&study::Study::Parts {
+        options: ["--gmsh", "--check"].map(Into::into).to_vec(),
+    })?;
     study::run(&study::Study::Segmentation {
         options: ["--set", "judge", "--full", "--peers", "--check"]
             .map(Into::into)

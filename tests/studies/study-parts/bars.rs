@@ -188,9 +188,33 @@ pub(crate) fn table(bars: &[Bar]) -> String {
     out
 }
 
+/// The figures that hold by the table of a page, and by these bars do not, or are not there.
+pub(crate) fn lost<'a>(page: &'a str, bars: &[Bar]) -> Vec<&'a str> {
+    let rows = page
+        .lines()
+        .filter_map(|line| line.strip_suffix(" | yes |"));
+    let figures = rows.filter_map(|row| row.strip_prefix("| ")?.split(" | ").next());
+    let holds = |figure: &str| bars.iter().any(|bar| bar.what == figure && bar.holds);
+    figures.filter(|figure| !holds(figure)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_held_on_the_page_must_hold() {
+        let at = |what: &str, holds: bool| bar(what, "at most 1", "0.5".into(), holds);
+        let page = format!(
+            "# Page\n\n{}",
+            table(&[at("a", true), at("b", false), at("c", true)])
+        );
+        assert_eq!(
+            lost(&page, &[at("a", true), at("c", true)]),
+            Vec::<&str>::new()
+        );
+        assert_eq!(lost(&page, &[at("a", false), at("b", true)]), ["a", "c"]);
+    }
 
     fn judged(file: &str, invalid: usize, misplaced_mm: f64) -> Judged {
         Judged {

@@ -73,8 +73,8 @@ struct Options {
     /// Leave regions whole whose surfaces join smoothly
     #[arg(long, conflicts_with = "write")]
     keep: bool,
-    /// Give the shapes the regularities that they are likely to have
-    #[arg(long, conflicts_with = "write")]
+    /// Give the shapes the regularities that they are likely to have; has a page of its own
+    #[arg(long)]
     regularize: bool,
     /// The first six parts only
     #[arg(long)]
@@ -82,6 +82,9 @@ struct Options {
     /// Write the page about the study instead of printing it
     #[arg(long)]
     write: bool,
+    /// Fail if a figure of the page that holds there does not any more
+    #[arg(long, conflicts_with_all = ["write", "keep", "short", "seeds"], requires = "gmsh")]
+    check: bool,
 }
 
 impl Options {
@@ -94,12 +97,21 @@ impl Options {
             settings.regularize = Regularize::On(RegularizeSettings::default());
         }
     }
+
+    /// The page about the study.
+    fn page(&self) -> &'static str {
+        if self.regularize { REGULAR } else { PAGE }
+    }
 }
 
 /// Parts of a short study.
 const SHORT: usize = 6;
 
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/studies/parts.md");
+const REGULAR: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/../../docs/studies/parts-regularized.md"
+);
 
 fn parse_seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
     let parse = |number: &str| number.trim().parse::<u64>().ok();
@@ -152,13 +164,28 @@ fn run(options: &Options) -> Result<()> {
     if options.list {
         print!("{}", list::list(&parts));
     }
-    let text = page::page(&(*first..=*last), &parts, &failed, judged.as_deref());
+    let text = page::page(
+        &(*first..=*last),
+        &parts,
+        &failed,
+        judged.as_deref(),
+        options.regularize,
+    );
+    let page = options.page();
     if options.write {
-        return fs::write(PAGE, text).context(PAGE);
+        return fs::write(page, text).context(page);
     }
     print!("{text}");
-    if options.regularize {
-        print!("{}", regular::regularities(&parts));
+    if options.check {
+        let before = fs::read_to_string(page).context(page)?;
+        let bars = page::bars(&parts, judged.as_deref());
+        let lost = bars::lost(&before, &bars);
+        ensure!(
+            lost.is_empty() && failed.is_empty(),
+            "parts without a model: {}; figures that held and do not any more: {}",
+            failed.len(),
+            lost.join("; ")
+        );
     }
     Ok(())
 }

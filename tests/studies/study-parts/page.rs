@@ -6,34 +6,47 @@ use std::ops::RangeInclusive;
 use relief_tests::score::TruthClass;
 
 use crate::Failed;
-use crate::bars::{self, of_files, of_models};
+use crate::bars::{self, Bar, of_files, of_models};
 use crate::edges::MEETS_MM;
 use crate::judge::{Judged, MISPLACED_MM};
 use crate::measure::Measured;
+use crate::regular::regularities;
 use crate::scan::{DEEP, DROPOUTS, OUTLIERS, SPOT_RADIUS_MM};
 use crate::tables::Totals;
 
 const WORST: usize = 8;
 
+/// All bars.
+pub(crate) fn bars(parts: &[Measured], judged: Option<&[Judged]>) -> Vec<Bar> {
+    let mut all = of_models(&Totals { parts });
+    all.extend(judged.map_or_else(Vec::new, of_files));
+    all
+}
+
+/// The page. With `has_regularities` the shapes were given those that they are likely to have.
 pub(crate) fn page(
     seeds: &RangeInclusive<u64>,
     parts: &[Measured],
     failed: &[Failed],
     judged: Option<&[Judged]>,
+    has_regularities: bool,
 ) -> String {
     let totals = Totals { parts };
-    let mut out = String::from("# Exact models of parts, measured\n\n");
+    let (title, option) = if has_regularities {
+        (", with regularities", " --regularize")
+    } else {
+        ("", "")
+    };
+    let mut out = format!("# Exact models of parts, measured{title}\n\n");
     let _ = writeln!(
         out,
-        "`cargo xtask study parts --gmsh --write` makes this page. Seeds {} to {}, none left out; \
-         the code under test was not tuned on them.\n",
+        "`cargo xtask study parts{option} --gmsh --write` makes this page. Seeds {} to {}, none left \
+         out; the code under test was not tuned on them.\n",
         seeds.start(),
         seeds.end()
     );
     out += &about();
-    let mut all = of_models(&totals);
-    all.extend(judged.map_or_else(Vec::new, of_files));
-    let _ = writeln!(out, "\n## Bars\n\n{}", bars::table(&all));
+    let _ = writeln!(out, "\n## Bars\n\n{}", bars::table(&bars(parts, judged)));
     for (seed, why) in failed {
         let _ = writeln!(out, "Part {seed} gave no model: {why}\n");
     }
@@ -60,6 +73,9 @@ pub(crate) fn page(
          nodes beyond the four around them are of it, too.\n\n{}",
         totals.qualities()
     );
+    if has_regularities {
+        let _ = writeln!(out, "{}", regularities(parts));
+    }
     let _ = writeln!(
         out,
         "## Surfaces\n\nDistance of the exported surfaces from the true faces along their normals, \

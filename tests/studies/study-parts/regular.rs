@@ -48,7 +48,7 @@ pub(crate) fn regularities(parts: &[Measured]) -> String {
         }
     }
     let mut out = format!(
-        "\n## Regularities\n\n{tied} regions were adjusted. A regularity is true where the faces \
+        "## Regularities\n\n{tied} regions were adjusted. A regularity is true where the faces \
          that the regions share the most nodes with have it.\n\n| kind | accepted | true | false | \
          refused |\n| --- | ---: | ---: | ---: | ---: |\n"
     );
