@@ -141,6 +141,15 @@ fn run(options: &Options) -> Result<()> {
     let (Some(first), Some(last)) = (seeds.first(), seeds.last()) else {
         bail!("no seeds");
     };
+    let page = options.page();
+    // Before the work, which is long.
+    let before = if options.check {
+        Some(fs::read_to_string(page).with_context(|| {
+            format!("cannot read {page}; `--write` in place of `--check` makes it")
+        })?)
+    } else {
+        None
+    };
     let python = options.python.clone().map(Python);
     if let Some(python) = &python {
         python.make(&options.parts, &seeds)?;
@@ -171,13 +180,11 @@ fn run(options: &Options) -> Result<()> {
         judged.as_deref(),
         options.regularize,
     );
-    let page = options.page();
     if options.write {
         return fs::write(page, text).context(page);
     }
     print!("{text}");
-    if options.check {
-        let before = fs::read_to_string(page).context(page)?;
+    if let Some(before) = before {
         let bars = page::bars(&parts, judged.as_deref());
         let lost = bars::lost(&before, &bars);
         ensure!(

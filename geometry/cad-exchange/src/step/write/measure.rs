@@ -68,11 +68,11 @@ impl Moments {
                 let [x, y, z] = curve.piece_value(k, s, 0);
                 let [dx, dy, _] = curve.piece_value(k, s, 1);
                 let [area, of_x, of_z] = row(surface, x, y);
-                // Moved along the normal onto the surface, which is longer than what is seen of it
-                // by the cosine in `z`: that cancels out of the distance.
-                let [to_x, to_y, _] = surface.normal(x, y);
+                // To first order: the way to the foot, seen in x and y, is (on - z) n_z (n_x, n_y), and
+                // of the surface there is 1 / n_z as much as is seen.
+                let [n_x, n_y, _] = surface.normal(x, y);
                 let on = surface.z(x, y);
-                let beside = (on - z) * (to_x * dy - to_y * dx);
+                let beside = (on - z) * (n_x * dy - n_y * dx);
                 self.area_mm2 += weight * (area * dy + beside);
                 self.first_mm3[0] += weight * (of_x * dy + beside * x);
                 self.first_mm3[1] += weight * y * (area * dy + beside);
@@ -175,10 +175,9 @@ mod tests {
     #[test]
     fn an_edge_off_the_face_bounds_it_by_its_foot() {
         // A slope of 3 in 4 from x = 0 to 20, whose right edge is lifted by 0.1 along the normal.
-        let breaks = [vec![0.0, 10.0, 20.0], vec![0.0, 10.0]];
-        let [u, v] = breaks;
-        let slope = PatchSurface::through_thirds(u, v, |i, _| 0.75 * 10.0 * i as f64 / 3.0);
-        let slope = slope.unwrap();
+        let (u, v) = (vec![0.0, 10.0, 20.0], vec![0.0, 10.0]);
+        let height = |i: usize, _| 0.75 * 10.0 * i as f64 / 3.0;
+        let slope = PatchSurface::through_thirds(u, v, height).unwrap();
         let lifted = |y: f64| [20.0 - 0.06, y, 15.0 + 0.08];
         let corners = [[0.0; 3], lifted(0.0), lifted(10.0), [0.0, 10.0, 0.0]];
         let mut sum = Moments::default();
@@ -186,9 +185,9 @@ mod tests {
             let edge = PiecewiseCubic::line(start, corners[(k + 1) % 4], 1.0).unwrap();
             sum.add_edge(&slope, &edge);
         }
-        // Of second order in the lift is what the strip's middle is beside.
         assert!((sum.area_mm2 - 250.0).abs() < 1e-9, "{}", sum.area_mm2);
         for (got, expected) in sum.centroid_mm().into_iter().zip([10.0, 5.0, 7.5]) {
+            // The moments of the strip beside the edge are taken at the edge: second order.
             assert!((got - expected).abs() < 1e-4, "{got} {expected}");
         }
     }
