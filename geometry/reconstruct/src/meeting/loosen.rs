@@ -154,6 +154,25 @@ mod tests {
     }
 
     #[test]
+    fn a_pitch_is_cut_off_at_a_vertex_that_is_not_on_its_crease() {
+        let (flat, tilted) = (plane(0.0, 0.0, 0.0), plane(0.0, 0.0, 0.5));
+        let edge = crease_and_outline().edges.swap_remove(0);
+        let (first, last) = edge.path.domain();
+        let found = |ends| cuts(&edge, [(&tilted, 0.01), (&flat, 0.01)], ends, PLACEMENT);
+        let cut = 1.5;
+        for (ends, expected) in [
+            ([false, true], vec![last - cut]),
+            ([true, false], vec![first + cut]),
+            ([true, true], vec![first + cut, last - cut]),
+        ] {
+            let found = found(ends);
+            assert_eq!(found.len(), expected.len(), "{found:?}");
+            let off = found.iter().zip(&expected).map(|(a, b)| (a - b).abs());
+            assert!(off.fold(0.0, f64::max) < 0.26, "{found:?} {expected:?}");
+        }
+    }
+
+    #[test]
     fn a_crease_that_is_met_stays_whole() {
         let (map, is_met) = loosened(&plane(0.0, 0.0, 0.5));
         assert_eq!((map.edges.len(), is_met), (2, vec![true, false]));
