@@ -234,6 +234,7 @@ mod tests {
             noise_density_mm2: 1e-6,
             least_span_mm: 1.0,
             most_spans: 100,
+            margin_mm: 3.0,
         }
     }
 

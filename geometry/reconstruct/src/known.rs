@@ -11,7 +11,7 @@ use shapes::{Form, Shape};
 use crate::fit::Domain;
 use crate::model::FORM_TOLERANCE_MM;
 use crate::refine::{self, Demand};
-use crate::run::{Node, SURFACE_MARGIN};
+use crate::run::{FAR, Node, SURFACE_MARGIN};
 
 /// Places along each side of its domain that determine a plane, and more.
 const PLANE_SIDE: usize = 5;
@@ -60,6 +60,7 @@ pub(crate) fn patches(
             noise_density_mm2: NO_NOISE_MM2,
             least_span_mm: LEAST_SPAN * image.pitch_mm() / fineness as f64,
             most_spans,
+            margin_mm: FAR * image.pitch_mm(),
         };
         let (spline, _) = refine::fit(&observations, domain, &demand).ok()?;
         let surface = spline.to_patches().ok()?;

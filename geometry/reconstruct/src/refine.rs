@@ -48,6 +48,9 @@ pub struct Demand {
     pub least_span_mm: f64,
     /// Most spans along a side.
     pub most_spans: usize,
+    /// How far around the observations the surface is used, millimetres; beyond that it keeps
+    /// within bounds.
+    pub margin_mm: f64,
 }
 
 /// Fits a spline over the domain; with it the number of coefficients that the data were asked for:
@@ -56,6 +59,28 @@ pub struct Demand {
 /// # Errors
 /// [`Singular`] when the observations lie on a line or are fewer than three.
 pub(crate) fn fit(
+    observations: &[Observation],
+    domain: &Domain,
+    demand: &Demand,
+) -> Result<(UniformSpline, usize), Singular> {
+    let (mut spline, parameters) = refined(observations, domain, demand)?;
+    let bounds = bounds(observations, domain);
+    spline.bound_far(observations, demand.margin_mm, bounds);
+    Ok((spline, parameters))
+}
+
+/// What a surface keeps within where nothing is known of it: the values of the observations, and
+/// to either side of them the greater side of the domain.
+fn bounds(observations: &[Observation], domain: &Domain) -> (f64, f64) {
+    let width = |(low, high): (f64, f64)| high - low;
+    let side = width(domain.x_mm).max(width(domain.y_mm));
+    let values = observations.iter().map(|o| o.value);
+    let none = (f64::INFINITY, f64::NEG_INFINITY);
+    let (least, greatest) = values.fold(none, |(low, high), z| (low.min(z), high.max(z)));
+    (least - side, greatest + side)
+}
+
+fn refined(
     observations: &[Observation],
     domain: &Domain,
     demand: &Demand,
@@ -229,6 +254,7 @@ mod tests {
             noise_density_mm2: NOISE_MM * NOISE_MM,
             least_span_mm: 2.0,
             most_spans: 64,
+            margin_mm: 3.0,
         }
     }
 
@@ -324,6 +350,24 @@ mod tests {
             (0.4 * told..=1.4 * told).contains(&followed),
             "{followed} of {told}"
         );
+    }
+
+    #[test]
+    fn beyond_its_data_a_surface_keeps_near_them() {
+        // A strip across the domain, bent along itself: what lies beside it tells nothing.
+        let mut strip = nodes(|x, y| 8.0 * libm::sin((x + y) / 6.0));
+        strip.retain(|o| (o.u - o.v - 10.0).abs() < 4.0);
+        let (spline, _) = fit(&strip, &DOMAIN, &demand()).unwrap();
+        let surface = spline.to_patches().unwrap();
+        let mut farthest = 0.0_f64;
+        for i in 0..=86 {
+            for j in 0..=66 {
+                let z = surface.z(f64::from(i) - 3.0, f64::from(j) - 3.0);
+                farthest = farthest.max(z.abs());
+            }
+        }
+        // 8 mm of shape and the longer side of the domain.
+        assert!(farthest <= 8.0 + 86.0 + 0.1, "{farthest}");
     }
 
     #[test]

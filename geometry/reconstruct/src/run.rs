@@ -76,6 +76,10 @@ pub struct RegionFit {
 /// border, and what smoothing may do.
 pub(crate) const SURFACE_MARGIN: f64 = 3.0;
 
+/// How far from the nodes of its region a surface may be asked for, pitches: by borders on its margin,
+/// and by vertices on their way to a corner. Beyond that it only keeps near the part.
+pub(crate) const FAR: f64 = 2.0 * SURFACE_MARGIN;
+
 /// Narrowest span of a fitted spline, pitches: halving brings spans as near to two pitches as it
 /// can.
 const LEAST_SPAN: f64 = core::f64::consts::SQRT_2;
@@ -440,6 +444,7 @@ fn surface(
                 noise_density_mm2: noise.density_mm2(qualities),
                 least_span_mm: LEAST_SPAN * image.pitch_mm(),
                 most_spans: settings.knots_per_side - 1,
+                margin_mm: FAR * image.pitch_mm(),
             };
             patches_from_spline(&mut observations, domain, &demand)
         }

@@ -5,6 +5,7 @@
 //! All have the same shape, and each is the sum of five of half the width (the two-scale
 //! relation), so that a spline is carried over to a finer grid without any loss.
 
+mod far;
 mod fit;
 
 pub use fit::{Lines, Scores};

@@ -6,6 +6,7 @@
 //! crease are put where the surfaces meet, the crease is traced between them, and the other borders
 //! follow their vertices. What gets in another border's way stays as it was drawn.
 
+mod back;
 mod corner;
 mod gap;
 mod line;
@@ -27,6 +28,7 @@ use crate::border::crossing::{Conflict, Strand, conflicts};
 use crate::border::deflect::bent;
 use crate::border::map::{MapEdge, PlanarMap};
 use crate::polygon::{cross, minus, norm, signed_area};
+use back::{turns_back, turns_round};
 use corner::corner;
 pub(crate) use gap::{Gap, Line, Reach};
 use line::{REACH, is_closed_up, line, places, reach, sides};
@@ -52,6 +54,9 @@ const EXACT_MM: f64 = 1e-6;
 /// An outline that its vertex leads farther than this to its side, pitches, does not run where the
 /// samples tell any more: where they are few, at its ends, the nodes know it to half a pitch.
 const ASTRAY: f64 = 0.5;
+
+/// Borders no longer than this, pitches, may become straight when their ends are moved.
+const SHORT: f64 = 3.0;
 
 /// How much the area of a loop may shrink or grow.
 const LEAST_AREA: f64 = 0.5;
@@ -194,7 +199,7 @@ impl Drawn<'_> {
             left.vertices.extend([edge.start, edge.end]);
         };
         for (e, (edge, drawn)) in edges.iter().zip(&self.map.edges).enumerate() {
-            if edge.path != drawn.path && !self.is_covered(edge) {
+            if edge.path != drawn.path && (turns_round(edge, drawn) || !self.is_covered(edge)) {
                 leave(e, left);
             }
         }
@@ -374,7 +379,8 @@ fn leaving(edge: &MapEdge, vertex: usize) -> [f64; 2] {
     }
 }
 
-/// The path of an edge that follows its vertices: a straight one stays straight.
+/// The path of an edge that follows its vertices: a straight one stays straight, and one whose ends
+/// come so near to each other that it would be a hairpin becomes straight.
 fn led(
     edge: &MapEdge,
     [start, end]: [[f64; 2]; 2],
@@ -384,10 +390,16 @@ fn led(
         [piece] => piece.iter().all(|c| c[2] == 0.0 && c[3] == 0.0),
         _ => false,
     };
-    if is_straight {
-        return PiecewiseCubic::line(start, end, norm(minus(end, start))).ok();
+    if !is_straight {
+        let path = bent::<Beam>(&edge.path, None, moves)?;
+        if !turns_back(&path, &edge.path) {
+            return Some(path);
+        }
+        if edge.path.arc_length() > SHORT {
+            return None;
+        }
     }
-    bent::<Beam>(&edge.path, None, moves)
+    PiecewiseCubic::line(start, end, norm(minus(end, start))).ok()
 }
 
 /// Pairs of edges that cross, touch or fold back.
@@ -512,6 +524,27 @@ mod tests {
         let is_crease = [true, false, false];
         let found = meet(&mut map, &sides, &is_crease, PLACEMENT, &Unmonitored).unwrap();
         assert_eq!(found.loose, BTreeSet::from([(0, 1)]));
+    }
+
+    #[test]
+    fn a_short_border_that_would_become_a_hairpin_becomes_straight() {
+        let edge = |end: [f64; 2], via: [f64; 2]| MapEdge {
+            start: 0,
+            end: 1,
+            sides: [1, 2],
+            path: polyline(&[[10.0, 20.0], via, end]).unwrap(),
+            is_settled: true,
+        };
+        let led = |edge: &MapEdge, end: [f64; 2]| {
+            let from = edge.path.end();
+            led(edge, [[10.0, 20.0], end], [[0.0; 2], minus(end, from)])
+        };
+        let short = edge([11.0, 20.0], [10.5, 20.1]);
+        assert!(led(&short, [11.2, 20.1]).unwrap().pieces.len() > 1);
+        let straight = led(&short, [10.05, 20.0]).unwrap();
+        assert_eq!((straight.pieces.len(), straight.end()), (1, [10.05, 20.0]));
+        let long = edge([14.0, 20.0], [12.0, 20.1]);
+        assert_eq!(led(&long, [10.05, 20.0]), None);
     }
 
     #[test]
