@@ -76,9 +76,9 @@ pub struct RegionFit {
 /// border, and what smoothing may do.
 pub(crate) const SURFACE_MARGIN: f64 = 3.0;
 
-/// How far from the nodes of its region a surface may be asked for, pitches: by borders on its margin,
-/// and by vertices on their way to a corner. Beyond that it only keeps near the part.
-pub(crate) const FAR: f64 = 2.0 * SURFACE_MARGIN;
+/// How far from the nodes of its region a surface is what the nodes make of it, pitches; beyond that
+/// it keeps near the part as well. Borders and their vertices do not go farther.
+pub(crate) const FAR: f64 = 2.0;
 
 /// Narrowest span of a fitted spline, pitches: halving brings spans as near to two pitches as it
 /// can.

@@ -5,12 +5,16 @@
 //! then show a part as a speck in it. A spline lies between the least and the greatest of its
 //! coefficients, so bounding them bounds it.
 
-use super::UniformSpline;
+use super::{Axis, Parameter, UniformSpline};
 use crate::fit::Observation;
+
+/// Spans may be so wide, in margins: functions reach over four of them.
+const SPANS_OF_MARGIN: f64 = 1.5;
 
 impl UniformSpline {
     /// Puts coefficients between two bounds whose functions vanish within `margin` of every
-    /// observation, along u and v. Their knots are in use from now on.
+    /// observation, along u and v. Their knots are in use from now on. Where any are beyond the
+    /// bounds, wide spans are halved first: every wide function is near some observation.
     pub fn bound_far(
         &mut self,
         observations: &[Observation],
@@ -18,6 +22,14 @@ impl UniformSpline {
         (low, high): (f64, f64),
     ) {
         let is_within = |c: &f64| (low..=high).contains(c);
+        for along in [Parameter::U, Parameter::V] {
+            while self.span(along) > SPANS_OF_MARGIN * margin {
+                if self.coefficients.iter().all(is_within) {
+                    return;
+                }
+                *self = self.halved(along);
+            }
+        }
         if self.coefficients.iter().all(is_within) {
             return;
         }
@@ -37,9 +49,8 @@ impl UniformSpline {
         let rows = self.v.functions();
         let mut near = vec![false; self.coefficients.len()];
         for o in observations {
-            let functions = |axis: &super::Axis, at: f64| {
-                axis.basis(at - margin).0..axis.basis(at + margin).0 + 4
-            };
+            let functions =
+                |axis: &Axis, at: f64| axis.basis(at - margin).0..axis.basis(at + margin).0 + 4;
             let along = functions(&self.v, o.v);
             for i in functions(&self.u, o.u) {
                 near[i * rows..][along.clone()].fill(true);
@@ -52,9 +63,9 @@ impl UniformSpline {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::uniform::{Lines, Parameter};
+    use crate::uniform::Lines;
 
-    const MARGIN: f64 = 0.5;
+    const MARGIN: f64 = 2.0;
 
     /// A steep spline over 0 to 32 both ways, on spans of 1, that was fitted along the diagonal.
     fn diagonal() -> (UniformSpline, Vec<Observation>) {
@@ -102,7 +113,7 @@ mod tests {
             }
         }
         // Functions that reach over the margin keep what they had.
-        assert!(farthest[0] > 80.0 && farthest[1] <= 20.0, "{farthest:?}");
+        assert!(farthest[0] > 80.0 && farthest[1] <= 25.0, "{farthest:?}");
     }
 
     #[test]
@@ -115,6 +126,35 @@ mod tests {
                 (patches.z(u, v) - spline.value(u, v)).abs() < 1e-9,
                 "{u} {v}"
             );
+        }
+    }
+
+    #[test]
+    fn wide_spans_are_halved_to_tell_far_from_near() {
+        let (_, observations) = diagonal();
+        let corner = |u: f64, v: f64| 0.02 * (u - v) * (u - v) * (u - v);
+        let all: Vec<Observation> = (0..33 * 33)
+            .map(|k| (f64::from(k / 33), f64::from(k % 33)))
+            .map(|(u, v)| Observation {
+                u,
+                v,
+                value: corner(u, v),
+                weight: 1.0,
+            })
+            .collect();
+        let terms: Vec<_> = (0..16).map(|k| (k / 4, k % 4)).collect();
+        let domain = (0.0, 32.0);
+        let before = UniformSpline::fit_polynomial(domain, domain, &terms, &all, 0.0).unwrap();
+        let mut after = before.clone();
+        after.bound_far(&observations, MARGIN, (-12.0, 12.0));
+        assert!(before.value(32.0, 0.0) > 600.0 && before.value(0.0, 32.0) < -600.0);
+        let farthest = after
+            .coefficients
+            .iter()
+            .fold(0.0_f64, |most, c| most.max(c.abs()));
+        assert!(farthest < 40.0, "{farthest}");
+        for o in &observations {
+            assert!((after.value(o.u, o.v) - before.value(o.u, o.v)).abs() < 1e-9);
         }
     }
 
