@@ -182,6 +182,9 @@ pub struct RangeImageReport {
     /// Median over the nodes of the standard deviation of those samples about it.
     #[serde(default)]
     pub noise_mm: Option<f64>,
+    /// Nodes beside borders that the samples around them gave to another region.
+    #[serde(default)]
+    pub claimed_nodes: usize,
     /// Nodes next to outlines that lost their value once these were settled by the samples.
     #[serde(default)]
     pub dropped_nodes: usize,

@@ -11,6 +11,7 @@
 //! [`Observer`] learns when each stage begins, so that time is measured outside.
 
 mod background;
+mod claims;
 mod columns;
 mod extent;
 mod kinds;

@@ -7,6 +7,7 @@ use reconstruct::{Evidence, Fitted, Known, Method, ReconstructError, Reconstruct
 use regrid::RegridError;
 use segment::SegmentError;
 
+use crate::claims;
 use crate::columns::{Columns, InMemory, ReadAgainError, Within};
 use crate::kinds::samples::{OnRegion, of_regions};
 use crate::kinds::{RegionKind, kinds};
@@ -36,9 +37,12 @@ pub struct Outcome {
     pub regularities: Option<Regularities>,
     /// The model made of them, and how well it fits.
     pub reconstruction: Reconstruction,
-    /// The part's range image with the nodes beside its outlines decided anew by these. The
-    /// reconstruction's metrics are against it. `None` where there were no samples to settle the
-    /// outlines by: then they are against the range image as it was.
+    /// Nodes beside borders that the samples around them gave to another region than the segmentation
+    /// did, with their height on its surface: where faces run out in tips, most of all.
+    pub claimed_nodes: usize,
+    /// The part's range image with the nodes beside its borders and outlines decided anew. The
+    /// reconstruction's metrics are against it. `None` where there were no samples to decide them by:
+    /// then they are against the range image as it was.
     pub settled: Option<SettledNodes>,
     /// The stages that ran, in order.
     pub stages: Vec<Stage>,
@@ -271,15 +275,27 @@ fn in_view(
     }
 
     observer.stage(Stage::Reconstruct);
-    let of_samples = || {
-        let decided = kinds(
-            part_image,
-            &part.regions,
-            samples.as_deref(),
-            settings.smooth_joins,
-            observer,
-        )?;
-        let tied = regular::tie(decided, has_kinds, settings)?;
+    let decided = kinds(
+        part_image,
+        &part.regions,
+        samples.as_deref(),
+        settings.smooth_joins,
+        observer,
+    )?;
+    let tied = regular::tie(decided, has_kinds, settings)?;
+    let mut claimed = None;
+    if let Some(columns) = columns.filter(|_| has_kinds) {
+        claimed = claims::claimed(part_image, &part.regions, &tied.kinds, columns, observer)?;
+    }
+    let mut claimed_image = None;
+    let mut claimed_nodes = 0;
+    if let Some(claimed) = claimed {
+        part.regions = claimed.regions;
+        claimed_nodes = claimed.nodes;
+        claimed_image = Some(claimed.image);
+    }
+    let part_image = claimed_image.as_ref().unwrap_or(part_image);
+    let of_outlines = || {
         let removed = part.image.is_some().then_some(Removed {
             image,
             roles: &part.roles,
@@ -290,11 +306,11 @@ fn in_view(
             }
             _ => Some(Vec::new()),
         };
-        Ok::<_, PipelineError>((tied, beside))
+        Ok::<_, PipelineError>(beside)
     };
     let fit = || Fitted::of(part_image, &part.regions, &settings.reconstruct, observer);
-    let (fitted, of_samples) = rayon::join(fit, of_samples);
-    let (fitted, (tied, beside)) = (fitted?, of_samples?);
+    let (fitted, beside) = rayon::join(fit, of_outlines);
+    let (fitted, beside) = (fitted?, beside?);
     let are_too_many = beside.is_none();
     let beside = beside.unwrap_or_default();
     let mut forms: Vec<Option<Known>> = Vec::new();
@@ -330,6 +346,12 @@ fn in_view(
         )?;
         reconstruction.metrics = compare(&nodes.image, &reconstruction.restored);
         settled = Some(nodes);
+    } else if let Some(image) = claimed_image {
+        settled = Some(SettledNodes {
+            image,
+            dropped: 0,
+            filled: 0,
+        });
     }
     Ok(Outcome {
         regions: part.regions,
@@ -340,6 +362,7 @@ fn in_view(
         tangent: tied.tangent,
         regularities: tied.regularities,
         reconstruction,
+        claimed_nodes,
         settled,
         stages: vec![Stage::Segment, Stage::Reconstruct],
     })

@@ -59,6 +59,18 @@ impl RegionMap {
         }
     }
 
+    /// Gives a node to another region. Which numbers there are stays as it is.
+    ///
+    /// # Panics
+    /// When the node is outside the image, or there is no such region.
+    pub fn set_label(&mut self, column: usize, row: usize, label: u16) {
+        assert!(
+            column < self.columns && row < self.rows && label <= self.regions,
+            "a node of the image, and a region"
+        );
+        self.labels[column * self.rows + row] = label;
+    }
+
     /// Number of regions.
     #[must_use]
     pub fn regions(&self) -> u16 {

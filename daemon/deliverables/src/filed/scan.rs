@@ -125,7 +125,9 @@ fn range(report: &Report, png: Option<Vec<u8>>) -> Section {
                 .count(image.dropped_nodes)
                 .text(" nodes dropped and ")
                 .count(image.filled_nodes)
-                .text(" filled beside outlines"),
+                .text(" filled beside outlines, ")
+                .count(image.claimed_nodes)
+                .text(" given to another face beside borders"),
         ),
     ];
     if let Some(share) = image.inlier_share {
