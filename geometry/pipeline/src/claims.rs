@@ -20,11 +20,14 @@ const NEAR: f64 = 1.25;
 /// beyond so many: where surfaces go over into each other smoothly none is clear of either.
 const ON: f64 = 3.5;
 const CLEAR: f64 = 6.0;
+/// Root mean squares are taken to be this at least, pitches: of samples without noise they are but
+/// rounding.
+const LEAST_RMS: f64 = 1e-3;
 /// By how much what speaks for a new owner has to outweigh what speaks for the old one.
 const OUTWEIGHS: f64 = 1.5;
 /// Fewest samples that speak for a new owner.
 const LEAST: usize = 2;
-/// Cosine of the steepest slope (70 degrees) at which a surface is given nodes: what is steeper takes
+/// Cosine of the steepest slope (81 degrees) at which a surface is given nodes: what is steeper takes
 /// many patches, and hides from the camera what lies behind it.
 const LEAST_FACING: f64 = 0.15;
 /// A region keeps so much of its nodes.
@@ -37,14 +40,17 @@ struct Surface {
 }
 
 impl Surface {
-    fn of(kind: &RegionKind) -> Option<Self> {
+    fn of(kind: &RegionKind, pitch_mm: f64) -> Option<Self> {
         let rms_mm = match &kind.evidence.verdict {
             Verdict::Shape(fit) => fit.rms_mm,
             Verdict::Swept(fit) => fit.rms_mm,
             Verdict::FreeForm | Verdict::Unknown => return None,
         };
         let form = kind.known()?.form;
-        Some(Self { form, rms_mm })
+        Some(Self {
+            form,
+            rms_mm: rms_mm.max(LEAST_RMS * pitch_mm),
+        })
     }
 }
 
@@ -67,7 +73,9 @@ pub(crate) fn claimed(
     columns: &dyn Columns,
     monitor: &dyn Monitor,
 ) -> Result<Option<Claimed>, PipelineError> {
-    let surfaces: Vec<Option<Surface>> = kinds.iter().map(Surface::of).collect();
+    let pitch_mm = image.pitch_mm();
+    let surfaces = kinds.iter().map(|kind| Surface::of(kind, pitch_mm));
+    let surfaces: Vec<Option<Surface>> = surfaces.collect();
     if surfaces.iter().flatten().count() < 2 {
         return Ok(None);
     }
@@ -122,7 +130,6 @@ fn by_surfaces(
         if changed.is_empty() {
             break;
         }
-        claimed.nodes += changed.len();
         // Only beside what has changed is there anything new to ask.
         asked = changed
             .iter()
@@ -132,6 +139,9 @@ fn by_surfaces(
         asked.sort_unstable();
         asked.dedup();
     }
+    let labels = claimed.regions.raw_labels().iter();
+    let pairs = labels.zip(regions.raw_labels());
+    claimed.nodes = pairs.filter(|(now, before)| now != before).count();
     Ok(claimed)
 }
 
