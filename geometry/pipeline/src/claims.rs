@@ -460,4 +460,34 @@ mod tests {
         let found = claims(&surfaces, heights, |x, _| x > 23.5, |x, _| x > 20.0);
         assert_eq!(found.nodes, 0);
     }
+
+    #[test]
+    fn one_sample_alone_gives_no_node_away() {
+        // Two strays beside the border, each near nodes that have no other sample.
+        let surfaces = [plane(0.0, 0.0), plane(1.0, 0.0)];
+        let mut image = RangeImage::masked(Lattice { pitch_mm: 1.0 }, 0, 0, COUNT, COUNT);
+        let mut labels = Vec::new();
+        for column in 0..COUNT {
+            for row in 0..COUNT {
+                let is_second = column > 20;
+                image.set_z_mm(column, row, Some(f64::from(u8::from(is_second))));
+                labels.push(u16::from(is_second) + 1);
+            }
+        }
+        let columns = [19.9, 20.1].map(|x_mm| {
+            let sample = |y_mm: f64| Sample {
+                y_mm,
+                z_mm: 1.0,
+                intensity: 200,
+            };
+            Column::new(x_mm, vec![sample(10.0 + 40.0 * (x_mm - 19.9))])
+        });
+        let scan = InMemory {
+            columns: &columns,
+            camera_mm: None,
+        };
+        let regions = RegionMap::new(&image, labels);
+        let found = by_surfaces(&image, &regions, &surfaces, &scan, &Unmonitored).unwrap();
+        assert_eq!(found.nodes, 0);
+    }
 }

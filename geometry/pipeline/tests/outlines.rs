@@ -190,3 +190,46 @@ fn what_lies_beyond_the_region_of_interest_is_not_there() {
         }
     }
 }
+
+/// A wedge of 16 degrees stands 2 mm above a plane, its tip at (-20, 1).
+#[test]
+fn the_tip_of_a_wedge_is_its_own() {
+    let in_wedge = |x: f64, y: f64| x < 22.0 && (y - 1.0).abs() < 0.14 * (x + 20.0);
+    let plane_mm = |x: f64, y: f64| 10.0 + 0.2 * x - 0.1 * y;
+    let scan = scanned(|x, y| Some(plane_mm(x, y) + if in_wedge(x, y) { 2.0 } else { 0.0 }));
+    let (image, by_samples) = made(&scan);
+    let by_nodes = process(&image, &Settings::new(PITCH_MM), &Unmonitored).expect("planes are met");
+    assert_eq!(by_nodes.claimed_nodes, 0);
+
+    // Nodes of the wedge that are of the other region.
+    let lost = |outcome: &Outcome| {
+        let of_wedge = (
+            (15.0 - image.x_mm(0)) / PITCH_MM,
+            (1.0 - image.y_mm(0)) / PITCH_MM,
+        );
+        let regions = &outcome.regions;
+        let own = regions.label(of_wedge.0 as usize, of_wedge.1 as usize);
+        let nodes = (0..image.columns()).flat_map(|c| (0..image.rows()).map(move |r| (c, r)));
+        let within = nodes.filter(|&(column, row)| {
+            let (x, y) = (image.x_mm(column), image.y_mm(row));
+            x > -18.0 && in_wedge(x - 0.5, y) && x < 21.0
+        });
+        within.filter(|&(c, r)| regions.label(c, r) != own).count()
+    };
+    assert!(lost(&by_nodes) > 10, "{}", lost(&by_nodes));
+    assert!(by_samples.claimed_nodes >= lost(&by_nodes) / 2);
+    assert!(
+        4 * lost(&by_samples) < lost(&by_nodes),
+        "{}",
+        lost(&by_samples)
+    );
+    // They have the wedge's height.
+    let settled = by_samples.settled.as_ref().expect("nodes were claimed");
+    let off_mm = |column: usize, row: usize| {
+        let (x, y) = (image.x_mm(column), image.y_mm(row));
+        settled.image.z_mm(column, row).map(|z| z - plane_mm(x, y))
+    };
+    let column = ((-14.0 - image.x_mm(0)) / PITCH_MM) as usize;
+    let row = ((1.0 - image.y_mm(0)) / PITCH_MM) as usize;
+    assert!(off_mm(column, row).is_some_and(|off| (off - 2.0).abs() < 0.01));
+}
