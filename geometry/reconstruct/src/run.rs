@@ -77,7 +77,7 @@ pub struct RegionFit {
 pub(crate) const SURFACE_MARGIN: f64 = 3.0;
 
 /// How far from the nodes of its region a surface is what the nodes make of it, pitches; beyond that
-/// it keeps near the part as well. Borders and their vertices do not go farther.
+/// it keeps near the part as well. Borders and their vertices seldom go farther.
 pub(crate) const FAR: f64 = 2.0;
 
 /// Narrowest span of a fitted spline, pitches: halving brings spans as near to two pitches as it
