@@ -5,17 +5,23 @@
 //! as entities 112 and 114.
 
 pub mod banded;
+mod closest;
 pub mod curve;
+mod edit;
 pub mod fit;
 pub mod knots;
 pub mod piecewise;
+mod rational;
 pub mod surface;
 pub mod uniform;
 
 pub use banded::{BandedCholesky, BandedMatrix, Singular};
+pub use closest::Closest;
 pub use curve::{BSplineCurve, ControlCountError};
+pub use edit::Removal;
 pub use fit::{Observation, TensorSpline, thirds};
 pub use knots::{Basis, KnotError, KnotVector, MAX_DEGREE};
 pub use piecewise::{PatchSurface, PiecewiseCubic, PiecewiseError, cubic_through_thirds};
+pub use rational::{RationalCurve, RationalError, RationalSurface};
 pub use surface::BSplineSurface;
 pub use uniform::{Parameter, UniformSpline};

@@ -3,15 +3,15 @@
 use crate::curve::ControlCountError;
 use crate::knots::KnotVector;
 
-/// A polynomial tensor-product B-spline surface in space.
+/// A polynomial tensor-product B-spline surface, in space or in another number of dimensions.
 #[derive(Debug, Clone, PartialEq)]
-pub struct BSplineSurface {
+pub struct BSplineSurface<const D: usize = 3> {
     u_knots: KnotVector,
     v_knots: KnotVector,
-    points: Vec<[f64; 3]>,
+    points: Vec<[f64; D]>,
 }
 
-impl BSplineSurface {
+impl<const D: usize> BSplineSurface<D> {
     /// A surface from knots and its control net, v fastest.
     ///
     /// # Errors
@@ -19,7 +19,7 @@ impl BSplineSurface {
     pub fn new(
         u_knots: KnotVector,
         v_knots: KnotVector,
-        points: Vec<[f64; 3]>,
+        points: Vec<[f64; D]>,
     ) -> Result<Self, ControlCountError> {
         let (needed, given) = (
             u_knots.control_count() * v_knots.control_count(),
@@ -38,7 +38,7 @@ impl BSplineSurface {
     pub(crate) fn assembled(
         u_knots: KnotVector,
         v_knots: KnotVector,
-        points: Vec<[f64; 3]>,
+        points: Vec<[f64; D]>,
     ) -> Self {
         debug_assert_eq!(
             u_knots.control_count() * v_knots.control_count(),
@@ -65,13 +65,13 @@ impl BSplineSurface {
 
     /// The control net, v fastest.
     #[must_use]
-    pub fn points(&self) -> &[[f64; 3]] {
+    pub fn points(&self) -> &[[f64; D]] {
         &self.points
     }
 
     /// Control point `(i, j)`.
     #[must_use]
-    pub fn point(&self, i: usize, j: usize) -> Option<[f64; 3]> {
+    pub fn point(&self, i: usize, j: usize) -> Option<[f64; D]> {
         let rows = self.v_knots.control_count();
         (j < rows)
             .then(|| self.points.get(i * rows + j).copied())
@@ -80,17 +80,17 @@ impl BSplineSurface {
 
     /// The point at `(u, v)`.
     #[must_use]
-    pub fn evaluate(&self, u: f64, v: f64) -> [f64; 3] {
+    pub fn evaluate(&self, u: f64, v: f64) -> [f64; D] {
         self.partial(u, v, 0, 0)
     }
 
     /// The partial derivative of order `u_order` in u and `v_order` in v.
     #[must_use]
-    pub fn partial(&self, u: f64, v: f64, u_order: usize, v_order: usize) -> [f64; 3] {
+    pub fn partial(&self, u: f64, v: f64, u_order: usize, v_order: usize) -> [f64; D] {
         let a = self.u_knots.basis_derivative(u, u_order);
         let b = self.v_knots.basis_derivative(v, v_order);
         let rows = self.v_knots.control_count();
-        let mut sum = [0.0; 3];
+        let mut sum = [0.0; D];
         for i in 0..=self.u_knots.degree() {
             for j in 0..=self.v_knots.degree() {
                 let weight = a.values[i] * b.values[j];
