@@ -1,7 +1,7 @@
 //! What is done to curves.
 
 use super::polygon::Polygon;
-use super::remove::{Removal, removed};
+use super::remove::{Removal, View, bound, removed};
 use super::{elevate, refine};
 use crate::curve::BSplineCurve;
 use crate::knots::{KnotError, KnotVector, MAX_DEGREE};
@@ -9,6 +9,14 @@ use crate::knots::{KnotError, KnotVector, MAX_DEGREE};
 impl<const D: usize> BSplineCurve<D> {
     fn polygon(&self) -> Polygon {
         Polygon::new(self.knots(), D, self.points().concat())
+    }
+
+    fn view(&self) -> View<'_> {
+        View {
+            knots: self.knots(),
+            width: D,
+            points: self.points().as_flattened(),
+        }
     }
 
     fn of(polygon: Polygon) -> Self {
@@ -32,12 +40,20 @@ impl<const D: usize> BSplineCurve<D> {
     /// it (Piegl & Tiller 1997, algorithm A5.8). `None` where there is no such knot inside.
     #[must_use]
     pub fn without_knot(&self, knot: f64) -> Option<Removal<Self>> {
-        let removal = removed(&self.polygon(), knot, D)?;
+        let removal = removed(&self.view(), knot, D)?;
         Some(Removal {
             left: Self::of(removal.left),
             moved: removal.moved,
             function: removal.function,
         })
+    }
+
+    /// By how much [`Self::without_knot`] would move the curve, and which function carries that:
+    /// no point is moved by more than its value times this. `None` where there is no such knot
+    /// inside.
+    #[must_use]
+    pub fn removal_bound(&self, knot: f64) -> Option<(f64, usize)> {
+        bound(&self.view(), knot, D)
     }
 
     /// The same curve, one degree higher (Piegl & Tiller 1997, section 5.5). `None` at
@@ -140,6 +156,8 @@ mod tests {
         let curve = cubic();
         for knot in [1.0, 2.5, 3.0] {
             let removal = curve.without_knot(knot).unwrap();
+            let bound = (removal.moved, removal.function);
+            assert_eq!(curve.removal_bound(knot), Some(bound));
             let moved = farthest(&curve, &removal.left);
             assert!(
                 moved > 0.1 * removal.moved && moved <= removal.moved,

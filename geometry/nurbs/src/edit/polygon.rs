@@ -30,10 +30,6 @@ impl Polygon {
         self.knots.len() - self.degree - 1
     }
 
-    pub(crate) fn point(&self, i: usize) -> &[f64] {
-        &self.points[i * self.width..(i + 1) * self.width]
-    }
-
     /// Index `k` of the span `knots[k]..knots[k + 1]` that holds a parameter.
     pub(crate) fn span(&self, t: f64) -> usize {
         let after = self.knots.partition_point(|&knot| knot <= t);

@@ -1,7 +1,7 @@
 //! What is done to surfaces: what is done to curves, whose points are rows of the control net.
 
 use super::polygon::Polygon;
-use super::remove::{Removal, removed};
+use super::remove::{Removal, View, removed};
 use super::{elevate, refine};
 use crate::knots::{KnotError, KnotVector, MAX_DEGREE};
 use crate::surface::BSplineSurface;
@@ -66,7 +66,13 @@ impl<const D: usize> BSplineSurface<D> {
     /// inside.
     #[must_use]
     pub fn without_knot(&self, along: Parameter, knot: f64) -> Option<Removal<Self>> {
-        let removal = removed(&self.polygon(along), knot, D)?;
+        let polygon = self.polygon(along);
+        let view = View {
+            knots: self.knots(along),
+            width: polygon.width,
+            points: &polygon.points,
+        };
+        let removal = removed(&view, knot, D)?;
         Some(Removal {
             left: self.of(removal.left, along),
             moved: removal.moved,

@@ -1,0 +1,224 @@
+//! Curves through sections: least squares, led towards the least greatest deviation.
+
+use nurbs::{BSplineCurve, BandedMatrix};
+
+use crate::basis::{Basis, DEGREE};
+use crate::space::{distance, dot, minus};
+use crate::stack::Course;
+
+/// Share of the second differences of control points in what is minimised: it only decides where no
+/// data do.
+pub(crate) const STIFFNESS: f64 = 1e-9;
+
+/// Newton steps that lead a parameter to the foot of its data point.
+const STEPS: usize = 3;
+
+/// What a weight keeps of itself at a data point that is on the curve.
+const LEAST_WEIGHT: f64 = 1e-3;
+
+/// The curve of a section, and where its data points have their feet on it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Ring {
+    pub(crate) points: Vec<[f64; 3]>,
+    pub(crate) at: Vec<f64>,
+    pub(crate) off_mm: Vec<f64>,
+    pub(crate) most_mm: f64,
+}
+
+/// A section's curve over a basis: in each round the least squares with the weights and parameters
+/// of the one before; parameters are led to the feet of the data points, and weights grow with their
+/// distances (Lawson 1961), so that the greatest of these becomes as small as it can be. The best
+/// round counts, and the first that holds the tolerance is the last. `None` where breaks do not
+/// ascend.
+pub(crate) fn ring(
+    course: &Course,
+    basis: &Basis,
+    start: &[f64],
+    (rounds, tolerance_mm): (usize, f64),
+) -> Option<Ring> {
+    let mut at = start.to_vec();
+    let mut weights = vec![1.0; at.len()];
+    let mut best: Option<Ring> = None;
+    for _ in 0..rounds {
+        let points = least_squares(basis, &course.points, &at, &weights)?;
+        let curve = basis.curve(&points)?;
+        let off_mm = feet(&curve, basis.is_closed, &course.points, &mut at);
+        let most_mm = off_mm.iter().copied().fold(0.0, f64::max);
+        reweigh(&mut weights, &off_mm, most_mm);
+        if best.as_ref().is_none_or(|best| most_mm < best.most_mm) {
+            best = Some(Ring {
+                points,
+                at: at.clone(),
+                off_mm,
+                most_mm,
+            });
+        }
+        if most_mm <= tolerance_mm {
+            break;
+        }
+    }
+    best
+}
+
+/// Lawson's weights of the next round, with a mean of 1.
+pub(crate) fn reweigh(weights: &mut [f64], off_mm: &[f64], most_mm: f64) {
+    if most_mm <= 0.0 {
+        return;
+    }
+    for (weight, off_mm) in weights.iter_mut().zip(off_mm) {
+        *weight *= (off_mm / most_mm).max(LEAST_WEIGHT);
+    }
+    let mean = weights.iter().sum::<f64>() / weights.len() as f64;
+    weights
+        .iter_mut()
+        .for_each(|weight| *weight = (*weight / mean).max(LEAST_WEIGHT));
+}
+
+/// Leads parameters to the feet of their data points; gives the distances.
+pub(crate) fn feet(
+    curve: &BSplineCurve<3>,
+    is_closed: bool,
+    places: &[[f64; 3]],
+    at: &mut [f64],
+) -> Vec<f64> {
+    let off = |place: [f64; 3], t: f64| distance(curve.evaluate(t), place);
+    let lead = |(place, at): (&[f64; 3], &mut f64)| {
+        let mut own = off(*place, *at);
+        for _ in 0..STEPS {
+            let [on, along, bend] = [0, 1, 2].map(|order| curve.derivative(*at, order));
+            let r = minus(on, *place);
+            let speed = dot(along, along);
+            let curved = speed + dot(r, bend);
+            let step = -dot(r, along) / if curved > 0.1 * speed { curved } else { speed };
+            let next = *at + step;
+            let next = if is_closed {
+                next - next.floor()
+            } else {
+                next.clamp(0.0, 1.0)
+            };
+            let nearer = off(*place, next);
+            if nearer.is_nan() || nearer >= own {
+                break;
+            }
+            (*at, own) = (next, nearer);
+        }
+        own
+    };
+    places.iter().zip(at).map(lead).collect()
+}
+
+/// The place of a control point in the equations: those of a closed curve from both ends in turn, so
+/// that neighbours over the seam stay neighbours.
+fn folded(basis: &Basis, function: usize) -> usize {
+    let functions = basis.functions();
+    match (basis.is_closed, 2 * function < functions) {
+        (false, _) => function,
+        (true, true) => 2 * function,
+        (true, false) => 2 * (functions - 1 - function) + 1,
+    }
+}
+
+/// Control points of the curve with the least sum of weighted squares. `None` where they are not
+/// determined.
+pub(crate) fn least_squares(
+    basis: &Basis,
+    places: &[[f64; 3]],
+    at: &[f64],
+    weights: &[f64],
+) -> Option<Vec<[f64; 3]>> {
+    let functions = basis.functions();
+    let mut matrix = BandedMatrix::zero(functions, 2 * DEGREE + 1);
+    let mut sums = vec![[0.0; 3]; functions];
+    let mut add = |a: usize, b: usize, value: f64| {
+        if a >= b {
+            matrix.add(a, b, value);
+        }
+    };
+    for ((place, t), weight) in places.iter().zip(at).zip(weights) {
+        let local = basis
+            .at(*t)
+            .map(|(function, value)| (folded(basis, function), value));
+        for (a, value) in local {
+            for (b, other) in local {
+                add(a, b, weight * value * other);
+            }
+            let sum = &mut sums[a];
+            (0..3).for_each(|d| sum[d] += weight * value * place[d]);
+        }
+    }
+    let stiffness = STIFFNESS * places.len() as f64 / functions as f64;
+    let middles = if basis.is_closed {
+        0..functions
+    } else {
+        1..functions - 1
+    };
+    for middle in middles {
+        let of = [functions - 1, 0, 1].map(|by| folded(basis, (middle + by) % functions));
+        for (a, own) in of.into_iter().zip([1.0, -2.0, 1.0]) {
+            for (b, other) in of.into_iter().zip([1.0, -2.0, 1.0]) {
+                add(a, b, stiffness * own * other);
+            }
+        }
+    }
+    // A hair of the diagonal, where neither data nor neighbours decide.
+    for k in 0..functions {
+        add(k, k, stiffness * STIFFNESS);
+    }
+    let factor = matrix.cholesky().ok()?;
+    let mut points = vec![[0.0; 3]; functions];
+    for d in 0..3 {
+        let mut column: Vec<f64> = sums.iter().map(|sum| sum[d]).collect();
+        factor.solve(&mut column);
+        for (function, point) in points.iter_mut().enumerate() {
+            point[d] = column[folded(basis, function)];
+        }
+    }
+    Some(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::ellipse;
+
+    fn even(spans: usize) -> Basis {
+        Basis {
+            breaks: (0..=spans).map(|k| k as f64 / spans as f64).collect(),
+            is_closed: true,
+        }
+    }
+
+    #[test]
+    fn a_closed_spline_is_found_again() {
+        let basis = even(9);
+        let points: Vec<[f64; 3]> = (0..9)
+            .map(|k| [f64::from(k * k % 5), f64::from(k * 3 % 7), f64::from(k)])
+            .collect();
+        let curve = basis.curve(&points).unwrap();
+        let at: Vec<f64> = (0..60).map(|k| f64::from(k) / 60.0).collect();
+        let places: Vec<[f64; 3]> = at.iter().map(|t| curve.evaluate(*t)).collect();
+        let found = least_squares(&basis, &places, &at, &vec![1.0; 60]).unwrap();
+        let off = found.iter().zip(&points).map(|(a, b)| distance(*a, *b));
+        assert!(off.fold(0.0, f64::max) < 1e-5);
+    }
+
+    #[test]
+    fn rounds_lower_the_greatest_deviation() {
+        let course = ellipse(60.0, 30.0, 0.0, 80);
+        let basis = even(6);
+        let most = |rounds: usize| {
+            ring(&course, &basis, &course.at, (rounds, 0.0))
+                .unwrap()
+                .most_mm
+        };
+        let (plain, led) = (most(1), most(20));
+        assert!(led < 0.75 * plain, "{plain} {led}");
+        // What is said of the curve is true of it.
+        let ring = ring(&course, &basis, &course.at, (20, 0.0)).unwrap();
+        let curve = basis.curve(&ring.points).unwrap();
+        for (place, off_mm) in course.points.iter().zip(&ring.off_mm) {
+            let closest = curve.closest(*place).distance;
+            assert!(closest <= off_mm + 1e-9 && off_mm - closest < 1e-3);
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! The paper's way (Jo, Kwon & Han, section 2): each section by itself, open at its seam, with as
+//! many control points as its tolerance takes; then common knots for all, of which those are removed
+//! that the tolerance does not need.
+//!
+//! The paper follows Piegl & Tiller 1997, pp. 405 to 412, and leaves to them what it does not say:
+//! chord lengths as parameters, knots by averaging for the interpolation (equation 9.8) and by number
+//! for least squares (9.69), and for the removal of knots a bound of the error at each data point,
+//! which grows by what each knot removed moves the curve there (A9.8 and A9.9).
+
+mod approximate;
+mod remove;
+
+use nurbs::{BSplineCurve, BSplineSurface, KnotVector};
+use range_image::Monitor;
+
+use crate::error::SkinError;
+use crate::settings::Settings;
+use crate::spread::{averaged, column_of};
+use crate::stack::{Course, Stack};
+use crate::surface::{Counts, Skin, finished};
+use approximate::approximated;
+use remove::{Bounded, thinned};
+
+/// Knots nearer than this are one.
+const SAME_KNOT: f64 = 1e-12;
+
+pub(crate) fn skin(
+    mut stack: Stack,
+    settings: &Settings,
+    monitor: &dyn Monitor,
+) -> Result<Skin, SkinError> {
+    let tolerance_mm = settings.tolerance_mm;
+    if stack.is_closed {
+        // The paper's curves end where they begin.
+        for course in &mut stack.courses {
+            course.points.extend(course.points.first().copied());
+            course.at.push(1.0);
+        }
+    }
+    let mut bounded = Vec::with_capacity(stack.courses.len());
+    for (k, course) in stack.courses.iter().enumerate() {
+        monitor.check()?;
+        let curve = approximated(course, tolerance_mm).ok_or_else(|| SkinError::OutOfReach {
+            section: course.name.clone(),
+            reached_mm: f64::NAN,
+            tolerance_mm,
+        })?;
+        bounded.push(bounds(course, curve));
+        monitor.progress(0.4 * (k + 1) as f64 / stack.courses.len() as f64);
+    }
+    let of_sections = bounded
+        .iter()
+        .map(|own| own.curve.knots().knots().len())
+        .collect();
+    let before_mm = bounded.iter().flat_map(|own| own.off_mm.clone()).collect();
+    merge(&mut bounded);
+    let merged = bounded[0].curve.knots().knots().len();
+    monitor.progress(0.5);
+    thinned(&mut bounded, tolerance_mm, monitor)?;
+    monitor.progress(0.8);
+    let feet: Vec<Vec<f64>> = bounded.iter().map(|own| own.at.clone()).collect();
+    let surface = skinned(&bounded, &stack.heights, settings.degree_across);
+    let surface = surface.ok_or(SkinError::TooFewSections(stack.courses.len()))?;
+    let counts = Counts {
+        of_sections,
+        merged: Some(merged),
+        around: surface.u_knots().knots().len(),
+        points_around: surface.u_knots().control_count(),
+        rows: surface.v_knots().control_count(),
+    };
+    finished(stack, surface, (&feet, before_mm), counts, monitor)
+}
+
+/// A curve with what its data points are off it.
+fn bounds(course: &Course, curve: BSplineCurve<3>) -> Bounded {
+    let closest = course
+        .points
+        .iter()
+        .zip(&course.at)
+        .map(|(place, t)| curve.closest_from(*place, *t));
+    let (at, off_mm) = closest
+        .map(|closest| (closest.at, closest.distance))
+        .unzip();
+    Bounded { curve, at, off_mm }
+}
+
+/// Brings all curves to the knots that any of them has.
+fn merge(all: &mut [Bounded]) {
+    let mut merged: Vec<f64> = Vec::new();
+    for own in all.iter() {
+        let knots = own.curve.knots();
+        let inner = &knots.knots()[knots.degree() + 1..knots.control_count()];
+        merged.extend(inner);
+    }
+    merged.sort_by(f64::total_cmp);
+    merged.dedup_by(|a, b| (*a - *b).abs() <= SAME_KNOT);
+    for own in all {
+        let has = own.curve.knots().knots();
+        let lacks = |knot: &f64| !has.iter().any(|own| (own - knot).abs() <= SAME_KNOT);
+        let missing: Vec<f64> = merged.iter().copied().filter(lacks).collect();
+        if let Ok(finer) = own.curve.with_knots(&missing) {
+            own.curve = finer;
+        }
+    }
+}
+
+/// The surface through the curves, which have common knots.
+fn skinned(all: &[Bounded], heights: &[f64], degree: usize) -> Option<BSplineSurface> {
+    let across: KnotVector = averaged(heights, degree)?;
+    let knots = all.first()?.curve.knots().clone();
+    let mut points = Vec::new();
+    for i in 0..knots.control_count() {
+        let column: Vec<[f64; 3]> = all.iter().map(|own| own.curve.points()[i]).collect();
+        points.extend(column_of(&across, heights, &column)?);
+    }
+    BSplineSurface::new(knots, across, points).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use range_image::Unmonitored;
+
+    use crate::settings::{Method, Settings};
+    use crate::skin;
+    use crate::testing::waisted;
+
+    fn settings(tolerance_mm: f64) -> Settings {
+        Settings {
+            method: Method::Jo,
+            ..Settings::new(tolerance_mm)
+        }
+    }
+
+    #[test]
+    fn knots_are_merged_and_removed_and_the_tolerance_is_held() {
+        let sections = waisted(9, 90);
+        let mut before = usize::MAX;
+        for tolerance_mm in [0.3, 3.0] {
+            let skin = skin(&sections, &settings(tolerance_mm), &Unmonitored).unwrap();
+            assert!(skin.most_mm() <= tolerance_mm, "{}", skin.most_mm());
+            let counts = &skin.counts;
+            assert_eq!((counts.of_sections.len(), counts.rows), (9, 9));
+            assert!(counts.merged.unwrap() > counts.around);
+            assert_eq!(counts.around, counts.points_around + 4);
+            assert!(counts.points() < before);
+            before = counts.points();
+            // It ends where it begins.
+            for k in 0..=10 {
+                let v = 0.1 * f64::from(k);
+                let (start, end) = (skin.surface.evaluate(0.0, v), skin.surface.evaluate(1.0, v));
+                assert!(crate::space::distance(start, end) < 1e-9);
+            }
+        }
+    }
+}

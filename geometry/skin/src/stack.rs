@@ -1,0 +1,418 @@
+//! Sections brought to one order, one sense and one start.
+
+use crate::crossing;
+use crate::error::SkinError;
+use crate::section::Section;
+use crate::settings::{Method, Settings};
+use crate::space::{along, area_vector, distance, dot, lengths, middle, minus, norm, times};
+use crate::surface::Warning;
+
+/// Places along a section at which it is compared with its neighbour.
+const SAMPLES: usize = 128;
+
+/// Sections nearer to each other than this part of the usual distance lie at one height.
+const ONE_HEIGHT: f64 = 0.01;
+
+/// What is across another section by less than this part of their distance is noise.
+const ACROSS: f64 = 0.25;
+
+/// An open section runs the other way if that brings it so much nearer to its neighbour, as the
+/// mean of squares; it has no sense if neither way does.
+const OTHER_WAY: f64 = 0.7;
+
+/// Least area of a closed section, in squares of its length (a circle has 0.08).
+const LEAST_AREA: f64 = 1e-4;
+
+/// Normals that are this near to each other, as a cosine, are those of parallel sections.
+const PARALLEL: f64 = 0.7;
+
+/// A section with the parameters of its points.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Course {
+    pub(crate) name: String,
+    /// From its start on.
+    pub(crate) points: Vec<[f64; 3]>,
+    /// Of each point: 0 at the start, and 1 at the end, or where a closed one is at its start again.
+    pub(crate) at: Vec<f64>,
+}
+
+/// Sections in order, that run the same way and begin beside each other.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Stack {
+    pub(crate) courses: Vec<Course>,
+    /// Parameter of each section, 0 to 1.
+    pub(crate) heights: Vec<f64>,
+    pub(crate) is_closed: bool,
+    pub(crate) warnings: Vec<Warning>,
+}
+
+/// A section on its way there.
+struct Loose {
+    name: String,
+    points: Vec<[f64; 3]>,
+    center: [f64; 3],
+}
+
+impl Stack {
+    pub(crate) fn of(sections: &[Section], settings: &Settings) -> Result<Self, SkinError> {
+        if sections.len() < 2 {
+            return Err(SkinError::TooFewSections(sections.len()));
+        }
+        let mut loose = Vec::with_capacity(sections.len());
+        for section in sections {
+            let points = section.distinct()?;
+            loose.push(Loose {
+                name: section.name.clone(),
+                center: middle(&points),
+                points,
+            });
+        }
+        let is_closed = all_alike(sections)?;
+        let mut warnings = Vec::new();
+        let axis = order(&mut loose, is_closed, &mut warnings)?;
+        if is_closed {
+            for own in &loose {
+                if let Some(place_mm) = crossing::of_polygon(&own.points) {
+                    return Err(SkinError::CrossingItself {
+                        section: own.name.clone(),
+                        place_mm,
+                    });
+                }
+            }
+        }
+        let turned = turn(&mut loose, is_closed, settings)?;
+        if !turned.is_empty() {
+            warnings.push(Warning::Turned(turned));
+        }
+        let courses = started(&loose, is_closed, settings.method);
+        passed(&courses, &loose, is_closed, axis)?;
+        Ok(Self {
+            heights: heights(&courses, is_closed),
+            courses,
+            is_closed,
+            warnings,
+        })
+    }
+}
+
+/// Whether all are closed; an error where some are and some are not.
+fn all_alike(sections: &[Section]) -> Result<bool, SkinError> {
+    let first = |is_closed: bool| sections.iter().find(|own| own.is_closed == is_closed);
+    match (first(false), first(true)) {
+        (Some(open), Some(closed)) => Err(SkinError::OpenAmongClosed {
+            open: open.name.clone(),
+            closed: closed.name.clone(),
+        }),
+        (open, _) => Ok(open.is_none()),
+    }
+}
+
+/// Puts sections in the order of their heights if they are not in it; gives the direction in which
+/// they are stacked. Closed sections that are not parallel, as those of a pipe that bends, keep the
+/// order in which they came.
+fn order(
+    loose: &mut [Loose],
+    is_closed: bool,
+    warnings: &mut Vec<Warning>,
+) -> Result<[f64; 3], SkinError> {
+    let unit = |v: [f64; 3]| times(v, 1.0 / norm(v).max(f64::MIN_POSITIVE));
+    let normals: Vec<[f64; 3]> = loose
+        .iter()
+        .map(|own| unit(area_vector(&own.points)))
+        .collect();
+    let are_parallel = normals
+        .iter()
+        .all(|n| dot(*n, normals[0]).abs() >= PARALLEL);
+    let (first, last) = farthest_pair(loose);
+    let between = unit(minus(loose[last].center, loose[first].center));
+    let axis = if is_closed && are_parallel {
+        let same = |n: &[f64; 3]| times(*n, dot(*n, normals[0]).signum());
+        let sum = normals
+            .iter()
+            .map(same)
+            .fold([0.0; 3], |sum, n| core::array::from_fn(|d| sum[d] + n[d]));
+        unit(sum)
+    } else {
+        between
+    };
+    if is_closed && !are_parallel {
+        return Ok(axis);
+    }
+    let height = |own: &Loose| dot(own.center, axis);
+    let mut gaps: Vec<f64> = loose
+        .windows(2)
+        .map(|pair| height(&pair[1]) - height(&pair[0]))
+        .collect();
+    let is_ordered = gaps.iter().all(|gap| *gap >= 0.0) || gaps.iter().all(|gap| *gap <= 0.0);
+    if !is_ordered {
+        loose.sort_by(|a, b| height(a).total_cmp(&height(b)));
+        warnings.push(Warning::Sorted);
+        gaps = loose
+            .windows(2)
+            .map(|pair| height(&pair[1]) - height(&pair[0]))
+            .collect();
+    }
+    let mut sizes: Vec<f64> = gaps.iter().map(|gap| gap.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let usual = sizes[sizes.len() / 2].max(sizes[sizes.len() - 1] * ONE_HEIGHT);
+    let same = gaps.iter().position(|gap| gap.abs() <= ONE_HEIGHT * usual);
+    // Open sections may lean, so that their middles tell nothing of their heights.
+    if let Some(k) = same.filter(|_| is_closed) {
+        return Err(SkinError::Branching {
+            first: loose[k].name.clone(),
+            second: loose[k + 1].name.clone(),
+        });
+    }
+    let upwards = gaps.iter().sum::<f64>();
+    Ok(times(axis, if upwards < 0.0 { -1.0 } else { 1.0 }))
+}
+
+/// The two sections whose middles are the farthest from each other, in a sweep and one back.
+fn farthest_pair(loose: &[Loose]) -> (usize, usize) {
+    let farthest = |from: usize| {
+        let off = |k: &usize| distance(loose[*k].center, loose[from].center);
+        (0..loose.len())
+            .max_by(|a, b| off(a).total_cmp(&off(b)))
+            .unwrap_or(from)
+    };
+    let last = farthest(0);
+    (farthest(last), last)
+}
+
+/// Turns sections to the sense of the first; gives the names of those that were.
+fn turn(
+    loose: &mut [Loose],
+    is_closed: bool,
+    settings: &Settings,
+) -> Result<Vec<String>, SkinError> {
+    let mut turned = Vec::new();
+    for k in 1..loose.len() {
+        let (before, own) = (&loose[k - 1], &loose[k]);
+        let is_same = if is_closed {
+            same_around(before, own)
+        } else {
+            same_along(before, own)
+        };
+        let error = |hint: &'static str| SkinError::Sense {
+            section: own.name.clone(),
+            reference: before.name.clone(),
+            hint,
+        };
+        let Some(is_same) = is_same else {
+            return Err(error(if is_closed {
+                "it encloses hardly any area; give its points in their order around it"
+            } else {
+                "both its ends are as near to either end; give all sections from the same side"
+            }));
+        };
+        if is_same {
+            continue;
+        }
+        if !settings.turn_sections {
+            return Err(error("turn it, or let sections be turned"));
+        }
+        let own = &mut loose[k];
+        own.points.reverse();
+        if is_closed {
+            // Its first point stays the first.
+            own.points.rotate_right(1);
+        }
+        turned.push(own.name.clone());
+    }
+    Ok(turned)
+}
+
+/// Whether two closed sections run around the same way.
+fn same_around(before: &Loose, own: &Loose) -> Option<bool> {
+    let [a, b] = [before, own].map(|of| area_vector(&of.points));
+    let is_thin = [(before, a), (own, b)].iter().any(|(of, area)| {
+        let around = lengths(&of.points, true);
+        let length = around[around.len() - 1];
+        norm(*area) / 2.0 < LEAST_AREA * length * length
+    });
+    (!is_thin).then(|| dot(a, b) > 0.0)
+}
+
+/// Whether two open sections run the same way.
+fn same_along(before: &Loose, own: &Loose) -> Option<bool> {
+    let [a, b] = [before, own].map(|of| samples(&of.points, false, 0.0));
+    let off = |b: &mut dyn Iterator<Item = &[f64; 3]>| -> f64 {
+        let both = a.iter().zip(b);
+        both.map(|(a, b)| distance(*a, *b))
+            .map(|off| off * off)
+            .sum()
+    };
+    let (same, other) = (off(&mut b.iter()), off(&mut b.iter().rev()));
+    if other < OTHER_WAY * same {
+        Some(false)
+    } else {
+        (same < OTHER_WAY * other).then_some(true)
+    }
+}
+
+/// Places at even parts of the length, from a share of it on.
+fn samples(points: &[[f64; 3]], is_closed: bool, start: f64) -> Vec<[f64; 3]> {
+    let lengths = lengths(points, is_closed);
+    let whole = lengths[lengths.len() - 1];
+    let parts = if is_closed { SAMPLES } else { SAMPLES - 1 };
+    let share = |k: usize| {
+        let share = start + k as f64 / parts as f64;
+        if is_closed {
+            share - share.floor()
+        } else {
+            share.min(1.0)
+        }
+    };
+    (0..SAMPLES)
+        .map(|k| along(points, &lengths, share(k) * whole))
+        .collect()
+}
+
+/// Sections with their parameters: shares of their lengths, closed ones from a start on that is
+/// beside that of the section before, so that the surface is twisted as little as may be.
+fn started(loose: &[Loose], is_closed: bool, method: Method) -> Vec<Course> {
+    let mut start = 0.0;
+    let mut before: Option<(Vec<[f64; 3]>, [f64; 3])> = None;
+    let mut courses = Vec::with_capacity(loose.len());
+    for own in loose {
+        if let Some((samples, center)) = before.as_ref().filter(|_| is_closed) {
+            start = seam(own, samples, *center);
+        }
+        let lengths = lengths(&own.points, is_closed);
+        let whole = lengths[lengths.len() - 1];
+        if is_closed && method == Method::Jo {
+            // The paper's curves begin with a data point.
+            let off = |k: &usize| {
+                let off = (lengths[*k] / whole - start).abs();
+                off.min(1.0 - off)
+            };
+            let nearest = (0..own.points.len()).min_by(|a, b| off(a).total_cmp(&off(b)));
+            start = lengths[nearest.unwrap_or(0)] / whole;
+        }
+        before = Some((samples(&own.points, is_closed, start), own.center));
+        let share = |k: usize| {
+            let share = lengths[k] / whole - start;
+            if is_closed {
+                share - share.floor()
+            } else {
+                share
+            }
+        };
+        let mut order: Vec<(f64, [f64; 3])> = own
+            .points
+            .iter()
+            .enumerate()
+            .map(|(k, point)| (share(k), *point))
+            .collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (at, points) = order.into_iter().unzip();
+        courses.push(Course {
+            name: own.name.clone(),
+            points,
+            at,
+        });
+    }
+    courses
+}
+
+/// The share of a closed section's length at which it is to begin.
+fn seam(own: &Loose, before: &[[f64; 3]], center: [f64; 3]) -> f64 {
+    let around = samples(&own.points, true, 0.0);
+    let off = |shift: usize| -> f64 {
+        let both = before.iter().enumerate();
+        both.map(|(k, place)| {
+            let other = minus(around[(k + shift) % SAMPLES], own.center);
+            let off = distance(minus(*place, center), other);
+            off * off
+        })
+        .sum()
+    };
+    let best = (0..SAMPLES)
+        .min_by(|a, b| off(*a).total_cmp(&off(*b)))
+        .unwrap_or(0);
+    // Between samples by the parabola through three of them.
+    let [low, own_off, high] = [SAMPLES - 1, 0, 1].map(|by| off((best + by) % SAMPLES));
+    let bend = low + high - 2.0 * own_off;
+    let by = if bend > 0.0 {
+        (low - high) / (2.0 * bend)
+    } else {
+        0.0
+    };
+    let start = (best as f64 + by.clamp(-0.5, 0.5)) / SAMPLES as f64;
+    start - start.floor()
+}
+
+/// An error where one section passes through the next.
+fn passed(
+    courses: &[Course],
+    loose: &[Loose],
+    is_closed: bool,
+    axis: [f64; 3],
+) -> Result<(), SkinError> {
+    for (k, pair) in courses.windows(2).enumerate() {
+        let between = minus(loose[k + 1].center, loose[k].center);
+        let up = if is_closed {
+            let normal = area_vector(&loose[k].points);
+            times(normal, 1.0 / norm(normal).max(f64::MIN_POSITIVE))
+        } else {
+            axis
+        };
+        let up = times(up, if dot(up, between) < 0.0 { -1.0 } else { 1.0 });
+        let above: Vec<f64> = if is_closed {
+            let of_next = pair[1].points.iter();
+            of_next
+                .map(|place| dot(minus(*place, loose[k].center), up))
+                .collect()
+        } else {
+            let [a, b] = [0, 1].map(|side| samples(&pair[side].points, false, 0.0));
+            a.iter()
+                .zip(&b)
+                .map(|(a, b)| dot(minus(*b, *a), up))
+                .collect()
+        };
+        let usual = above.iter().map(|gap| gap.abs()).sum::<f64>() / above.len() as f64;
+        let is_beyond = |sign: f64| above.iter().any(|gap| sign * gap > ACROSS * usual);
+        if is_beyond(1.0) && is_beyond(-1.0) {
+            return Err(SkinError::Crossing {
+                first: pair[0].name.clone(),
+                second: pair[1].name.clone(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Parameters of the sections: sums of the roots of their distances (centripetal; Lee 1989), the
+/// means over places along them.
+fn heights(courses: &[Course], is_closed: bool) -> Vec<f64> {
+    let samples: Vec<_> = courses
+        .iter()
+        .map(|course| {
+            samples(
+                &course.points,
+                is_closed,
+                1.0 - course.at[0] * f64::from(is_closed),
+            )
+        })
+        .collect();
+    let mut heights = vec![0.0; courses.len()];
+    for place in 0..SAMPLES {
+        let roots = samples
+            .windows(2)
+            .map(|pair| distance(pair[0][place], pair[1][place]).sqrt());
+        let sums: Vec<f64> = roots
+            .scan(0.0, |sum, root| {
+                *sum += root;
+                Some(*sum)
+            })
+            .collect();
+        let whole = sums[sums.len() - 1].max(f64::MIN_POSITIVE);
+        for (height, sum) in heights.iter_mut().skip(1).zip(&sums) {
+            *height += sum / whole / SAMPLES as f64;
+        }
+    }
+    if let Some(last) = heights.last_mut() {
+        *last = 1.0;
+    }
+    heights
+}
