@@ -17,4 +17,7 @@ pub use read::{
     AnalyticSurface, MAX_FILE_BYTES, ReadError, Shell, SplineCurve, SurfaceFrame, TrimmedCurve,
     TrimmedFace, TrimmedModel, TrimmedSurface, read_model, read_points,
 };
-pub use write::{DEFAULT_PALETTE, Entities, FaceDefect, Summary, WriteError, WriteOptions, write};
+pub use write::{
+    DEFAULT_PALETTE, Entities, FaceDefect, NamedSurface, Summary, WriteError, WriteOptions, write,
+    write_surfaces,
+};

@@ -13,6 +13,7 @@ mod colour;
 mod error;
 mod fields;
 mod options;
+mod plain;
 mod shapes;
 mod sheet;
 mod shell;
@@ -24,6 +25,7 @@ use reconstruct::{Face, Model, Surface};
 pub use crate::common::{DEFAULT_PALETTE, FaceDefect};
 pub use error::WriteError;
 pub use options::{Entities, WriteOptions};
+pub use plain::{NamedSurface, write_surfaces};
 
 use crate::brep::{Brep, Sharing};
 use crate::common::check;
@@ -96,7 +98,7 @@ pub fn write(
         _ => "trimmed surfaces",
     };
     let start = format!("{}: {what} from a range scan", options.system);
-    let global = global_fields(model, options, resolution_mm);
+    let global = global_fields(options, resolution_mm, largest_coordinate(model));
     let bytes = sheet.write(&start, &global, out)?;
     Ok(Summary {
         faces: model.faces.len(),
@@ -174,7 +176,7 @@ fn write_name(sheet: &mut Sheet, level: u16, name: &str) -> Result<Pointer, Writ
 }
 
 /// The 26 fields of the Global section.
-fn global_fields(model: &Model, options: &WriteOptions, resolution_mm: f64) -> Vec<String> {
+fn global_fields(options: &WriteOptions, resolution_mm: f64, largest_mm: f64) -> Vec<String> {
     let text = |value: &str| {
         let mut out = String::new();
         fields::text(&mut out, value);
@@ -212,7 +214,7 @@ fn global_fields(model: &Model, options: &WriteOptions, resolution_mm: f64) -> V
         real(LINE_WIDTH_MM),
         text(&options.timestamp),
         real(resolution_mm),
-        real(largest_coordinate(model)),
+        real(largest_mm),
         text(&options.author),
         text(&options.organization),
         // Version 5.3, no drafting standard.

@@ -1,6 +1,6 @@
 //! Curves and surfaces as entities: 112 and 114, or 126 and 128.
 
-use nurbs::{BSplineCurve, KnotVector, PatchSurface, PiecewiseCubic};
+use nurbs::{BSplineCurve, BSplineSurface, KnotVector, PatchSurface, PiecewiseCubic};
 
 use super::error::WriteError;
 use super::options::Entities;
@@ -136,15 +136,26 @@ fn bspline_surface(
     surface: &PatchSurface,
 ) -> Result<Pointer, WriteError> {
     let spline = surface.to_bspline(SMOOTH_MM);
+    let mut record = sheet.begin(plain_entry(128, level, Status::Dependent));
+    bspline_parameters(&mut record, &spline, [false; 2]);
+    record.finish()
+}
+
+/// The parameters of entity 128; `is_closed` along u and along v.
+pub(super) fn bspline_parameters(
+    record: &mut Record<'_>,
+    spline: &BSplineSurface,
+    is_closed: [bool; 2],
+) {
     let (u, v) = (spline.u_knots(), spline.v_knots());
     let (columns, rows) = (u.control_count(), v.control_count());
-    let mut record = sheet.begin(plain_entry(128, level, Status::Dependent));
     record.integer(columns - 1);
     record.integer(rows - 1);
     record.integer(u.degree());
     record.integer(v.degree());
-    // Not closed in u nor in v, polynomial, not periodic in u nor in v.
-    for flag in [0, 0, 1, 0, 0] {
+    // Closed in u and in v; polynomial; not periodic in u nor in v.
+    let [u_closed, v_closed] = is_closed.map(usize::from);
+    for flag in [u_closed, v_closed, 1, 0, 0] {
         record.integer(flag);
     }
     record.reals(u.knots());
@@ -161,7 +172,6 @@ fn bspline_surface(
     for domain in [u.domain(), v.domain()] {
         record.reals(&[domain.0, domain.1]);
     }
-    record.finish()
 }
 
 /// Entity 112.
