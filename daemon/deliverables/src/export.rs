@@ -107,17 +107,34 @@ pub fn write_iges(
     mut sink: impl Write,
 ) -> Result<(), WriteError> {
     let stem = file_stem(name);
-    let time = timestamp
-        .to_zoned(TimeZone::UTC)
-        .strftime("%Y%m%d.%H%M%S")
-        .to_string();
-    let mut options = iges::WriteOptions::new(stem.clone(), time);
+    let mut options = iges::WriteOptions::new(stem.clone(), iges_time(timestamp));
     options.file_name = format!("{stem}.igs");
     options.entities = cad.entities;
     options.author.clone_from(&cad.author);
     options.organization.clone_from(&cad.organisation);
     iges::write(model, &options, &mut sink)?;
     Ok(())
+}
+
+/// Writes whole surfaces as IGES.
+///
+/// # Errors
+/// As [`iges::write_surfaces`].
+pub fn write_surfaces(
+    surfaces: &[iges::NamedSurface<'_>],
+    name: &str,
+    timestamp: Timestamp,
+    mut sink: impl Write,
+) -> Result<iges::Summary, WriteError> {
+    let stem = file_stem(name);
+    let mut options = iges::WriteOptions::new(stem.clone(), iges_time(timestamp));
+    options.file_name = format!("{stem}.igs");
+    Ok(iges::write_surfaces(surfaces, &options, &mut sink)?)
+}
+
+fn iges_time(timestamp: Timestamp) -> String {
+    let time = timestamp.to_zoned(TimeZone::UTC);
+    time.strftime("%Y%m%d.%H%M%S").to_string()
 }
 
 /// Writes a model as STEP; AP242 where the options name no schema. The bytes depend on

@@ -22,6 +22,7 @@ mod gather;
 mod lattice;
 mod pitch;
 mod ply;
+mod sections;
 mod source;
 mod spacing;
 mod text;
@@ -35,6 +36,7 @@ use std::path::Path;
 pub use error::{Place, ScanFileError};
 pub use lattice::{LATTICE_MM, lattice_counts, lattice_mm};
 pub use pitch::recommended_pitch_mm;
+pub use sections::{RawSection, read_sections};
 pub use units::Units;
 pub use unpack::{MOST_UNPACKED_BYTES, Unpacked};
 

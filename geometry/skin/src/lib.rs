@@ -11,6 +11,7 @@
 mod around;
 mod basis;
 mod crossing;
+mod cut;
 mod error;
 mod jo;
 mod measure;
@@ -26,6 +27,7 @@ mod testing;
 
 use range_image::Monitor;
 
+pub use cut::{Cut, cut};
 pub use error::SkinError;
 pub use measure::Deviation;
 pub use section::Section;

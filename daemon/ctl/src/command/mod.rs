@@ -20,7 +20,10 @@ pub(crate) mod resume;
 pub(crate) mod scan;
 pub(crate) mod scans;
 mod setting;
+mod shown;
+pub(crate) mod skin;
 pub(crate) mod status;
+mod timestamp;
 pub(crate) mod token;
 pub(crate) mod watch;
 pub(crate) mod webhooks;
@@ -37,6 +40,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Demo(args) => block_on(demo::run(args, json)),
         Command::Compare(args) => block_on(compare::run(args, json)),
         Command::Convert(args) => block_on(convert::run(args, json)),
+        Command::Skin(args) => block_on(skin::run(args, json)),
         Command::Scan(args) => block_on(scan::run(args, json)),
         Command::Abort(args) => block_on(abort::run(args, json)),
         Command::Resume(args) => block_on(resume::run(args, json)),

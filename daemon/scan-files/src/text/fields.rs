@@ -2,7 +2,7 @@
 
 /// What is wrong with a line.
 #[derive(Debug, PartialEq)]
-pub(super) enum Problem {
+pub(crate) enum Problem {
     NotANumber(String),
     DecimalComma(String),
     TooFew(usize),
@@ -10,16 +10,16 @@ pub(super) enum Problem {
 
 /// A point in the file's units.
 #[derive(Debug, PartialEq)]
-pub(super) struct TextPoint {
-    pub(super) xyz: [f64; 3],
-    pub(super) intensity: Option<f64>,
+pub(crate) struct TextPoint {
+    pub(crate) xyz: [f64; 3],
+    pub(crate) intensity: Option<f64>,
     /// Values that were not looked at.
-    pub(super) surplus: usize,
+    pub(crate) surplus: usize,
 }
 
 /// Position of each value on a line.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Layout {
+pub(crate) struct Layout {
     named: Option<Named>,
 }
 
@@ -32,7 +32,7 @@ struct Named {
 impl Layout {
     /// The layout a header line gives, or `None` if the line holds numbers. A header that
     /// does not name x, y and z says nothing: the first three values are taken.
-    pub(super) fn from_header(line: &str) -> Option<Self> {
+    pub(crate) fn from_header(line: &str) -> Option<Self> {
         let (fields, _) = split(line).ok()?;
         if fields.iter().any(|f| number(f).is_some()) {
             return None;
@@ -49,11 +49,11 @@ impl Layout {
         Some(Self { named })
     }
 
-    pub(super) fn names_intensity(&self) -> bool {
+    pub(crate) fn names_intensity(&self) -> bool {
         self.named.as_ref().is_some_and(|n| n.intensity.is_some())
     }
 
-    pub(super) fn point(&self, line: &str) -> Result<TextPoint, Problem> {
+    pub(crate) fn point(&self, line: &str) -> Result<TextPoint, Problem> {
         let (fields, decimal_commas) = split(line)?;
         let value = |index: usize| -> Result<f64, Problem> {
             let field = fields.get(index).ok_or(Problem::TooFew(fields.len()))?;

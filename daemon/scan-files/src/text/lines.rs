@@ -15,15 +15,15 @@ const BYTE_ORDER_MARK: &str = "\u{feff}";
 const END_MARK: char = '\u{1a}';
 
 /// A line of the file.
-pub(super) struct Line<'a> {
+pub(crate) struct Line<'a> {
     /// Its number, from 1.
-    pub(super) number: u64,
-    pub(super) text: &'a str,
+    pub(crate) number: u64,
+    pub(crate) text: &'a str,
     /// A line end follows it; false for what a file that was cut off ends with.
-    pub(super) ended: bool,
+    pub(crate) ended: bool,
 }
 
-pub(super) struct Lines<'a, R> {
+pub(crate) struct Lines<'a, R> {
     reader: R,
     file: &'a str,
     line: Vec<u8>,
@@ -38,7 +38,7 @@ pub(super) struct Lines<'a, R> {
 }
 
 impl<'a, R: BufRead> Lines<'a, R> {
-    pub(super) fn new(reader: R, file: &'a str) -> Self {
+    pub(crate) fn new(reader: R, file: &'a str) -> Self {
         Self {
             reader,
             file,
@@ -52,7 +52,7 @@ impl<'a, R: BufRead> Lines<'a, R> {
     }
 
     /// The next line, without its end and without a comment that is not UTF-8.
-    pub(super) fn next(&mut self) -> Result<Option<Line<'_>>, ScanFileError> {
+    pub(crate) fn next(&mut self) -> Result<Option<Line<'_>>, ScanFileError> {
         self.line.clear();
         let mut ended = false;
         self.start = self.consumed;

@@ -9,8 +9,9 @@ use crate::error::{Place, ScanFileError};
 use crate::gather::Gather;
 use crate::units::Units;
 
-use fields::{Layout, Problem};
-use lines::Lines;
+pub(crate) use fields::Layout;
+use fields::Problem;
+pub(crate) use lines::Lines;
 
 pub(crate) fn parse(reader: impl BufRead, gather: &mut Gather<'_>) -> Result<(), ScanFileError> {
     let units = gather.options.units.unwrap_or(Units::Millimetre);
@@ -64,7 +65,7 @@ pub(crate) fn parse(reader: impl BufRead, gather: &mut Gather<'_>) -> Result<(),
 }
 
 impl Problem {
-    fn at(self, file: &str, line: u64) -> ScanFileError {
+    pub(crate) fn at(self, file: &str, line: u64) -> ScanFileError {
         let file = file.to_owned();
         match self {
             Self::NotANumber(text) => ScanFileError::NotANumber { file, line, text },

@@ -4,7 +4,8 @@
 //! 114 and 112, on 128 and 126, or on 190 to 198), one per face, or into shells (514) of faces on
 //! common edges, with name, colour and level;
 //! [`read_points`] takes measured points (106, 116) from anybody's file; [`read_model`]
-//! reads back what [`write()`] writes.
+//! reads back what [`write()`] writes. [`write_surfaces`] writes whole B-spline surfaces (128),
+//! [`read_surfaces`] reads them, and [`read_chains`] curves and chains of points (106, 112, 126).
 //!
 //! A file is sections of 80-column lines: Start, Global, Directory entry, Parameter
 //! data, Terminate. Column 73 tells the section, columns 74 to 80 number its lines.
@@ -14,8 +15,9 @@ mod read;
 mod write;
 
 pub use read::{
-    AnalyticSurface, MAX_FILE_BYTES, ReadError, Shell, SplineCurve, SurfaceFrame, TrimmedCurve,
-    TrimmedFace, TrimmedModel, TrimmedSurface, read_model, read_points,
+    AnalyticSurface, Chain, MAX_FILE_BYTES, PlainSurface, ReadError, Shell, SplineCurve,
+    SurfaceFrame, TrimmedCurve, TrimmedFace, TrimmedModel, TrimmedSurface, read_chains, read_model,
+    read_points, read_surfaces,
 };
 pub use write::{
     DEFAULT_PALETTE, Entities, FaceDefect, NamedSurface, Summary, WriteError, WriteOptions, write,

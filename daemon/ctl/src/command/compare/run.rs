@@ -1,23 +1,21 @@
 //! The comparison itself.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
 
 use compare::{CompareError, Nominal};
 use deliverables::{ComparisonReport, write_atomically};
 use jiff::Timestamp;
 use pipeline::Extent;
-use range_image::{Column, Monitor};
+use range_image::Column;
 use regrid::{RegridError, Roi};
 use serde::Serialize;
 
 use super::{Args, nominal, summary};
+use crate::command::shown::{self, Shown};
 use crate::command::{pages, places};
 use crate::failure::Failure;
 use crate::input;
 use crate::output;
-use crate::progress::Progress;
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -30,63 +28,9 @@ pub(super) struct Compared {
     pub(super) report: ComparisonReport,
 }
 
-/// Shows on standard error how far it is; ends it on Ctrl-C.
-struct Shown {
-    stop: AtomicBool,
-    bar: Mutex<Option<Progress>>,
-}
-
-impl Monitor for Shown {
-    fn is_cancelled(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
-    }
-
-    fn progress(&self, fraction: f64) {
-        if let Ok(mut bar) = self.bar.lock()
-            && let Some(bar) = bar.as_mut()
-        {
-            bar.at(fraction, "");
-        }
-    }
-}
-
-impl Shown {
-    fn begin(&self, title: &str) {
-        self.end("done");
-        if let Ok(mut bar) = self.bar.lock() {
-            *bar = Some(Progress::share(title));
-        }
-    }
-
-    fn end(&self, message: &str) {
-        if let Ok(mut bar) = self.bar.lock()
-            && let Some(bar) = bar.take()
-        {
-            bar.finish(message);
-        }
-    }
-}
-
 /// Compares; Ctrl-C ends it without leaving half a file.
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
-    let shown = Arc::new(Shown {
-        stop: AtomicBool::new(false),
-        bar: Mutex::new(None),
-    });
-    let worker = Arc::clone(&shown);
-    let mut work = tokio::task::spawn_blocking(move || {
-        let compared = compare_files(&args, &worker);
-        worker.end(if compared.is_ok() { "done" } else { "failed" });
-        compared
-    });
-    let joined = tokio::select! {
-        joined = &mut work => joined,
-        _ = tokio::signal::ctrl_c() => {
-            shown.stop.store(true, Ordering::Relaxed);
-            work.await
-        }
-    };
-    let compared = joined.map_err(|error| Failure::at("the comparison broke off", &error))??;
+    let compared = shown::work("the comparison", move |shown| compare_files(&args, shown)).await?;
     for warning in &compared.report.warnings {
         eprintln!("relief: note: {warning}");
     }

@@ -412,26 +412,7 @@ impl Args {
 
     /// The time that stands in the files.
     pub(super) fn timestamp(&self, kept: Option<Timestamp>) -> Result<Timestamp, Failure> {
-        if let Some(given) = self.timestamp {
-            return Ok(given);
-        }
-        if let Some(epoch) = std::env::var_os("SOURCE_DATE_EPOCH") {
-            let seconds = epoch.to_str().and_then(|text| text.parse().ok());
-            let time = seconds.and_then(|seconds| Timestamp::from_second(seconds).ok());
-            return time.ok_or_else(|| {
-                Failure::Usage(format!(
-                    "SOURCE_DATE_EPOCH is {epoch:?}, which is not a number of seconds since 1970"
-                ))
-            });
-        }
-        if let Some(kept) = kept {
-            return Ok(kept);
-        }
-        let changed = std::fs::metadata(&self.input)
-            .and_then(|file| file.modified())
-            .ok();
-        let changed = changed.and_then(|time| Timestamp::try_from(time).ok());
-        Ok(changed.unwrap_or(Timestamp::UNIX_EPOCH))
+        crate::command::timestamp::of(self.timestamp, kept, &self.input)
     }
 }
 

@@ -67,11 +67,15 @@ fn without_points(file: &File) -> String {
     format!("but {census}; it is a CAD model, not a scan")
 }
 
-fn is_measured(entity: &Entity) -> bool {
+pub(super) fn is_measured(entity: &Entity) -> bool {
     !matches!(entity.subordinate, 1 | 3) && !matches!(entity.purpose, 1 | 2 | 5)
 }
 
-fn copious_data(file: &File, entity: &Entity, points: &mut Vec<[f64; 3]>) -> Result<(), ReadError> {
+pub(super) fn copious_data(
+    file: &File,
+    entity: &Entity,
+    points: &mut Vec<[f64; 3]>,
+) -> Result<(), ReadError> {
     let mut record = file.record(entity)?;
     let kind = record.integer("the kind of tuples")?;
     let count = record.count("the number of tuples")?;

@@ -1,0 +1,149 @@
+//! Sections of a range image: its rows.
+
+use range_image::RangeImage;
+
+use crate::section::{LEAST_POINTS, Section};
+
+/// Neighbouring nodes belong together if z changes by no more than this from one to the next,
+/// pitches: a surface that turns from the camera by 79 degrees.
+const STEEPEST: f64 = 5.0;
+
+/// Sections, and how many nodes of the rows looked at are in none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cut {
+    /// Open sections, from the lowest row up.
+    pub sections: Vec<Section>,
+    /// Nodes in them.
+    pub nodes: usize,
+    /// Nodes in the same rows that are not.
+    pub left_out: usize,
+}
+
+/// A run of nodes in a row without a gap or a step.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    from: usize,
+    to: usize,
+}
+
+impl Run {
+    fn overlap(self, other: Self) -> usize {
+        self.to
+            .min(other.to)
+            .saturating_sub(self.from.max(other.from))
+    }
+}
+
+/// Cuts a range image into its rows, every so many of them: of each row the run of nodes without a
+/// gap or a step that goes on what was taken of the row below, beginning with the longest of all.
+/// The body ends where no run of a row goes on.
+#[must_use]
+pub fn cut(image: &RangeImage, every_rows: usize) -> Cut {
+    let every = every_rows.max(1);
+    let rows: Vec<usize> = (0..image.rows()).step_by(every).collect();
+    let runs: Vec<Vec<Run>> = rows.iter().map(|row| runs(image, *row)).collect();
+    let longest = |runs: &Vec<Run>| runs.iter().map(|run| run.to - run.from).max().unwrap_or(0);
+    let start = (0..rows.len())
+        .max_by_key(|k| longest(&runs[*k]))
+        .unwrap_or(0);
+    let first = runs
+        .get(start)
+        .and_then(|runs| runs.iter().max_by_key(|run| run.to - run.from));
+    let mut taken: Vec<(usize, Run)> = first.map(|run| (start, *run)).into_iter().collect();
+    let goes_on = |before: Run, k: usize| {
+        let best = runs[k]
+            .iter()
+            .copied()
+            .max_by_key(|run| run.overlap(before))?;
+        (best.overlap(before) > 0).then_some((k, best))
+    };
+    for k in start + 1..rows.len() {
+        let Some(next) = taken.last().and_then(|(_, before)| goes_on(*before, k)) else {
+            break;
+        };
+        taken.push(next);
+    }
+    for k in (0..start).rev() {
+        let Some(next) = taken.first().and_then(|(_, before)| goes_on(*before, k)) else {
+            break;
+        };
+        taken.insert(0, next);
+    }
+    let section = |(k, run): &(usize, Run)| {
+        let row = rows[*k];
+        let place = |column: usize| {
+            let z_mm = image.z_mm(column, row)?;
+            Some([image.x_mm(column), image.y_mm(row), z_mm])
+        };
+        Section {
+            name: format!("the row at y = {:.2} mm", image.y_mm(row)),
+            points: (run.from..run.to).filter_map(place).collect(),
+            is_closed: false,
+        }
+    };
+    let sections: Vec<Section> = taken.iter().map(section).collect();
+    let nodes: usize = sections.iter().map(|section| section.points.len()).sum();
+    let of_row = |row: &usize| {
+        (0..image.columns())
+            .filter(|c| image.z_mm(*c, *row).is_some())
+            .count()
+    };
+    let all: usize = rows.iter().map(of_row).sum();
+    Cut {
+        sections,
+        nodes,
+        left_out: all - nodes,
+    }
+}
+
+/// The runs of a row that are long enough for a section.
+fn runs(image: &RangeImage, row: usize) -> Vec<Run> {
+    let mut runs = Vec::new();
+    let mut from = None;
+    let mut before: Option<f64> = None;
+    for column in 0..=image.columns() {
+        let z_mm = (column < image.columns())
+            .then(|| image.z_mm(column, row))
+            .flatten();
+        let goes_on = z_mm
+            .zip(before)
+            .is_some_and(|(z_mm, before)| (z_mm - before).abs() <= STEEPEST * image.pitch_mm());
+        if !goes_on {
+            if let Some(from) = from.take().filter(|from| column - from >= LEAST_POINTS) {
+                runs.push(Run { from, to: column });
+            }
+            from = z_mm.map(|_| column);
+        }
+        before = z_mm;
+    }
+    runs
+}
+
+#[cfg(test)]
+mod tests {
+    use range_image::Lattice;
+
+    use super::*;
+
+    #[test]
+    fn rows_go_on_from_the_longest_as_far_as_they_hang_together() {
+        let lattice = Lattice { pitch_mm: 0.5 };
+        let mut image = RangeImage::masked(lattice, 0, 0, 40, 12);
+        for row in 0..12 {
+            for column in 5..30 {
+                // A step at column 20 in row 6, and nothing in row 9.
+                let z = if row == 6 && column >= 20 { 40.0 } else { 1.0 };
+                let is_there = row != 9 && !(row == 3 && column < 12);
+                image.set_z_mm(column, row, is_there.then_some(z));
+            }
+        }
+        let found = cut(&image, 3);
+        let lengths: Vec<usize> = found.sections.iter().map(|own| own.points.len()).collect();
+        // Rows 0, 3 and 6, of which the part that overlaps the more; row 9 is empty, so that the body
+        // ends there.
+        assert_eq!(lengths, [25, 18, 10]);
+        assert_eq!((found.nodes, found.left_out), (53, 15));
+        assert_eq!(found.sections[1].name, "the row at y = 1.50 mm");
+        assert_eq!(found.sections[1].points[0], [6.0, 1.5, 1.0]);
+    }
+}
