@@ -267,3 +267,37 @@ fn real_files() {
     );
     assert_eq!(empty, 21);
 }
+
+#[test]
+fn chains_of_points_and_curves_that_lie_by_themselves() {
+    let text = file(
+        "1.,1,2HIN",
+        &[
+            (106, 12, "00000000", 0, "106,2,2,0.,0.,1.,1.,0.,1.;"),
+            // Part of something else, and a single point: neither is a section.
+            (106, 12, "00010000", 0, "106,2,2,0.,0.,1.,1.,0.,1.;"),
+            (116, 0, "00000000", 0, "116,1.,2.,3.;"),
+            // A straight line from (0, 0, 2) to (2, 0, 2).
+            (
+                126,
+                0,
+                "00000000",
+                0,
+                "126,1,1,0,0,1,0,0.,0.,1.,1.,1.,1.,\n0.,0.,2.,2.,0.,2.,0.,1.,0.,0.,1.;",
+            ),
+        ],
+    );
+    let chains = iges::read_chains(text.as_bytes()).unwrap();
+    let found: Vec<(u32, usize)> = chains.iter().map(|own| (own.entity, own.line)).collect();
+    assert_eq!(found, [(106, 1), (126, 7)]);
+    // Inches become millimetres.
+    assert_eq!(chains[0].points, [[0.0, 0.0, 25.4], [25.4, 0.0, 25.4]]);
+    assert_eq!(chains[1].points.len(), 9);
+    for (k, point) in chains[1].points.iter().enumerate() {
+        assert!((point[0] - 25.4 * 0.25 * k as f64).abs() < 1e-12 && point[2] == 50.8);
+    }
+    let error = iges::read_surfaces(text.as_bytes())
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("128"), "{error}");
+}

@@ -8,6 +8,12 @@ use crate::section::{LEAST_POINTS, Section};
 /// pitches: a surface that turns from the camera by 79 degrees.
 const STEEPEST: f64 = 5.0;
 
+/// A run goes on over so many nodes that are missing, if z is near enough beyond them.
+const MISSING: usize = 3;
+
+/// A run goes on another if they overlap by this part of the shorter one.
+const LEAST_OVERLAP: f64 = 0.5;
+
 /// Sections, and how many nodes of the rows looked at are in none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cut {
@@ -15,7 +21,7 @@ pub struct Cut {
     pub sections: Vec<Section>,
     /// Nodes in them.
     pub nodes: usize,
-    /// Nodes in the same rows that are not.
+    /// Nodes in the same rows that are not, beyond a gap of more than three nodes or a step.
     pub left_out: usize,
 }
 
@@ -27,10 +33,18 @@ struct Run {
 }
 
 impl Run {
+    fn length(self) -> usize {
+        self.to - self.from
+    }
+
     fn overlap(self, other: Self) -> usize {
-        self.to
-            .min(other.to)
-            .saturating_sub(self.from.max(other.from))
+        let (from, to) = (self.from.max(other.from), self.to.min(other.to));
+        to.saturating_sub(from)
+    }
+
+    fn goes_on(self, other: Self) -> bool {
+        let shorter = self.length().min(other.length());
+        self.overlap(other) as f64 >= LEAST_OVERLAP * shorter as f64
     }
 }
 
@@ -42,20 +56,20 @@ pub fn cut(image: &RangeImage, every_rows: usize) -> Cut {
     let every = every_rows.max(1);
     let rows: Vec<usize> = (0..image.rows()).step_by(every).collect();
     let runs: Vec<Vec<Run>> = rows.iter().map(|row| runs(image, *row)).collect();
-    let longest = |runs: &Vec<Run>| runs.iter().map(|run| run.to - run.from).max().unwrap_or(0);
+    let longest = |runs: &Vec<Run>| runs.iter().map(|run| run.length()).max().unwrap_or(0);
     let start = (0..rows.len())
         .max_by_key(|k| longest(&runs[*k]))
         .unwrap_or(0);
     let first = runs
         .get(start)
-        .and_then(|runs| runs.iter().max_by_key(|run| run.to - run.from));
+        .and_then(|runs| runs.iter().max_by_key(|run| run.length()));
     let mut taken: Vec<(usize, Run)> = first.map(|run| (start, *run)).into_iter().collect();
     let goes_on = |before: Run, k: usize| {
         let best = runs[k]
             .iter()
             .copied()
             .max_by_key(|run| run.overlap(before))?;
-        (best.overlap(before) > 0).then_some((k, best))
+        best.goes_on(before).then_some((k, best))
     };
     for k in start + 1..rows.len() {
         let Some(next) = taken.last().and_then(|(_, before)| goes_on(*before, k)) else {
@@ -98,24 +112,32 @@ pub fn cut(image: &RangeImage, every_rows: usize) -> Cut {
 
 /// The runs of a row that are long enough for a section.
 fn runs(image: &RangeImage, row: usize) -> Vec<Run> {
-    let mut runs = Vec::new();
-    let mut from = None;
-    let mut before: Option<f64> = None;
-    for column in 0..=image.columns() {
-        let z_mm = (column < image.columns())
-            .then(|| image.z_mm(column, row))
-            .flatten();
-        let goes_on = z_mm
-            .zip(before)
-            .is_some_and(|(z_mm, before)| (z_mm - before).abs() <= STEEPEST * image.pitch_mm());
-        if !goes_on {
-            if let Some(from) = from.take().filter(|from| column - from >= LEAST_POINTS) {
-                runs.push(Run { from, to: column });
-            }
-            from = z_mm.map(|_| column);
+    let mut runs: Vec<Run> = Vec::new();
+    let mut before: Option<(usize, f64)> = None;
+    for column in 0..image.columns() {
+        let Some(z_mm) = image.z_mm(column, row) else {
+            continue;
+        };
+        let goes_on = before.is_some_and(|(last, last_z_mm)| {
+            let apart = column - last;
+            let farthest_mm = STEEPEST * image.pitch_mm() * apart as f64;
+            apart <= MISSING + 1 && (z_mm - last_z_mm).abs() <= farthest_mm
+        });
+        match runs.last_mut().filter(|_| goes_on) {
+            Some(run) => run.to = column + 1,
+            None => runs.push(Run {
+                from: column,
+                to: column + 1,
+            }),
         }
-        before = z_mm;
+        before = Some((column, z_mm));
     }
+    let nodes = |run: &Run| {
+        (run.from..run.to)
+            .filter(|c| image.z_mm(*c, row).is_some())
+            .count()
+    };
+    runs.retain(|run| nodes(run) >= LEAST_POINTS);
     runs
 }
 

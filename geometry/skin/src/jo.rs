@@ -52,15 +52,22 @@ pub(crate) fn skin(
         .iter()
         .map(|own| own.curve.knots().knots().len())
         .collect();
-    let before_mm = bounded.iter().flat_map(|own| own.off_mm.clone()).collect();
+    // The first point, that is the last as well, counts once.
+    let repeated = usize::from(stack.is_closed);
+    let once = |own: &Bounded| own.off_mm[..own.off_mm.len() - repeated].to_vec();
+    let before_mm = bounded.iter().flat_map(once).collect();
     merge(&mut bounded);
     let merged = bounded[0].curve.knots().knots().len();
     monitor.progress(0.5);
     thinned(&mut bounded, tolerance_mm, monitor)?;
     monitor.progress(0.8);
-    let feet: Vec<Vec<f64>> = bounded.iter().map(|own| own.at.clone()).collect();
+    let mut feet: Vec<Vec<f64>> = bounded.iter().map(|own| own.at.clone()).collect();
     let surface = skinned(&bounded, &stack.heights, settings.degree_across);
     let surface = surface.ok_or(SkinError::TooFewSections(stack.courses.len()))?;
+    for (course, feet) in stack.courses.iter_mut().zip(&mut feet) {
+        course.points.truncate(course.points.len() - repeated);
+        feet.truncate(feet.len() - repeated);
+    }
     let counts = Counts {
         of_sections,
         merged: Some(merged),

@@ -20,11 +20,18 @@ const ACROSS: f64 = 0.25;
 /// mean of squares; it has no sense if neither way does.
 const OTHER_WAY: f64 = 0.7;
 
+/// Directions from end to end tell a sense where they are no shorter than this part of their
+/// sections, and have an angle with this cosine.
+const LEAST_CHORD: f64 = 0.02;
+const CLEAR: f64 = 0.5;
+
 /// Least area of a closed section, in squares of its length (a circle has 0.08).
 const LEAST_AREA: f64 = 1e-4;
 
-/// Normals that are this near to each other, as a cosine, are those of parallel sections.
-const PARALLEL: f64 = 0.7;
+/// Sections are parallel planes if across these they spread by no more than this part of what they
+/// do along them; and parallel lines, if along the second direction by no more than this.
+const FLAT: f64 = 0.2;
+const LINES: f64 = 1e-3;
 
 /// A section with the parameters of its points.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,63 +115,77 @@ fn all_alike(sections: &[Section]) -> Result<bool, SkinError> {
 }
 
 /// Puts sections in the order of their heights if they are not in it; gives the direction in which
-/// they are stacked. Closed sections that are not parallel, as those of a pipe that bends, keep the
-/// order in which they came.
+/// they are stacked. Sections that are not parallel, as those of a pipe that bends, keep the order
+/// in which they came.
 fn order(
     loose: &mut [Loose],
     is_closed: bool,
     warnings: &mut Vec<Warning>,
 ) -> Result<[f64; 3], SkinError> {
-    let unit = |v: [f64; 3]| times(v, 1.0 / norm(v).max(f64::MIN_POSITIVE));
-    let normals: Vec<[f64; 3]> = loose
-        .iter()
-        .map(|own| unit(area_vector(&own.points)))
-        .collect();
-    let are_parallel = normals
-        .iter()
-        .all(|n| dot(*n, normals[0]).abs() >= PARALLEL);
     let (first, last) = farthest_pair(loose);
-    let between = unit(minus(loose[last].center, loose[first].center));
-    let axis = if is_closed && are_parallel {
-        let same = |n: &[f64; 3]| times(*n, dot(*n, normals[0]).signum());
-        let sum = normals
-            .iter()
-            .map(same)
-            .fold([0.0; 3], |sum, n| core::array::from_fn(|d| sum[d] + n[d]));
-        unit(sum)
-    } else {
-        between
+    let between = minus(loose[last].center, loose[first].center);
+    let Some(axis) = common_normal(loose, between) else {
+        return Ok(times(between, 1.0 / norm(between).max(f64::MIN_POSITIVE)));
     };
-    if is_closed && !are_parallel {
-        return Ok(axis);
-    }
     let height = |own: &Loose| dot(own.center, axis);
-    let mut gaps: Vec<f64> = loose
-        .windows(2)
-        .map(|pair| height(&pair[1]) - height(&pair[0]))
-        .collect();
-    let is_ordered = gaps.iter().all(|gap| *gap >= 0.0) || gaps.iter().all(|gap| *gap <= 0.0);
-    if !is_ordered {
+    let gaps = |loose: &[Loose]| -> Vec<f64> {
+        let pairs = loose.windows(2);
+        pairs
+            .map(|pair| height(&pair[1]) - height(&pair[0]))
+            .collect()
+    };
+    let mut steps = gaps(loose);
+    let is_ordered = |sign: f64| steps.iter().all(|step| sign * step >= 0.0);
+    if !is_ordered(1.0) && !is_ordered(-1.0) {
         loose.sort_by(|a, b| height(a).total_cmp(&height(b)));
         warnings.push(Warning::Sorted);
-        gaps = loose
-            .windows(2)
-            .map(|pair| height(&pair[1]) - height(&pair[0]))
-            .collect();
+        steps = gaps(loose);
     }
-    let mut sizes: Vec<f64> = gaps.iter().map(|gap| gap.abs()).collect();
+    let mut sizes: Vec<f64> = steps.iter().map(|step| step.abs()).collect();
     sizes.sort_by(f64::total_cmp);
     let usual = sizes[sizes.len() / 2].max(sizes[sizes.len() - 1] * ONE_HEIGHT);
-    let same = gaps.iter().position(|gap| gap.abs() <= ONE_HEIGHT * usual);
-    // Open sections may lean, so that their middles tell nothing of their heights.
+    let same = steps
+        .iter()
+        .position(|step| step.abs() <= ONE_HEIGHT * usual);
+    // Open sections may lie beside each other in one plane.
     if let Some(k) = same.filter(|_| is_closed) {
         return Err(SkinError::Branching {
             first: loose[k].name.clone(),
             second: loose[k + 1].name.clone(),
         });
     }
-    let upwards = gaps.iter().sum::<f64>();
+    let upwards = steps.iter().sum::<f64>();
     Ok(times(axis, if upwards < 0.0 { -1.0 } else { 1.0 }))
+}
+
+/// The unit normal of sections that are parallel: across it they spread least. Of parallel lines the
+/// direction in which they are beside each other.
+fn common_normal(loose: &[Loose], between: [f64; 3]) -> Option<[f64; 3]> {
+    let mut spread = nalgebra::Matrix3::<f64>::zeros();
+    for own in loose {
+        for place in &own.points {
+            let off = nalgebra::Vector3::from(minus(*place, own.center));
+            spread += off * off.transpose() / own.points.len() as f64;
+        }
+    }
+    let found = spread.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|a, b| found.eigenvalues[*a].total_cmp(&found.eigenvalues[*b]));
+    let [least, middle, most] = order.map(|k| found.eigenvalues[k].max(0.0).sqrt());
+    let direction =
+        |k: usize| -> [f64; 3] { found.eigenvectors.column(order[k]).into_owned().into() };
+    let axis = if middle <= LINES * most {
+        let along = direction(2);
+        minus(between, times(along, dot(along, between)))
+    } else if least <= FLAT * middle {
+        direction(0)
+    } else {
+        return None;
+    };
+    let length = norm(axis);
+    // The sign of an eigenvector is anybody's.
+    let sign = if dot(axis, between) < 0.0 { -1.0 } else { 1.0 };
+    (length > 0.0).then(|| times(axis, sign / length))
 }
 
 /// The two sections whose middles are the farthest from each other, in a sweep and one back.
@@ -233,8 +254,19 @@ fn same_around(before: &Loose, own: &Loose) -> Option<bool> {
     (!is_thin).then(|| dot(a, b) > 0.0)
 }
 
-/// Whether two open sections run the same way.
+/// Whether two open sections run the same way: by the directions from end to end, or where these
+/// tell nothing by how near to each other the sections are.
 fn same_along(before: &Loose, own: &Loose) -> Option<bool> {
+    let chord = |of: &Loose| minus(of.points[of.points.len() - 1], of.points[0]);
+    let is_long = |of: &Loose| {
+        let lengths = lengths(&of.points, false);
+        norm(chord(of)) >= LEAST_CHORD * lengths[lengths.len() - 1]
+    };
+    let (a, b) = (chord(before), chord(own));
+    let cosine = dot(a, b) / (norm(a) * norm(b));
+    if is_long(before) && is_long(own) && cosine.abs() >= CLEAR {
+        return Some(cosine > 0.0);
+    }
     let [a, b] = [before, own].map(|of| samples(&of.points, false, 0.0));
     let off = |b: &mut dyn Iterator<Item = &[f64; 3]>| -> f64 {
         let both = a.iter().zip(b);
