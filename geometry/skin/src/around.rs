@@ -16,6 +16,16 @@ const STEPS: usize = 3;
 /// What a weight keeps of itself at a data point that is on the curve.
 const LEAST_WEIGHT: f64 = 1e-3;
 
+/// After so many rounds a fit that is off by this many tolerances is given up.
+const PATIENCE: usize = 3;
+const HOPELESS: f64 = 1.7;
+
+/// Whether rounds are at their end: the tolerance is held, or will not be.
+pub(crate) fn is_done(round: usize, most_mm: f64, tolerance_mm: f64) -> bool {
+    let is_hopeless = round + 1 >= PATIENCE && tolerance_mm > 0.0;
+    most_mm <= tolerance_mm || (is_hopeless && most_mm > HOPELESS * tolerance_mm)
+}
+
 /// The curve of a section, and where its data points have their feet on it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Ring {
@@ -39,7 +49,7 @@ pub(crate) fn ring(
     let mut at = start.to_vec();
     let mut weights = vec![1.0; at.len()];
     let mut best: Option<Ring> = None;
-    for _ in 0..rounds {
+    for round in 0..rounds {
         let points = least_squares(basis, &course.points, &at, &weights)?;
         let curve = basis.curve(&points)?;
         let off_mm = feet(&curve, basis.is_closed, &course.points, &mut at);
@@ -53,7 +63,7 @@ pub(crate) fn ring(
                 most_mm,
             });
         }
-        if most_mm <= tolerance_mm {
+        if is_done(round, most_mm, tolerance_mm) {
             break;
         }
     }

@@ -26,8 +26,12 @@ const LEAST_DENSITY: f64 = 0.05;
 /// By how much the number of breaks grows while it is looked for.
 const GROWTH: f64 = 1.4;
 
-/// Fewer rows are tried in steps of this part.
+/// Fewer rows are tried one by one from so many on, and above in steps of this part.
+const FEW_ROWS: usize = 24;
 const FEWER_ROWS: f64 = 0.85;
+
+/// So many numbers of rows in turn that do not do are enough: fewer do not either.
+const FAILURES: usize = 4;
 
 /// Fewest rows.
 const LEAST_ROWS: usize = 4;
@@ -78,12 +82,11 @@ impl Density {
         (0..=spans).map(at).collect()
     }
 
-    /// Denser where a trial's deviations are great, so that they become alike.
-    fn after(trial: &Trial) -> Self {
-        let basis = &trial.basis;
+    /// Denser where the deviations of curves are great, so that they become alike.
+    fn after(basis: &Basis, rings: &[Ring]) -> Self {
         let spans = basis.spans();
         let mut off = vec![0.0_f64; spans];
-        for ring in &trial.rings {
+        for ring in rings {
             for (t, off_mm) in ring.at.iter().zip(&ring.off_mm) {
                 let own = &mut off[basis.span(*t)];
                 *own = own.max(*off_mm);
@@ -137,16 +140,21 @@ pub(crate) fn net(
         return Err(out_of_reach(stack, &trial, tolerance_mm));
     };
     let least = LEAST_ROWS.max(degree + 1);
+    let mut failures = 0;
     let mut rows = stack.courses.len();
     loop {
-        let fewer = (rows as f64 * FEWER_ROWS) as usize;
-        rows = fewer.min(rows.saturating_sub(1));
-        if rows < least {
+        rows = if rows <= FEW_ROWS {
+            rows.saturating_sub(1)
+        } else {
+            (rows as f64 * FEWER_ROWS) as usize
+        };
+        if rows < least || failures == FAILURES {
             break;
         }
         monitor.check()?;
-        if let Some(net) = with_rows(stack, &trial, &density, (rows, degree), &best, tolerance_mm) {
-            best = net;
+        match with_rows(stack, &trial, &density, (rows, degree), &best, tolerance_mm) {
+            Some(net) => (best, failures) = (net, 0),
+            None => failures += 1,
         }
     }
     monitor.progress(0.9);
@@ -223,7 +231,7 @@ fn settled(
         let Some(trial) = over(stack, density.breaks(spans), tolerance_mm) else {
             break;
         };
-        let next = Density::after(&trial);
+        let next = Density::after(&trial.basis, &trial.rings);
         let is_better = best
             .as_ref()
             .is_none_or(|(best, _)| trial.most_mm < best.most_mm);
@@ -283,7 +291,7 @@ fn thin(
         let best = if best.most_mm <= tolerance_mm {
             best
         } else {
-            let density = Density::after(&best);
+            let density = Density::after(&best.basis, &best.rings);
             match settled(stack, &density, best.basis.spans(), tolerance_mm).0 {
                 Some(moved) if moved.most_mm <= tolerance_mm => moved,
                 _ => break,
@@ -307,17 +315,33 @@ fn with_rows(
     let across = thinned(&stack.heights, degree, rows)?;
     let wrapped = trial.basis.written() - trial.basis.spans();
     let most = (best.written() - 1) / rows;
-    let fit = |breaks: Vec<f64>| {
+    let starts: Vec<Vec<f64>> = stack.courses.iter().map(|own| own.at.clone()).collect();
+    let over = |breaks: Vec<f64>| {
         let basis = Basis {
             breaks,
             is_closed: stack.is_closed,
         };
-        let starts: Vec<Vec<f64>> = stack
-            .courses
-            .iter()
-            .map(|course| course.at.clone())
-            .collect();
         Net::least_squares(stack, &basis, &across, &starts, (ROUNDS, tolerance_mm))
+    };
+    // Breaks are moved to where the deviations are, as they are without fewer rows.
+    let fit = |breaks: Vec<f64>| {
+        let spans = breaks.len() - 1;
+        let mut best: Option<Net> = None;
+        let mut breaks = breaks;
+        for _ in 0..SETTLINGS {
+            let net = over(breaks)?;
+            breaks = Density::after(&net.basis, &net.rings).breaks(spans);
+            if best.as_ref().is_none_or(|best| net.most_mm < best.most_mm) {
+                best = Some(net);
+            }
+            if best
+                .as_ref()
+                .is_some_and(|best| best.most_mm <= tolerance_mm)
+            {
+                break;
+            }
+        }
+        best
     };
     let holds = |net: &Net| net.most_mm <= tolerance_mm;
     let least = trial.basis.spans();

@@ -2,7 +2,7 @@
 
 use nurbs::{BandedMatrix, KnotVector};
 
-use crate::around::{Ring, STIFFNESS, feet, reweigh};
+use crate::around::{Ring, STIFFNESS, feet, is_done, reweigh};
 use crate::basis::Basis;
 use crate::space::{plus, times};
 use crate::stack::Stack;
@@ -65,7 +65,7 @@ impl Net {
         let mut at = starts.to_vec();
         let mut weights: Vec<Vec<f64>> = at.iter().map(|of| vec![1.0; of.len()]).collect();
         let mut best: Option<Self> = None;
-        for _ in 0..rounds {
+        for round in 0..rounds {
             let points = solved(stack, basis, across, &at, &weights)?;
             let mut rings = Vec::with_capacity(at.len());
             for ((course, height), at) in stack.courses.iter().zip(&stack.heights).zip(&mut at) {
@@ -93,7 +93,7 @@ impl Net {
                     most_mm,
                 });
             }
-            if most_mm <= tolerance_mm {
+            if is_done(round, most_mm, tolerance_mm) {
                 break;
             }
         }
