@@ -86,7 +86,7 @@ struct Case {
 /// STEP file of each judged. All are judged before the first failure is reported.
 pub(crate) fn run(options: &Options) -> Result<()> {
     let place = shell::root().join("target/judges");
-    let python = python(&place, options.gmsh)?;
+    let python = python(&place, gmsh(options.gmsh))?;
     let scenes = options.out.clone().unwrap_or_else(|| place.join("scenes"));
     study::build()?;
     let judges = Judges {
@@ -319,22 +319,27 @@ fn cadmpeg(place: &Path) -> Result<String> {
     Ok(home.join("release/judge-cadmpeg").display().to_string())
 }
 
-/// A Python with the judge's packages, and Gmsh if asked for, made once.
-pub(crate) fn python(place: &Path, with_gmsh: bool) -> Result<String> {
+/// Gmsh, if asked for, among the packages of [`python`].
+pub(crate) fn gmsh(is_wanted: bool) -> &'static [&'static str] {
+    if is_wanted { &[GMSH] } else { &[] }
+}
+
+/// A Python with the judge's packages, and more if asked for, made once.
+pub(crate) fn python(place: &Path, more: &[&str]) -> Result<String> {
     let mut packages = PACKAGES.to_vec();
-    packages.extend(with_gmsh.then_some(GMSH));
+    packages.extend(more);
     let home = place.join("python");
     let python = home.join("bin/python").display().to_string();
     let ready = home.join("ready");
     // What more an earlier run asked for does no harm.
     let had = std::fs::read_to_string(&ready).unwrap_or_default();
-    if packages
-        .iter()
-        .all(|package| had.lines().any(|line| line == *package))
-    {
+    packages.retain(|package| !had.lines().any(|line| line == *package));
+    if packages.is_empty() {
         return Ok(python);
     }
-    shell::run("python3", &["-m", "venv", &home.display().to_string()])?;
+    if had.is_empty() {
+        shell::run("python3", &["-m", "venv", &home.display().to_string()])?;
+    }
     let mut install = vec![
         "-m",
         "pip",
@@ -344,7 +349,8 @@ pub(crate) fn python(place: &Path, with_gmsh: bool) -> Result<String> {
     ];
     install.extend(packages.iter().copied());
     shell::run(&python, &install)?;
-    std::fs::write(&ready, packages.join("\n"))
+    let now: Vec<&str> = had.lines().chain(packages.iter().copied()).collect();
+    std::fs::write(&ready, now.join("\n"))
         .with_context(|| format!("cannot write {}", ready.display()))?;
     Ok(python)
 }

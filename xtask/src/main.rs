@@ -4,6 +4,7 @@ mod apt;
 mod deb;
 mod fuzz;
 mod judge;
+mod peers;
 mod reproduce;
 mod rules;
 mod safety;
@@ -36,6 +37,9 @@ enum Chore {
     ///
     /// Needs Python 3; installs the judge's packages into `target/judges`.
     Judge(judge::Options),
+    /// Hold a command against what other programs make of the same task.
+    #[command(subcommand)]
+    Peers(peers::Peers),
     /// Repeat the experiments of Shim & Lee 1995 and write `docs/reproduction.md`.
     ///
     /// For the figures' pictures it needs Python 3, as `judge` does; `--check` and `--print`
@@ -77,6 +81,7 @@ fn main() -> anyhow::Result<()> {
     match Arguments::parse().chore {
         Chore::Rules => rules::check(),
         Chore::Judge(options) => judge::run(&options),
+        Chore::Peers(peers) => peers::run(&peers),
         Chore::Reproduce(options) => reproduce::run(&options),
         Chore::Fuzz(options) => fuzz::run(&options),
         Chore::Study(study) => study::run(&study),
@@ -115,6 +120,7 @@ fn full() -> anyhow::Result<()> {
         within_s: Some(SLOWEST_S),
         out: None,
     })?;
+    peers::run(&peers::Peers::Skin(peers::Options { short: false }))?;
     vm::run(&vm::Vm::Usb(vm::Options::default()))?;
     fuzz::run(&fuzz::Options {
         seconds: 600,

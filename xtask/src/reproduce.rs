@@ -38,7 +38,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     let target = shell::root().join("target");
     let data = target.join("studies/reproduction").display().to_string();
     study::program(PROGRAM, &words(&["--write", PAGE, "--data", &data]))?;
-    let python = judge::python(&target.join("judges"), false)?;
+    let python = judge::python(&target.join("judges"), &[])?;
     let draw = ["-B", "docs/pictures/reproduction.py", &data, PICTURES];
     shell::run(&python, &draw)
 }

@@ -97,7 +97,7 @@ pub(crate) fn run(study: &Study) -> Result<()> {
         Study::Parts { options } => {
             let place = shell::root().join("target/judges");
             let with_gmsh = options.iter().any(|word| word == "--gmsh");
-            let python = judge::python(&place, with_gmsh)?;
+            let python = judge::python(&place, judge::gmsh(with_gmsh))?;
             let mut words: Vec<OsString> = vec!["--python".into(), python.into()];
             words.extend(options.iter().cloned());
             program("study-parts", &words)
