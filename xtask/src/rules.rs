@@ -38,6 +38,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &["nurbs", "range-image", "reconstruct", "shapes"],
     ),
     ("compare", &["range-image"]),
+    ("surfacing", &["nurbs", "range-image"]),
     (
         "pipeline",
         &[

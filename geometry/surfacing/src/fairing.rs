@@ -1,0 +1,327 @@
+//! Fairing: data points moved within a bound, so that curvature varies less.
+//!
+//! The idea is Kjellander's (1983): points, not the surface, are moved, none farther than a
+//! bound. The points minimise the sum of squared moves plus a weight times the sum of squared
+//! third differences along both directions, under the bound. The weight follows from the
+//! noise by Stein's estimate of the risk (1981): of those weights with nearly the least
+//! expected distance from the noiseless surface the greatest, so that fairing takes away
+//! noise and leaves shape. No difference reaches across a feature line.
+
+use range_image::{Cancelled, Monitor};
+
+use crate::character::Features;
+use crate::grid::HeightGrid;
+
+/// Weights tried: powers of four from the first.
+const FIRST_WEIGHT: f64 = 0.25;
+const WEIGHTS: usize = 11;
+/// How far above the least risk the chosen weight's may lie.
+const RISK_SLACK: f64 = 1.05;
+/// Rounds in which points at the bound are found.
+const MOST_ROUNDS: usize = 30;
+/// Steps of conjugate gradients, and the drop of the residual at which they end.
+const MOST_STEPS: usize = 600;
+const DROP: f64 = 1e-6;
+/// Moves this near to the bound count as at it.
+const AT_BOUND: f64 = 1.0 - 1e-9;
+
+/// What fairing did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FairingReport {
+    /// No point was moved farther, millimetres.
+    pub bound_mm: f64,
+    /// Noise that the data show, one standard deviation, millimetres.
+    pub noise_mm: f64,
+    /// Mean square of the third derivative along x and y before, mm^-4.
+    pub variation_before: f64,
+    /// The same after.
+    pub variation_after: f64,
+    /// Greatest move, millimetres.
+    pub greatest_move_mm: f64,
+    /// Root mean square of the moves, millimetres.
+    pub rms_move_mm: f64,
+    /// Nodes moved as far as the bound.
+    pub at_bound: usize,
+    /// Pairs of neighbouring nodes between which a feature line runs.
+    pub feature_crossings: usize,
+}
+
+/// Third differences that are asked to be small.
+struct Energy {
+    rows: usize,
+    /// First nodes of those along x and along y.
+    along_x: Vec<usize>,
+    along_y: Vec<usize>,
+}
+
+impl Energy {
+    fn new(grid: &HeightGrid, features: &Features) -> Self {
+        let (columns, rows) = (grid.columns(), grid.rows());
+        let z = grid.raw_z_mm();
+        let whole = |n: usize, stride: usize, breaks: &[bool]| {
+            (0..4).all(|k| !z[n + k * stride].is_nan()) && (0..3).all(|k| !breaks[n + k * stride])
+        };
+        let (mut along_x, mut along_y) = (Vec::new(), Vec::new());
+        for i in 0..columns {
+            for j in 0..rows {
+                let n = i * rows + j;
+                if i + 3 < columns && whole(n, rows, &features.along_x) {
+                    along_x.push(n);
+                }
+                if j + 3 < rows && whole(n, 1, &features.along_y) {
+                    along_y.push(n);
+                }
+            }
+        }
+        Self {
+            rows,
+            along_x,
+            along_y,
+        }
+    }
+
+    fn third(z: &[f64], n: usize, stride: usize) -> f64 {
+        z[n + 3 * stride] - 3.0 * z[n + 2 * stride] + 3.0 * z[n + stride] - z[n]
+    }
+
+    fn lines(&self) -> [(&[usize], usize); 2] {
+        [(&self.along_x, self.rows), (&self.along_y, 1)]
+    }
+
+    /// Mean square of the third differences.
+    fn mean_square(&self, z: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        for (starts, stride) in self.lines() {
+            for &n in starts {
+                let third = Self::third(z, n, stride);
+                sum += third * third;
+            }
+        }
+        sum / (self.along_x.len() + self.along_y.len()).max(1) as f64
+    }
+
+    /// `z + weight D'D z`.
+    fn apply(&self, z: &[f64], weight: f64) -> Vec<f64> {
+        let mut out = z.to_vec();
+        for (starts, stride) in self.lines() {
+            for &n in starts {
+                let third = weight * Self::third(z, n, stride);
+                out[n + 3 * stride] += third;
+                out[n + 2 * stride] -= 3.0 * third;
+                out[n + stride] += 3.0 * third;
+                out[n] -= third;
+            }
+        }
+        out
+    }
+
+    fn diagonal(&self, nodes: usize, weight: f64) -> Vec<f64> {
+        let mut out = vec![1.0; nodes];
+        for (starts, stride) in self.lines() {
+            for &n in starts {
+                for (k, square) in [1.0, 9.0, 9.0, 1.0].into_iter().enumerate() {
+                    out[n + k * stride] += weight * square;
+                }
+            }
+        }
+        out
+    }
+
+    /// Solves `(1 + weight D'D) z = data` over the nodes that are free; the others keep
+    /// their z of `start`.
+    fn solve(
+        &self,
+        data: &[f64],
+        weight: f64,
+        start: &[f64],
+        is_free: &[bool],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<f64>, Cancelled> {
+        let mut z = start.to_vec();
+        let image = self.apply(&z, weight);
+        let only_free = |n: usize, value: f64| if is_free[n] { value } else { 0.0 };
+        let mut residual: Vec<f64> = (0..z.len())
+            .map(|n| only_free(n, data[n] - image[n]))
+            .collect();
+        let diagonal = self.diagonal(z.len(), weight);
+        let mut direction: Vec<f64> = residual.iter().zip(&diagonal).map(|(r, d)| r / d).collect();
+        let mut size = dot(&residual, &direction);
+        let enough = size * DROP * DROP;
+        for _ in 0..MOST_STEPS {
+            if size <= enough || size <= 0.0 {
+                break;
+            }
+            monitor.check()?;
+            let image = self.apply(&direction, weight);
+            let step = size / dot(&direction, &image);
+            let mut next = 0.0;
+            for n in 0..z.len() {
+                z[n] += step * direction[n];
+                residual[n] -= only_free(n, step * image[n]);
+                next += residual[n] * residual[n] / diagonal[n];
+            }
+            let turn = next / size;
+            size = next;
+            for n in 0..z.len() {
+                direction[n] = residual[n] / diagonal[n] + turn * direction[n];
+            }
+        }
+        Ok(z)
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// The grid with its points moved by at most `bound_mm`, and what that did.
+///
+/// # Errors
+/// [`Cancelled`] at the monitor's wish.
+pub fn fair(
+    grid: &HeightGrid,
+    bound_mm: f64,
+    monitor: &dyn Monitor,
+) -> Result<(Vec<f64>, FairingReport), Cancelled> {
+    let raw = grid.raw_z_mm();
+    let noise_mm = grid.noise_mm();
+    let features = Features::of(grid, noise_mm);
+    let energy = Energy::new(grid, &features);
+    let is_data: Vec<bool> = raw.iter().map(|z| !z.is_nan()).collect();
+    // Around 0, so that sums keep their digits; masked nodes lie in no difference.
+    let mean = raw.iter().filter(|z| !z.is_nan()).sum::<f64>() / grid.valid_nodes().max(1) as f64;
+    let data: Vec<f64> = raw
+        .iter()
+        .map(|z| if z.is_nan() { 0.0 } else { z - mean })
+        .collect();
+    let (weight, start) = chosen_weight(&energy, &data, &is_data, noise_mm, monitor)?;
+    let z = bounded(&energy, &data, weight, start, bound_mm, monitor)?;
+    let moves = || {
+        let moves = z.iter().zip(&data).map(|(z, d)| (z - d).abs());
+        moves
+            .zip(&is_data)
+            .filter_map(|(m, &is_data)| is_data.then_some(m))
+    };
+    let scale = grid.pitch_mm() * grid.pitch_mm() * grid.pitch_mm();
+    let squares: f64 = moves().map(|m| m * m).sum();
+    let crossings = features.along_x.iter().chain(&features.along_y);
+    let report = FairingReport {
+        bound_mm,
+        noise_mm,
+        variation_before: energy.mean_square(&data) / (scale * scale),
+        variation_after: energy.mean_square(&z) / (scale * scale),
+        greatest_move_mm: moves().fold(0.0, f64::max),
+        rms_move_mm: (squares / grid.valid_nodes().max(1) as f64).sqrt(),
+        at_bound: moves().filter(|m| *m >= bound_mm * AT_BOUND).count(),
+        feature_crossings: crossings.filter(|crosses| **crosses).count(),
+    };
+    let faired = z
+        .iter()
+        .zip(raw)
+        .map(|(z, raw)| if raw.is_nan() { f64::NAN } else { z + mean })
+        .collect();
+    Ok((faired, report))
+}
+
+/// The greatest weight with nearly the least risk, and the points under it without a bound.
+fn chosen_weight(
+    energy: &Energy,
+    data: &[f64],
+    is_data: &[bool],
+    noise_mm: f64,
+    monitor: &dyn Monitor,
+) -> Result<(f64, Vec<f64>), Cancelled> {
+    let nodes = is_data.iter().filter(|is_data| **is_data).count().max(1) as f64;
+    let all_free = vec![true; data.len()];
+    let mut tried: Vec<(f64, f64, Vec<f64>)> = Vec::new();
+    let mut start = data.to_vec();
+    let mut weight = FIRST_WEIGHT;
+    for round in 0..WEIGHTS {
+        let z = energy.solve(data, weight, &start, &all_free, monitor)?;
+        monitor.progress(0.8 * (round + 1) as f64 / WEIGHTS as f64);
+        let off: f64 = z.iter().zip(data).map(|(z, d)| (z - d) * (z - d)).sum();
+        let kept = kept_share(weight);
+        let risk = off / nodes + (2.0 * kept - 1.0) * noise_mm * noise_mm;
+        let is_past = tried
+            .iter()
+            .any(|(_, least, _)| risk > 2.0 * least.max(0.01 * noise_mm * noise_mm));
+        start.clone_from(&z);
+        tried.push((weight, risk, z));
+        if is_past {
+            break;
+        }
+        weight *= 4.0;
+    }
+    // What lies below a hundredth of the noise cannot be told apart.
+    let floor = 0.01 * noise_mm * noise_mm;
+    let least = tried
+        .iter()
+        .map(|t| t.1.max(floor))
+        .fold(f64::INFINITY, f64::min);
+    let chosen = tried
+        .into_iter()
+        .rev()
+        .find(|(_, risk, _)| risk.max(floor) <= RISK_SLACK * least);
+    Ok(chosen.map_or((FIRST_WEIGHT, data.to_vec()), |(weight, _, z)| (weight, z)))
+}
+
+/// Trace of the smoothing operator per node, far from borders: the mean over frequencies of
+/// 1 / (1 + weight (4 sin^2)^3), both directions added.
+fn kept_share(weight: f64) -> f64 {
+    const PARTS: usize = 64;
+    let powers: Vec<f64> = (0..PARTS)
+        .map(|k| {
+            let angle = (k as f64 + 0.5) / PARTS as f64 * core::f64::consts::FRAC_PI_2;
+            let sine = 2.0 * libm::sin(angle);
+            let square = sine * sine;
+            square * square * square
+        })
+        .collect();
+    let mut sum = 0.0;
+    for a in &powers {
+        for b in &powers {
+            sum += 1.0 / (1.0 + weight * (a + b));
+        }
+    }
+    sum / (PARTS * PARTS) as f64
+}
+
+/// The points that minimise the same under the bound: those beyond it are held at it, and let
+/// go again when they would move inwards, until that changes nothing.
+fn bounded(
+    energy: &Energy,
+    data: &[f64],
+    weight: f64,
+    start: Vec<f64>,
+    bound_mm: f64,
+    monitor: &dyn Monitor,
+) -> Result<Vec<f64>, Cancelled> {
+    let clamped = |z: &[f64]| -> Vec<f64> {
+        let both = z.iter().zip(data);
+        both.map(|(z, d)| d + (z - d).clamp(-bound_mm, bound_mm))
+            .collect()
+    };
+    let mut z = start;
+    let mut is_free = vec![true; z.len()];
+    for _ in 0..MOST_ROUNDS {
+        let held = clamped(&z);
+        let image = energy.apply(&z, weight);
+        let next: Vec<bool> = (0..z.len())
+            .map(|n| {
+                let shift = z[n] - data[n];
+                if is_free[n] {
+                    shift.abs() <= bound_mm
+                } else {
+                    // At the bound, the descent must point outwards.
+                    (data[n] - image[n]) * shift < 0.0
+                }
+            })
+            .collect();
+        if next == is_free {
+            return Ok(held);
+        }
+        is_free = next;
+        z = energy.solve(data, weight, &held, &is_free, monitor)?;
+    }
+    Ok(clamped(&z))
+}
