@@ -221,6 +221,8 @@ fn parts(knots: &KnotVector) -> Vec<(KnotVector, usize)> {
 const SIDE: usize = 7;
 /// Lines to either side over which jumps are averaged.
 const BESIDE: usize = 2;
+/// Beside a feature another must show at least this share of its jump to be one.
+const LOBE: f64 = 0.6;
 /// Least change of slope that is a crease, mm/mm: 8.5 degrees from level.
 const LEAST_CREASE: f64 = 0.15;
 
@@ -277,10 +279,10 @@ fn found_along(
     for k in SIDE - 1..count.saturating_sub(SIDE) {
         for line in 0..lines {
             let mut jump = [0.0; 2];
-            for m in 0..SIDE {
+            for (m, (value, slope)) in weights[0].iter().zip(&weights[1]).enumerate() {
                 let (before, after) = (z(k - m, line), z(k + 1 + m, line));
-                jump[0] += weights[0][m] * (after - before);
-                jump[1] += weights[1][m] * (after + before);
+                jump[0] += value * (after - before);
+                jump[1] += slope * (after + before);
             }
             jumps[k * lines + line] = jump;
         }
@@ -310,11 +312,16 @@ fn found_along(
             *score = step.max(crease);
         }
         for k in 0..count {
-            let from = k.saturating_sub(SIDE / 2);
-            let near = line_scores[from..(k + SIDE / 2 + 1).min(count)].iter();
-            let most = near.copied().fold(0.0, f64::max);
-            // The line may run between two middles.
-            is_feature[k * lines + line] = line_scores[k] > 1.0 && line_scores[k] >= 0.9 * most;
+            let most = |reach: usize| {
+                let from = k.saturating_sub(reach);
+                let near = line_scores[from..(k + reach + 1).min(count)].iter();
+                near.copied().fold(0.0, f64::max)
+            };
+            // The line may run between two middles; parabolas that reach across it miss each
+            // other, too, but by less.
+            is_feature[k * lines + line] = line_scores[k] > 1.0
+                && line_scores[k] >= 0.9 * most(SIDE / 2)
+                && line_scores[k] >= LOBE * most(SIDE);
         }
     }
     is_feature
@@ -339,11 +346,12 @@ fn parabola() -> [[f64; SIDE]; 2] {
             *norm += b * b;
         }
     }
-    for m in 0..SIDE {
+    let [values, of_slope] = &mut weights;
+    for (m, (value, slope)) in values.iter_mut().zip(of_slope).enumerate() {
         let here = basis(m as f64 - middle);
         for k in 0..3 {
-            weights[0][m] += here[k] * basis(at)[k] / norms[k];
-            weights[1][m] += here[k] * slopes[k] / norms[k];
+            *value += here[k] * basis(at)[k] / norms[k];
+            *slope += here[k] * slopes[k] / norms[k];
         }
     }
     weights

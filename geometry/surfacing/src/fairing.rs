@@ -196,11 +196,15 @@ pub fn fair(
         .collect();
     let (weight, start) = chosen_weight(&energy, &data, &is_data, noise_mm, monitor)?;
     let z = bounded(&energy, &data, weight, start, bound_mm, monitor)?;
+    let faired: Vec<f64> = z
+        .iter()
+        .zip(&data)
+        .zip(raw)
+        .map(|((z, d), raw)| moved(*raw, z - d, bound_mm))
+        .collect();
     let moves = || {
-        let moves = z.iter().zip(&data).map(|(z, d)| (z - d).abs());
-        moves
-            .zip(&is_data)
-            .filter_map(|(m, &is_data)| is_data.then_some(m))
+        let moves = faired.iter().zip(raw).map(|(z, raw)| (z - raw).abs());
+        moves.filter(|m| !m.is_nan())
     };
     let scale = grid.pitch_mm() * grid.pitch_mm() * grid.pitch_mm();
     let squares: f64 = moves().map(|m| m * m).sum();
@@ -208,19 +212,27 @@ pub fn fair(
     let report = FairingReport {
         bound_mm,
         noise_mm,
-        variation_before: energy.mean_square(&data) / (scale * scale),
-        variation_after: energy.mean_square(&z) / (scale * scale),
+        variation_before: energy.mean_square(raw) / (scale * scale),
+        variation_after: energy.mean_square(&faired) / (scale * scale),
         greatest_move_mm: moves().fold(0.0, f64::max),
         rms_move_mm: (squares / grid.valid_nodes().max(1) as f64).sqrt(),
         at_bound: moves().filter(|m| *m >= bound_mm * AT_BOUND).count(),
         feature_crossings: crossings.filter(|crosses| **crosses).count(),
     };
-    let faired = z
-        .iter()
-        .zip(raw)
-        .map(|(z, raw)| if raw.is_nan() { f64::NAN } else { z + mean })
-        .collect();
     Ok((faired, report))
+}
+
+/// A point moved, by no more than the bound to the last digit.
+fn moved(raw_mm: f64, by_mm: f64, bound_mm: f64) -> f64 {
+    let mut z_mm = raw_mm + by_mm.clamp(-bound_mm, bound_mm);
+    while (z_mm - raw_mm).abs() > bound_mm {
+        z_mm = if z_mm > raw_mm {
+            z_mm.next_down()
+        } else {
+            z_mm.next_up()
+        };
+    }
+    z_mm
 }
 
 /// The greatest weight with nearly the least risk, and the points under it without a bound.
@@ -324,4 +336,108 @@ fn bounded(
         z = energy.solve(data, weight, &held, &is_free, monitor)?;
     }
     Ok(clamped(&z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use range_image::Unmonitored;
+
+    const SIDE: usize = 90;
+    const PITCH_MM: f64 = 0.5;
+
+    /// Normal draws from a fixed seed, of one standard deviation.
+    fn noise(count: usize) -> Vec<f64> {
+        let mut state: u64 = 0x9e37_79b9_7f4a_7c15;
+        let mut uniform = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+        };
+        (0..count)
+            .map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0)
+            .collect()
+    }
+
+    fn faired(
+        truth: impl Fn(f64, f64) -> f64,
+        noise_mm: f64,
+        bound_mm: f64,
+    ) -> (Vec<f64>, Vec<f64>, Vec<f64>, FairingReport) {
+        let truth: Vec<f64> = (0..SIDE * SIDE)
+            .map(|n| truth((n / SIDE) as f64 * PITCH_MM, (n % SIDE) as f64 * PITCH_MM))
+            .collect();
+        let draws = noise(truth.len());
+        let measured: Vec<f64> = truth
+            .iter()
+            .zip(&draws)
+            .map(|(t, d)| t + noise_mm * d)
+            .collect();
+        let grid = HeightGrid::new(PITCH_MM, [0.0; 2], SIDE, SIDE, measured.clone()).unwrap();
+        let (z, report) = fair(&grid, bound_mm, &Unmonitored).unwrap();
+        (truth, measured, z, report)
+    }
+
+    fn rms(a: &[f64], b: &[f64]) -> f64 {
+        let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
+        (squares.sum::<f64>() / a.len() as f64).sqrt()
+    }
+
+    fn hills(x: f64, y: f64) -> f64 {
+        4.0 * libm::sin(x * 0.16) * libm::cos(y * 0.13) + 0.05 * x
+    }
+
+    #[test]
+    fn noise_goes_and_shape_stays() {
+        let (truth, measured, z, report) = faired(hills, 0.05, 0.15);
+        assert!((report.noise_mm - 0.05).abs() < 0.003, "{report:?}");
+        assert!(
+            report.variation_after * 10.0 < report.variation_before,
+            "{report:?}"
+        );
+        let (before, after) = (rms(&measured, &truth), rms(&z, &truth));
+        assert!(after < 0.35 * before, "{before} {after}");
+        assert!(report.greatest_move_mm <= 0.15, "{report:?}");
+    }
+
+    #[test]
+    fn no_point_moves_over_a_bound_that_binds() {
+        let (truth, measured, z, report) = faired(hills, 0.05, 0.04);
+        let farthest = z
+            .iter()
+            .zip(&measured)
+            .map(|(z, m)| (z - m).abs())
+            .fold(0.0, f64::max);
+        assert!(farthest <= 0.04, "{farthest}");
+        assert!(report.at_bound > 500, "{report:?}");
+        assert!(
+            report.variation_after < report.variation_before,
+            "{report:?}"
+        );
+        assert!(rms(&z, &truth) < rms(&measured, &truth));
+    }
+
+    #[test]
+    fn a_crease_stays_sharp() {
+        let ridge = |x: f64, y: f64| 3.0 - (x - 22.3 + 0.3 * (y - 22.0)).abs() * 0.6;
+        let (truth, measured, z, report) = faired(ridge, 0.05, 0.15);
+        assert!(report.feature_crossings > 60, "{report:?}");
+        // Within two nodes of the crease the points are nearer to the truth than before.
+        let near: Vec<usize> = (0..truth.len())
+            .filter(|n| {
+                let (x, y) = ((n / SIDE) as f64 * PITCH_MM, (n % SIDE) as f64 * PITCH_MM);
+                (x - 22.3 + 0.3 * (y - 22.0)).abs() < 2.0 * PITCH_MM
+            })
+            .collect();
+        let at = |values: &[f64]| -> Vec<f64> { near.iter().map(|&n| values[n]).collect() };
+        let (before, after) = (rms(&at(&measured), &at(&truth)), rms(&at(&z), &at(&truth)));
+        assert!(after < before, "{before} {after}");
+    }
+
+    #[test]
+    fn noiseless_points_stay_where_they_are() {
+        let (truth, _, z, report) = faired(hills, 0.0, 0.5);
+        assert!(rms(&z, &truth) < 1e-4, "{report:?}");
+    }
 }

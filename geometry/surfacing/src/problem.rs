@@ -8,16 +8,14 @@ use crate::grid::HeightGrid;
 use crate::infill;
 use crate::knots::Knots;
 
-/// Power of the soft maximum, as a power of two that squares reach: 2^4 and 2^3 added.
-/// Coordinates are moved to lower the sum of (deviation / tolerance)^12: near the maximum,
-/// but every large deviation counts, not only the largest.
-const SOFT: i32 = 12;
-
 /// The deviations of the nodes with a value.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Score {
     pub(crate) max: f64,
+    /// Sum of (deviation / tolerance)^12: near the maximum, but every large deviation counts.
     pub(crate) soft: f64,
+    /// Sum of (deviation / tolerance)^4, which tells sooner where knots are wanted.
+    pub(crate) gentle: f64,
     pub(crate) sum_of_squares: f64,
     pub(crate) within: usize,
 }
@@ -79,12 +77,7 @@ impl Problem {
     pub(crate) fn score(&self, u: &Axis, v: &Axis, coefficients: &[f64]) -> Score {
         let rows = self.rows;
         let of_column = |i: usize| {
-            let mut score = Score {
-                max: 0.0,
-                soft: 0.0,
-                sum_of_squares: 0.0,
-                within: 0,
-            };
+            let mut score = Score::default();
             let line = fit::section(&u.at[i], coefficients, v.count);
             let here = i * rows..(i + 1) * rows;
             let data = self.z[here.clone()].iter().zip(&self.is_data[here]);
@@ -93,7 +86,10 @@ impl Problem {
                     let off = (z - fit::at(&line, node)).abs();
                     score.max = score.max.max(off);
                     score.sum_of_squares += off * off;
-                    score.soft += power(off / self.tolerance);
+                    let square = (off / self.tolerance) * (off / self.tolerance);
+                    let fourth = square * square;
+                    score.gentle += fourth;
+                    score.soft += fourth * fourth * fourth;
                     score.within += usize::from(off <= self.tolerance);
                 }
             }
@@ -105,20 +101,15 @@ impl Problem {
             .map(of_column)
             .collect();
         // One after the other, so that the sums do not depend on the threads.
-        columns.into_iter().fold(
-            Score {
-                max: 0.0,
-                soft: 0.0,
-                sum_of_squares: 0.0,
-                within: 0,
-            },
-            |sum, column| Score {
+        columns
+            .into_iter()
+            .fold(Score::default(), |sum, column| Score {
                 max: sum.max.max(column.max),
                 soft: sum.soft + column.soft,
+                gentle: sum.gentle + column.gentle,
                 sum_of_squares: sum.sum_of_squares + column.sum_of_squares,
                 within: sum.within + column.within,
-            },
-        )
+            })
     }
 
     /// Greatest deviation in each column of the nodes from what knots along x alone come to.
@@ -171,11 +162,4 @@ impl Problem {
             }
         }
     }
-}
-
-fn power(share: f64) -> f64 {
-    debug_assert_eq!(SOFT, 12);
-    let square = share * share;
-    let fourth = square * square;
-    fourth * fourth * fourth
 }

@@ -149,8 +149,7 @@ pub fn breaks_of(z_mm: &[f64], pitch_mm: f64, thresholds: &JumpThresholds) -> Ve
         let threshold = thresholds.0[order];
         let mut candidates: Vec<usize> = (0..jumps.len())
             .filter(|&k| jumps[k][order] >= threshold)
-            // A crease between two nodes makes the cubics miss each other a little, too.
-            .filter(|&k| order > 0 || is_step(&jumps[k], pitch_mm))
+            .filter(|&k| is_own(&jumps[k], order, pitch_mm))
             .collect();
         // Beside the break the cubics reach across it and can miss each other by more, but
         // there the next derivative jumps, too.
@@ -176,9 +175,13 @@ pub fn breaks_of(z_mm: &[f64], pitch_mm: f64, thresholds: &JumpThresholds) -> Ve
     found
 }
 
-/// Both cubics meet within half a pitch of the middle at a crease, not at a step.
-pub(crate) fn is_step(jumps: &[f64; 4], pitch_mm: f64) -> bool {
-    jumps[0] > jumps[1] * pitch_mm
+/// Whether a derivative breaks at this middle, and not a higher one beside it: a cubic of which
+/// the last point lies across a break misses by 2.2, 3.0, 2.5 and 1 times that point's
+/// distance in value and derivatives, so that the next derivative jumps nearly as much.
+fn is_own(jumps: &[f64; 4], order: usize, pitch_mm: f64) -> bool {
+    const LEAST: [f64; 4] = [1.0, 1.5, 3.0, 0.0];
+    let next = jumps.get(order + 1).copied().unwrap_or(0.0);
+    jumps[order] > LEAST[order] * next * pitch_mm
 }
 
 /// Knots where derivatives of the reference sections break. A surface with four knots in a

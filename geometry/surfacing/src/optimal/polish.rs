@@ -9,7 +9,7 @@ use crate::problem::{Problem, Score};
 
 /// Nodes visited by all fits together, at most: a bound on the time that follows from the
 /// grid alone.
-const MOST_VISITS: usize = 800_000_000;
+const MOST_VISITS: usize = 600_000_000;
 /// Knots whose loss is tried in earnest, those that are missed least first.
 const TRIED: usize = 8;
 /// Knots to either side of a lost one that make up for it.
@@ -80,16 +80,18 @@ pub(super) fn polish(
             break;
         }
         safe = state.knots.clone();
-        polish.move_all(&mut state)?;
+        polish.move_all(&mut state, |score| score.soft)?;
         polish.refill(&mut state);
         if !is_near(polish.problem, &state.knots) {
             break;
         }
         safe = state.knots.clone();
-        if state.knots.control_points() == before && !polish.remove_all_changes(&mut state)? {
-            break;
+        if state.knots.control_points() < before {
+            continue;
         }
-        if polish.fits_left == 0 {
+        if polish.fits_left == 0
+            || !(polish.remove_all_changes(&mut state)? || polish.remove_boldly(&mut state)?)
+        {
             break;
         }
     }
@@ -182,9 +184,8 @@ impl Polish<'_> {
         Ok(())
     }
 
-    fn remove_one(&mut self, state: &mut State) -> Result<bool, Cancelled> {
-        self.told()?;
-        let tolerance = self.problem.tolerance;
+    /// What it costs to lose each knot, least first.
+    fn losses(&mut self, state: &State) -> Vec<(Score, Along, usize)> {
         let mut losses: Vec<(Score, Along, usize)> = Vec::new();
         for along in [Along::U, Along::V] {
             let breaks = breaks_of(state, along).clone();
@@ -201,6 +202,13 @@ impl Polish<'_> {
             }
         }
         losses.sort_by(|a, b| a.0.soft.total_cmp(&b.0.soft));
+        losses
+    }
+
+    fn remove_one(&mut self, state: &mut State) -> Result<bool, Cancelled> {
+        self.told()?;
+        let tolerance = self.problem.tolerance;
+        let losses = self.losses(state);
         // Where many can go without a word, they go at once.
         let mut gone = false;
         for along in [Along::U, Along::V] {
@@ -226,6 +234,31 @@ impl Polish<'_> {
             {
                 self.take(state, along, breaks, score);
                 return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Takes away a knot that is missed, and moves all others to make up for it.
+    fn remove_boldly(&mut self, state: &mut State) -> Result<bool, Cancelled> {
+        let losses = self.losses(state);
+        for (_, along, index) in losses.into_iter().take(TRIED) {
+            let mut knots = state.knots.clone();
+            match along {
+                Along::U => knots.u = knots.u.without(index),
+                Along::V => knots.v = knots.v.without(index),
+            }
+            let Some(mut fewer) = self.state(knots) else {
+                continue;
+            };
+            self.move_all(&mut fewer, |score| score.gentle)?;
+            self.move_all(&mut fewer, |score| score.soft)?;
+            if fewer.score.max <= self.problem.tolerance {
+                *state = fewer;
+                return Ok(true);
+            }
+            if self.fits_left == 0 {
+                break;
             }
         }
         Ok(false)
@@ -294,17 +327,21 @@ impl Polish<'_> {
     }
 
     /// Moves all knots to where the deviations are least.
-    fn move_all(&mut self, state: &mut State) -> Result<(), Cancelled> {
+    fn move_all(
+        &mut self,
+        state: &mut State,
+        cost: impl Fn(&Score) -> f64,
+    ) -> Result<(), Cancelled> {
         let mut step = FIRST_STEP;
         while step > LAST_STEP && self.fits_left > 0 {
-            let before = state.score.soft;
+            let before = cost(&state.score);
             for along in [Along::U, Along::V] {
                 let mut index = 0;
                 while index < breaks_of(state, along).inner.len() {
                     let breaks = breaks_of(state, along).clone();
                     for other in moved(&breaks, index, step) {
                         if let Some(score) = self.try_other(state, along, &other)
-                            && score.soft < GAIN * state.score.soft
+                            && cost(&score) < GAIN * cost(&state.score)
                         {
                             self.take(state, along, other, score);
                             break;
@@ -314,7 +351,7 @@ impl Polish<'_> {
                 }
                 self.told()?;
             }
-            if state.score.soft > 0.9 * before {
+            if cost(&state.score) > 0.9 * before {
                 step /= 2.0;
             }
         }
