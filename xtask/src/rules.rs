@@ -131,7 +131,7 @@ const DAEMON: [&str; 15] = [
     "storage",
 ];
 
-const COMMAND_LINE: [&str; 18] = [
+const COMMAND_LINE: [&str; 19] = [
     "cad-exchange",
     "compare",
     "deliverables",
@@ -150,6 +150,7 @@ const COMMAND_LINE: [&str; 18] = [
     "sim-scanner",
     "solids",
     "storage",
+    "surfacing",
 ];
 
 const EVERYTHING: [&str; 15] = [

@@ -2,7 +2,7 @@
 
 use core::ops::Range;
 
-use range_image::RangeImage;
+use range_image::{Lattice, RangeImage};
 
 use crate::error::SurfaceError;
 
@@ -123,6 +123,20 @@ impl HeightGrid {
         Self::new(self.pitch_mm, first_mm, columns.len(), rows.len(), z_mm).ok()
     }
 
+    /// The same as a range image, for a grid on the lattice of one.
+    #[must_use]
+    pub fn to_image(&self) -> RangeImage {
+        let lattice = Lattice {
+            pitch_mm: self.pitch_mm,
+        };
+        let [i, j] = self.first_mm.map(|mm| (mm / self.pitch_mm).round() as i64);
+        let mut image = RangeImage::masked(lattice, i, j, self.columns, self.rows);
+        for (n, &z) in self.z_mm.iter().enumerate().filter(|(_, z)| !z.is_nan()) {
+            image.set_z_mm(n / self.rows, n % self.rows, Some(z));
+        }
+        image
+    }
+
     /// Distance of neighbouring nodes, millimetres.
     #[must_use]
     pub fn pitch_mm(&self) -> f64 {
@@ -222,7 +236,6 @@ impl HeightGrid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use range_image::Lattice;
 
     #[test]
     fn an_image_is_cropped_to_what_it_holds() {
@@ -242,6 +255,9 @@ mod tests {
         assert_eq!(grid.column(0)[0], 31.0);
         assert!(grid.column(1)[2].is_nan());
         assert_eq!(grid.row(0)[5], 81.0);
+        let again = grid.to_image();
+        assert_eq!((again.origin(), again.z_mm(5, 0)), ((-1, 3), Some(81.0)));
+        assert_eq!(again.valid_nodes(), 29);
     }
 
     #[test]

@@ -21,6 +21,7 @@ pub(crate) mod scan;
 pub(crate) mod scans;
 mod setting;
 pub(crate) mod status;
+pub(crate) mod surface;
 pub(crate) mod token;
 pub(crate) mod watch;
 pub(crate) mod webhooks;
@@ -46,6 +47,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Retry(args) => block_on(change::retry(args, json)),
         Command::Cancel(args) => block_on(change::cancel(args, json)),
         Command::Rerun(args) => block_on(rerun::run(args, json)),
+        Command::Surface(args) => block_on(surface::run(args, json)),
         Command::Watch(args) => block_on(watch::run(args, json)),
         Command::Doctor(args) => block_on(doctor::run(args, json)),
         Command::Fetch(args) => block_on(fetch::run(args, json)),

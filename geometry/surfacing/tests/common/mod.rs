@@ -5,7 +5,12 @@ use surfacing::HeightGrid;
 
 /// A grid of `columns` x `rows` nodes over the unit square stretched to `pitch_mm` apart; `z`
 /// is given x and y of the square.
-pub(crate) fn grid(columns: usize, rows: usize, pitch_mm: f64, z: impl Fn(f64, f64) -> f64) -> HeightGrid {
+pub(crate) fn grid(
+    columns: usize,
+    rows: usize,
+    pitch_mm: f64,
+    z: impl Fn(f64, f64) -> f64,
+) -> HeightGrid {
     let share = |k: usize, count: usize| k as f64 / (count - 1) as f64;
     let z = (0..columns * rows)
         .map(|n| z(share(n / rows, columns), share(n % rows, rows)))

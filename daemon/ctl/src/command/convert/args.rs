@@ -412,31 +412,41 @@ impl Args {
 
     /// The time that stands in the files.
     pub(super) fn timestamp(&self, kept: Option<Timestamp>) -> Result<Timestamp, Failure> {
-        if let Some(given) = self.timestamp {
-            return Ok(given);
-        }
-        if let Some(epoch) = std::env::var_os("SOURCE_DATE_EPOCH") {
-            let seconds = epoch.to_str().and_then(|text| text.parse().ok());
-            let time = seconds.and_then(|seconds| Timestamp::from_second(seconds).ok());
-            return time.ok_or_else(|| {
-                Failure::Usage(format!(
-                    "SOURCE_DATE_EPOCH is {epoch:?}, which is not a number of seconds since 1970"
-                ))
-            });
-        }
-        if let Some(kept) = kept {
-            return Ok(kept);
-        }
-        let changed = std::fs::metadata(&self.input)
-            .and_then(|file| file.modified())
-            .ok();
-        let changed = changed.and_then(|time| Timestamp::try_from(time).ok());
-        Ok(changed.unwrap_or(Timestamp::UNIX_EPOCH))
+        timestamp(self.timestamp, kept, &self.input)
     }
 }
 
+/// The time that stands in files: what is said, SOURCE_DATE_EPOCH, when the scan was taken, or
+/// when its file was last changed.
+pub(crate) fn timestamp(
+    given: Option<Timestamp>,
+    kept: Option<Timestamp>,
+    input: &Path,
+) -> Result<Timestamp, Failure> {
+    if let Some(given) = given {
+        return Ok(given);
+    }
+    if let Some(epoch) = std::env::var_os("SOURCE_DATE_EPOCH") {
+        let seconds = epoch.to_str().and_then(|text| text.parse().ok());
+        let time = seconds.and_then(|seconds| Timestamp::from_second(seconds).ok());
+        return time.ok_or_else(|| {
+            Failure::Usage(format!(
+                "SOURCE_DATE_EPOCH is {epoch:?}, which is not a number of seconds since 1970"
+            ))
+        });
+    }
+    if let Some(kept) = kept {
+        return Ok(kept);
+    }
+    let changed = std::fs::metadata(input)
+        .and_then(|file| file.modified())
+        .ok();
+    let changed = changed.and_then(|time| Timestamp::try_from(time).ok());
+    Ok(changed.unwrap_or(Timestamp::UNIX_EPOCH))
+}
+
 /// The input's name without `.gz` and the ending of its format, fit for a file.
-fn input_stem(input: &Path) -> String {
+pub(crate) fn input_stem(input: &Path) -> String {
     let name = input
         .file_name()
         .map(|name| name.to_string_lossy().into_owned())
@@ -451,7 +461,7 @@ fn input_stem(input: &Path) -> String {
     file_stem(stem)
 }
 
-fn same_file(a: &Path, b: &Path) -> bool {
+pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
     match (a.canonicalize(), b.canonicalize()) {
         (Ok(a), Ok(b)) => a == b,
         _ => false,
