@@ -12,6 +12,13 @@ pub(crate) const DEGREE: usize = 3;
 /// nodes (Schoenberg & Whitney ask for any value above 0).
 const LEAST_HOLD: f64 = 0.02;
 
+/// Most that the coefficients may grow beyond the data: more, and functions that the nodes hardly
+/// tell apart cancel each other at the nodes and swing between them.
+const MOST_GAIN: f64 = 40.0;
+
+/// Shortest span, nodes: far shorter ones would lose digits, and say nothing.
+const LEAST_SPAN: f64 = 0.05;
+
 /// Inner knots over the nodes of a direction, ascending, repeated ones as often as they
 /// count, at most three times.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,15 +37,20 @@ impl Breaks {
         }
     }
 
-    /// Inner knots, in any order; those outside of the nodes, and repeated more than three
-    /// times, are left out.
+    /// Inner knots, in any order. Those nearly together are put together; those outside of the
+    /// nodes, and repeated more than three times, are left out.
     #[must_use]
     pub fn new(nodes: usize, mut inner: Vec<f64>) -> Self {
         let last = nodes.saturating_sub(1) as f64;
-        inner.retain(|&t| t > 0.0 && t < last);
+        inner.retain(|&t| t >= LEAST_SPAN && t <= last - LEAST_SPAN);
         inner.sort_by(f64::total_cmp);
         let mut kept: Vec<f64> = Vec::with_capacity(inner.len());
-        for t in inner {
+        for mut t in inner {
+            if let Some(&before) = kept.last()
+                && t - before < LEAST_SPAN
+            {
+                t = before;
+            }
             let times = kept.iter().rev().take_while(|&&k| k == t).count();
             if times < DEGREE {
                 kept.push(t);
@@ -170,7 +182,29 @@ impl Axis {
             }
         }
         let system = matrix.cholesky().ok()?;
-        Some(Self { count, at, system })
+        let axis = Self { count, at, system };
+        (axis.gain() <= MOST_GAIN).then_some(axis)
+    }
+
+    /// The greatest coefficient of data that are 1 or -1, in an order without a pattern.
+    fn gain(&self) -> f64 {
+        let mut state: u64 = 0x9e37_79b9_7f4a_7c15;
+        let mut greatest = 0.0_f64;
+        for _ in 0..2 {
+            let mut line = vec![0.0; self.count];
+            for node in &self.at {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                let sign = if state >> 63 == 0 { 1.0 } else { -1.0 };
+                for (k, value) in node.values.iter().enumerate() {
+                    line[node.first + k] += sign * value;
+                }
+            }
+            self.solve(&mut line);
+            greatest = line.iter().fold(greatest, |most, c| most.max(c.abs()));
+        }
+        greatest
     }
 
     /// Solves the normal equations of this direction, in place.

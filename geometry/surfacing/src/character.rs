@@ -20,8 +20,9 @@ const SHARE: f64 = 0.6;
 /// Least jump, in tolerances, over one node, of z and of the slope: a smooth surface would
 /// bridge lower ones.
 const MATTERS: [f64; 2] = [4.0, 0.5];
-/// Fewest lines that can tell.
+/// Fewest lines that can tell, and as a part of all.
 const FEWEST_LINES: usize = 4;
+const LEAST_PART: usize = 4;
 /// Middles to either side in which one line shows.
 const REACH: usize = 3;
 
@@ -107,7 +108,7 @@ fn across(
             .filter_map(|line| line.get(k).copied())
             .filter(|jump| !jump[0].is_nan())
             .collect();
-        if here.len() < FEWEST_LINES {
+        if here.len() < FEWEST_LINES.max(sections.len() / LEAST_PART) {
             continue;
         }
         let of = |order: usize| median(here.iter().map(|jump| jump[order].abs()).collect());

@@ -2,12 +2,19 @@
 
 use core::ops::Range;
 
-use range_image::{Lattice, RangeImage};
+use range_image::{Column, Lattice, RangeImage};
 
 use crate::error::SurfaceError;
 
 /// Fewest nodes along a side: a cubic needs four.
 pub const FEWEST_NODES: usize = 4;
+
+/// How far off its node a sample of a uniform grid may lie, pitches.
+const OFF_NODE: f64 = 0.02;
+/// Most nodes along a side that samples are taken for a grid of.
+const MOST_SIDE: f64 = 65_536.0;
+/// Nodes for each sample, at most, for them to be a grid with holes.
+const SPARSE: usize = 4;
 
 /// z at the nodes of a uniform grid. Node `(i, j)` lies at `x = x_first + i pitch`,
 /// `y = y_first + j pitch`; masked nodes have no z.
@@ -92,6 +99,58 @@ impl HeightGrid {
             js.len(),
             z_mm,
         )
+    }
+
+    /// The samples as they are, where they lie on a uniform grid already, one at a node: columns
+    /// and samples within a fiftieth of the pitch of it. `None` where they do not.
+    #[must_use]
+    pub fn from_columns(columns: &[Column]) -> Option<Self> {
+        let mut steps: Vec<f64> = columns
+            .iter()
+            .flat_map(|column| column.samples().windows(2))
+            .filter_map(|pair| Some(pair.get(1)?.y_mm - pair.first()?.y_mm))
+            .collect();
+        let middle = steps.len() / 2;
+        let pitch_mm = match steps.is_empty() {
+            true => return None,
+            false => *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
+        };
+        if !(pitch_mm > 0.0 && pitch_mm.is_finite()) {
+            return None;
+        }
+        let filled = || columns.iter().filter(|column| !column.samples().is_empty());
+        let least = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, f64::min);
+        let x_mm = least(&mut filled().map(Column::x_mm));
+        let y_mm = least(&mut filled().filter_map(|c| c.y_extent_mm()).map(|e| e.0));
+        let node = |at: f64, first: f64| {
+            let index = (at - first) / pitch_mm;
+            let nearest = index.round();
+            ((index - nearest).abs() <= OFF_NODE && nearest <= MOST_SIDE)
+                .then_some(nearest as usize)
+        };
+        let mut nodes = Vec::new();
+        for column in filled() {
+            let i = node(column.x_mm(), x_mm)?;
+            for sample in column.samples() {
+                nodes.push((i, node(sample.y_mm, y_mm)?, sample.z_mm));
+            }
+        }
+        let count = |side: &mut dyn Iterator<Item = usize>| side.max().map_or(0, |last| last + 1);
+        let columns = count(&mut nodes.iter().map(|node| node.0));
+        let rows = count(&mut nodes.iter().map(|node| node.1));
+        // Scattered points on a fine lattice are no grid.
+        if columns.checked_mul(rows)? > SPARSE * nodes.len() {
+            return None;
+        }
+        let mut z_mm = vec![f64::NAN; columns * rows];
+        for (i, j, z) in nodes {
+            let place = z_mm.get_mut(i * rows + j)?;
+            if !place.is_nan() {
+                return None;
+            }
+            *place = z;
+        }
+        Self::new(pitch_mm, [x_mm, y_mm], columns, rows, z_mm).ok()
     }
 
     /// The same nodes with other values, masked where these are NaN.
@@ -236,6 +295,7 @@ impl HeightGrid {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use range_image::Sample;
 
     #[test]
     fn an_image_is_cropped_to_what_it_holds() {
@@ -258,6 +318,26 @@ mod tests {
         let again = grid.to_image();
         assert_eq!((again.origin(), again.z_mm(5, 0)), ((-1, 3), Some(81.0)));
         assert_eq!(again.valid_nodes(), 29);
+    }
+
+    #[test]
+    fn samples_on_a_grid_are_taken_as_they_are() {
+        let column = |i: usize, off: f64| {
+            let samples = (0..7).filter(|j| (i, *j) != (2, 3)).map(|j| Sample {
+                y_mm: 4.3 + 2.0 * j as f64 + off,
+                z_mm: (10 * i + j) as f64,
+                intensity: 255,
+            });
+            Column::new(-1.1 + 2.0 * i as f64, samples.collect())
+        };
+        let columns: Vec<Column> = (0..5).map(|i| column(i, 0.0)).collect();
+        let grid = HeightGrid::from_columns(&columns).unwrap();
+        assert_eq!((grid.columns(), grid.rows(), grid.pitch_mm()), (5, 7, 2.0));
+        assert_eq!((grid.x_mm(0), grid.y_mm(0)), (-1.1, 4.3));
+        assert_eq!((grid.column(3)[6], grid.valid_nodes()), (36.0, 34));
+        let uneven: Vec<Column> = (0..5).map(|i| column(i, 0.3 * i as f64)).collect();
+        assert_eq!(HeightGrid::from_columns(&uneven), None);
+        assert_eq!(HeightGrid::from_columns(&[]), None);
     }
 
     #[test]

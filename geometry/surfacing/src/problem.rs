@@ -8,6 +8,9 @@ use crate::grid::HeightGrid;
 use crate::infill;
 use crate::knots::Knots;
 
+/// How far beyond the data's range holes may be filled, as a share of it.
+const SWING: f64 = 0.1;
+
 /// The deviations of the nodes with a value.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Score {
@@ -147,7 +150,8 @@ impl Problem {
         worst
     }
 
-    /// Lets masked nodes lie where a fitted surface passes, so that they do not bend the next.
+    /// Lets masked nodes lie where a fitted surface passes, so that they do not bend the next, but
+    /// hardly beyond the data's range: a cubic that nothing holds swings far.
     pub(crate) fn refill(&mut self, knots: &Knots) {
         if self.is_full {
             return;
@@ -155,10 +159,15 @@ impl Problem {
         let (Some(u), Some(v)) = (Axis::new(&knots.u), Axis::new(&knots.v)) else {
             return;
         };
+        let mut extent = (f64::INFINITY, f64::NEG_INFINITY);
+        for (z, _) in self.z.iter().zip(&self.is_data).filter(|(_, is)| **is) {
+            extent = (extent.0.min(*z), extent.1.max(*z));
+        }
+        let beyond = SWING * (extent.1 - extent.0);
         let fitted = fit::values(&u, &v, &self.fit_axes(&u, &v).coefficients);
         for ((z, &is_data), fitted) in self.z.iter_mut().zip(&self.is_data).zip(fitted) {
             if !is_data {
-                *z = fitted;
+                *z = fitted.clamp(extent.0 - beyond, extent.1 + beyond);
             }
         }
     }

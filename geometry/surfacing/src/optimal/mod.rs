@@ -24,6 +24,9 @@ use density::Direction;
 /// Shares of the tolerance that each direction may take, tried from the largest.
 const SHARES: [f64; 8] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.42, 0.35];
 
+/// Times that holes are filled anew once the tolerance holds.
+const REFILLS: usize = 2;
+
 /// Places the knots. `fixed` are those that character lines ask for, along x and y.
 ///
 /// # Errors
@@ -66,9 +69,19 @@ pub(crate) fn place(
         u: Breaks::none(problem.columns),
         v: Breaks::none(problem.rows),
     });
-    let knots = halve_until_near(problem, knots, monitor)?;
+    let mut knots = halve_until_near(problem, knots, monitor)?;
+    // Filling the holes anew moves the surface a little, as long as it has not settled.
+    for _ in 0..REFILLS {
+        problem.refill(&knots);
+        knots = halve_until_near(problem, knots, monitor)?;
+    }
     monitor.progress(0.4);
-    problem.refill(&knots);
+    let is_near = problem
+        .fit(&knots)
+        .is_some_and(|fit| fit.score.max <= problem.tolerance);
+    if !is_near {
+        return Ok(every_node(problem));
+    }
     polish::polish(problem, knots, monitor)
 }
 

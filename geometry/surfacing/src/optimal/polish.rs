@@ -5,6 +5,7 @@ use range_image::{Cancelled, Monitor};
 use crate::axis::{Axis, Breaks, DEGREE};
 use crate::fit;
 use crate::knots::Knots;
+use crate::optimal::halve_until_near;
 use crate::problem::{Problem, Score};
 
 /// Nodes visited by all fits together, at most: a bound on the time that follows from the
@@ -75,17 +76,13 @@ pub(super) fn polish(
     loop {
         let before = state.knots.control_points();
         polish.remove_all(&mut state)?;
-        polish.refill(&mut state);
-        if !is_near(polish.problem, &state.knots) {
+        if !polish.settle(&mut state, &mut safe)? {
             break;
         }
-        safe = state.knots.clone();
         polish.move_all(&mut state, |score| score.soft)?;
-        polish.refill(&mut state);
-        if !is_near(polish.problem, &state.knots) {
+        if !polish.settle(&mut state, &mut safe)? {
             break;
         }
-        safe = state.knots.clone();
         if state.knots.control_points() < before {
             continue;
         }
@@ -120,14 +117,27 @@ impl Polish<'_> {
         })
     }
 
-    fn refill(&mut self, state: &mut State) {
-        if self.problem.is_full {
-            return;
+    /// Fills the holes anew and makes sure of the tolerance over what is around them, for
+    /// which a knot or two may be wanted after all. False where that leads to nothing better
+    /// than was there before.
+    fn settle(&mut self, state: &mut State, safe: &mut Knots) -> Result<bool, Cancelled> {
+        if !self.problem.is_full {
+            self.problem.refill(&state.knots);
+            let knots = halve_until_near(self.problem, state.knots.clone(), self.monitor)?;
+            match self.state(knots) {
+                Some(fresh) => *state = fresh,
+                None => return Ok(false),
+            }
         }
-        self.problem.refill(&state.knots);
-        if let Some(fresh) = self.state(state.knots.clone()) {
-            *state = fresh;
+        let is_near = self
+            .problem
+            .fit(&state.knots)
+            .is_some_and(|fit| fit.score.max <= self.problem.tolerance);
+        let is_better = is_near && state.knots.control_points() <= safe.control_points();
+        if is_better {
+            *safe = state.knots.clone();
         }
+        Ok(is_better)
     }
 
     /// The score with other knots along one direction; `None` where they are not held, or

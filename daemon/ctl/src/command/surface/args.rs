@@ -50,7 +50,8 @@ pub(crate) struct Args {
     /// directory, too
     #[arg(long, value_name = "DIR")]
     pub(super) pictures: Option<PathBuf>,
-    /// Distance of the grid's nodes, millimetres; default: after the scan's density
+    /// Distance of the grid's nodes, millimetres; default: after the scan's density. Samples that
+    /// lie on a uniform grid already are taken as they are unless this, or a --roi, is given
     #[arg(long, value_name = "MM")]
     pub(super) pitch_mm: Option<f64>,
     /// Unit of the coordinates in the file; default: millimetres, or what the file says
@@ -199,6 +200,12 @@ impl Args {
             .validate()
             .map_err(|error| Failure::Usage(error.to_string()))?;
         Ok(settings)
+    }
+
+    /// Whether samples are to be brought onto another grid even if they lie on one already.
+    pub(super) fn asks_for_a_grid(&self) -> bool {
+        let limits = [self.roi_x_mm, self.roi_y_mm, self.roi_z_mm];
+        self.pitch_mm.is_some() || limits.iter().any(Option::is_some)
     }
 
     /// The scan's file, for titles.

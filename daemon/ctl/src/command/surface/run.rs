@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use deliverables::{ManifestFile, write_atomically};
 use pipeline::Extent;
 use range_image::Monitor;
-use regrid::RegridError;
+use regrid::{RegridError, RegridSettings};
 use serde::Serialize;
 use surfacing::{HeightGrid, Made, Placement, Settings, SurfaceError};
 
@@ -16,7 +16,7 @@ use super::write::{NamedSurface, SurfacesError, surfaces};
 use super::{Args, pictures, summary};
 use crate::command::{convert, places};
 use crate::failure::Failure;
-use crate::input;
+use crate::input::{self, Input};
 use crate::output;
 use crate::progress::Progress;
 
@@ -26,6 +26,8 @@ pub(super) struct Surfaced {
     pub(super) output: PathBuf,
     pub(super) file: ManifestFile,
     pub(super) pitch_mm: f64,
+    /// Whether the samples lie on a uniform grid already, and were taken as they are.
+    pub(super) as_measured: bool,
     pub(super) tolerance_mm: f64,
     /// Noise of the grid, one standard deviation.
     pub(super) noise_mm: f64,
@@ -169,33 +171,19 @@ fn surface_of_file(args: &Args, shown: &Shown) -> Result<Surfaced, Failure> {
         return Err(Failure::Failed(format!("{file}: {why}")));
     }
     let regrid = args.regrid(input.settings().regrid)?;
-    if let Some(extent) = Extent::within(&input.columns, &regrid.roi)
-        && regrid.pitch_mm < extent.finest_pitch_mm()
-    {
-        return Err(Failure::Failed(format!(
-            "{file}: a grid of {} mm is too fine for its size and number of samples; leave out \
-             single points far away with --roi-x-mm and --roi-y-mm, else choose --pitch-mm {}",
-            regrid.pitch_mm,
-            extent.finest_pitch_mm()
-        )));
-    }
     let timestamp = convert::timestamp(args.timestamp, input.timestamp, &args.scan)?;
     let name = args.name(input.name.as_deref());
     let author = args.author.clone().or(input.scan.operator.clone());
-    shown.begin("regrid");
-    let image =
-        regrid::regrid(input.columns.iter().cloned(), &regrid, shown).map_err(
-            |error| match error {
-                RegridError::Cancelled(_) => Failure::Interrupted,
-                other => Failure::at(&file, &other),
-            },
-        )?;
-    let refused = |error: SurfaceError| match error {
-        SurfaceError::Cancelled(_) => Failure::Interrupted,
-        error => Failure::Failed(format!("{file}: {error}")),
+    let measured = match args.asks_for_a_grid() {
+        true => None,
+        false => HeightGrid::from_columns(&input.columns),
     };
-    let grid = HeightGrid::from_image(&image).map_err(refused)?;
-    drop(image);
+    let is_measured = measured.is_some();
+    let grid = match measured {
+        Some(grid) => grid,
+        None => regridded(args, &input, &regrid, shown)?,
+    };
+    let refused = |error| refused(args, error);
     let make = |settings: &Settings| {
         let made = regrid::with_threads(regrid.threads, || surfacing::make(&grid, settings, shown));
         made.map_err(|error| Failure::at("cannot make the surface", &error))?
@@ -249,6 +237,7 @@ fn surface_of_file(args: &Args, shown: &Shown) -> Result<Surfaced, Failure> {
         output,
         file: written,
         pitch_mm: grid.pitch_mm(),
+        as_measured: is_measured,
         tolerance_mm: settings.tolerance_mm,
         noise_mm: made.report.noise_mm,
         surface: Figures::of(&made),
@@ -265,6 +254,42 @@ fn surface_of_file(args: &Args, shown: &Shown) -> Result<Surfaced, Failure> {
         pictures,
         warnings,
     })
+}
+
+/// The scan on a grid, as `convert` would have it.
+fn regridded(
+    args: &Args,
+    input: &Input,
+    regrid: &RegridSettings,
+    shown: &Shown,
+) -> Result<HeightGrid, Failure> {
+    let file = args.scan.display();
+    if let Some(extent) = Extent::within(&input.columns, &regrid.roi)
+        && regrid.pitch_mm < extent.finest_pitch_mm()
+    {
+        return Err(Failure::Failed(format!(
+            "{file}: a grid of {} mm is too fine for its size and number of samples; leave out \
+             single points far away with --roi-x-mm and --roi-y-mm, else choose --pitch-mm {}",
+            regrid.pitch_mm,
+            extent.finest_pitch_mm()
+        )));
+    }
+    shown.begin("regrid");
+    let image =
+        regrid::regrid(input.columns.iter().cloned(), regrid, shown).map_err(
+            |error| match error {
+                RegridError::Cancelled(_) => Failure::Interrupted,
+                other => Failure::at(&file, &other),
+            },
+        )?;
+    HeightGrid::from_image(&image).map_err(|error| refused(args, error))
+}
+
+fn refused(args: &Args, error: SurfaceError) -> Failure {
+    match error {
+        SurfaceError::Cancelled(_) => Failure::Interrupted,
+        error => Failure::Failed(format!("{}: {error}", args.scan.display())),
+    }
 }
 
 fn lines(made: &Made) -> Vec<Line> {

@@ -28,8 +28,16 @@ pub(super) fn told(surfaced: &Surfaced) -> String {
         rows,
     ));
     lines.push(format!(
-        "grid         {} points at {} mm, noise {:.4} mm; tolerance {} mm",
-        surfaced.surface.nodes, surfaced.pitch_mm, surfaced.noise_mm, surfaced.tolerance_mm
+        "grid         {} points at {} mm{}, noise {:.4} mm; tolerance {} mm",
+        surfaced.surface.nodes,
+        surfaced.pitch_mm,
+        if surfaced.as_measured {
+            " as measured"
+        } else {
+            ""
+        },
+        surfaced.noise_mm,
+        surfaced.tolerance_mm
     ));
     for line in &surfaced.character_lines {
         let unit = if line.kind == "step" { " mm" } else { "" };
