@@ -13,6 +13,9 @@ const PACKAGES: [&str; 2] = ["cadquery-ocp==8.0.1.1.0", "numpy"];
 /// Meshes the files, where that is asked for.
 const GMSH: &str = "gmsh==4.15.2";
 
+/// Fits surfaces, where that is asked for.
+pub(crate) const SCIPY: &str = "scipy==1.17.1";
+
 /// The simulated objects, and what is asked of their scans.
 const OBJECTS: [&str; 2] = ["house", "cylinder"];
 
@@ -321,8 +324,13 @@ fn cadmpeg(place: &Path) -> Result<String> {
 
 /// A Python with the judge's packages, and Gmsh if asked for, made once.
 pub(crate) fn python(place: &Path, with_gmsh: bool) -> Result<String> {
+    python_with(place, if with_gmsh { &[GMSH] } else { &[] })
+}
+
+/// A Python with the judge's packages and more, made once.
+pub(crate) fn python_with(place: &Path, more: &[&'static str]) -> Result<String> {
     let mut packages = PACKAGES.to_vec();
-    packages.extend(with_gmsh.then_some(GMSH));
+    packages.extend(more);
     let home = place.join("python");
     let python = home.join("bin/python").display().to_string();
     let ready = home.join("ready");

@@ -83,6 +83,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("relief-tests", &EVERYTHING),
     ("relief-studies", &STUDIES),
+    (
+        "relief-surfaces",
+        &["nurbs", "range-image", "regrid", "scan-files", "surfacing"],
+    ),
     ("relief-vm-systemd", &["sim-scanner"]),
     (
         "relief-vm-usb",

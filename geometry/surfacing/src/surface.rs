@@ -273,9 +273,7 @@ fn placed(
 }
 
 fn raised(grid: &HeightGrid, settings: &Settings) -> JumpThresholds {
-    settings
-        .thresholds
-        .above_noise(grid.noise_mm(), grid.pitch_mm())
+    settings.thresholds.above_noise(grid.noise_mm())
 }
 
 /// Columns and rows between steps. With optimal knots these are the steps all along a grid
@@ -297,7 +295,7 @@ fn blocks(
             let (xz, yz) = longest_sections(data);
             let thresholds = raised(data, settings);
             for (section, at) in [(xz, &mut at_x), (yz, &mut at_y)] {
-                let breaks = breaks_of(&section.z_mm, data.pitch_mm(), &thresholds);
+                let breaks = breaks_of(&section.z_mm, &thresholds);
                 at.extend(breaks.iter().filter(|b| b.order == 0).map(|b| b.at));
             }
         }

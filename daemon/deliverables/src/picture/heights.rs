@@ -107,7 +107,7 @@ fn cut(
     );
     let mut level = (low / step_mm).ceil();
     // A step in z is not a hundred lines.
-    if !(step_mm > 0.0) || (high - low) / step_mm > 20.0 {
+    if step_mm.is_nan() || step_mm <= 0.0 || (high - low) / step_mm > 20.0 {
         return;
     }
     while level * step_mm <= high {

@@ -17,15 +17,16 @@ const NOISE_FACTOR: f64 = 5.0;
 /// reach across it.
 const REACH: usize = 3;
 
-/// Jumps at which derivative 0, 1, 2, 3 are taken to break: millimetres, mm/mm, 1/mm, 1/mm^2.
+/// Jumps at which derivative 0, 1, 2, 3 are taken to break, millimetres: the parameter of S1 and
+/// S2 counts data points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JumpThresholds(pub [f64; 4]);
 
 impl Default for JumpThresholds {
-    /// 2.0 and 3.0 for the second and third derivative are the paper's (section 5), which
-    /// does not tell the unit of its parameter; millimetres here. It takes the first
-    /// derivative for continuous and gives no thresholds below; ours are a step of 1 mm
-    /// and a crease at which the slope changes by 1 (45 degrees from level).
+    /// 2.0 and 3.0 for the second and third derivative are the paper's (section 5). It does not
+    /// tell the unit of its parameter; since its cubics run through points at equal distances,
+    /// we count these. It takes the first derivative for continuous and gives no thresholds
+    /// below; ours of 1.0 are lower than its own, as a step and a crease are the worse breaks.
     fn default() -> Self {
         Self([1.0, 1.0, 2.0, 3.0])
     }
@@ -47,13 +48,11 @@ impl JumpThresholds {
 
     /// Raised to what noise does not reach.
     #[must_use]
-    pub fn above_noise(mut self, noise_mm: f64, pitch_mm: f64) -> Self {
+    pub fn above_noise(mut self, noise_mm: f64) -> Self {
         let weights = one_sided();
-        let mut unit = 1.0;
         for (threshold, weights) in self.0.iter_mut().zip(weights) {
             let gain = weights.iter().map(|w| w * w).sum::<f64>() * 2.0;
-            *threshold = threshold.max(NOISE_FACTOR * noise_mm * gain.sqrt() / unit);
-            unit *= pitch_mm;
+            *threshold = threshold.max(NOISE_FACTOR * noise_mm * gain.sqrt());
         }
         self
     }
@@ -66,7 +65,7 @@ pub struct Break {
     pub at: f64,
     /// The lowest derivative that breaks, 0 to 3.
     pub order: usize,
-    /// By how much, mm^(1 - order).
+    /// By how much, millimetres (the parameter counts points).
     pub jump: f64,
 }
 
@@ -130,18 +129,10 @@ pub(crate) fn both_sides(z: &[f64]) -> Vec<[[f64; 4]; 2]> {
 /// The breaks along a section, from its first to its last: the lowest derivative first, and
 /// of neighbouring ones that jumps most, so that one break is told once.
 #[must_use]
-pub fn breaks_of(z_mm: &[f64], pitch_mm: f64, thresholds: &JumpThresholds) -> Vec<Break> {
+pub fn breaks_of(z_mm: &[f64], thresholds: &JumpThresholds) -> Vec<Break> {
     let jumps: Vec<[f64; 4]> = both_sides(z_mm)
         .iter()
-        .map(|[before, after]| {
-            let mut unit = 1.0;
-            let mut jumps = [0.0; 4];
-            for order in 0..4 {
-                jumps[order] = (after[order] - before[order]).abs() / unit;
-                unit *= pitch_mm;
-            }
-            jumps
-        })
+        .map(|[before, after]| core::array::from_fn(|order| (after[order] - before[order]).abs()))
         .collect();
     let mut is_taken = vec![false; jumps.len()];
     let mut found = Vec::new();
@@ -149,12 +140,12 @@ pub fn breaks_of(z_mm: &[f64], pitch_mm: f64, thresholds: &JumpThresholds) -> Ve
         let threshold = thresholds.0[order];
         let mut candidates: Vec<usize> = (0..jumps.len())
             .filter(|&k| jumps[k][order] >= threshold)
-            .filter(|&k| is_own(&jumps[k], order, pitch_mm))
+            .filter(|&k| is_own(&jumps[k], order))
             .collect();
         // Beside the break the cubics reach across it and can miss each other by more, but
         // there the next derivative jumps, too.
         let rank = |k: usize| {
-            let next = jumps[k].get(order + 1).map_or(0.0, |jump| jump * pitch_mm);
+            let next = jumps[k].get(order + 1).copied().unwrap_or(0.0);
             jumps[k][order] - 0.5 * next
         };
         candidates.sort_by(|&a, &b| rank(b).total_cmp(&rank(a)).then(a.cmp(&b)));
@@ -178,10 +169,10 @@ pub fn breaks_of(z_mm: &[f64], pitch_mm: f64, thresholds: &JumpThresholds) -> Ve
 /// Whether a derivative breaks at this middle, and not a higher one beside it: a cubic of which
 /// the last point lies across a break misses by 2.2, 3.0, 2.5 and 1 times that point's
 /// distance in value and derivatives, so that the next derivative jumps nearly as much.
-fn is_own(jumps: &[f64; 4], order: usize, pitch_mm: f64) -> bool {
+fn is_own(jumps: &[f64; 4], order: usize) -> bool {
     const LEAST: [f64; 4] = [1.0, 1.5, 3.0, 0.0];
     let next = jumps.get(order + 1).copied().unwrap_or(0.0);
-    jumps[order] > LEAST[order] * next * pitch_mm
+    jumps[order] > LEAST[order] * next
 }
 
 /// Knots where derivatives of the reference sections break. A surface with four knots in a
@@ -190,7 +181,7 @@ fn is_own(jumps: &[f64; 4], order: usize, pitch_mm: f64) -> bool {
 pub(crate) fn place(grid: &HeightGrid, thresholds: &JumpThresholds) -> Knots {
     let (xz, yz) = longest_sections(grid);
     let knots = |z_mm: &[f64], nodes: usize| {
-        let breaks = breaks_of(z_mm, grid.pitch_mm(), thresholds);
+        let breaks = breaks_of(z_mm, thresholds);
         let inner = breaks
             .iter()
             .flat_map(|b| core::iter::repeat_n(b.at, b.multiplicity().min(3)))
@@ -227,7 +218,7 @@ mod tests {
         // Powers of a truncated distance break one derivative each.
         let h = 0.5;
         for order in 0..4_usize {
-            let size = [3.0, 4.0, 9.0, 20.0][order];
+            let size = [3.0, 4.0, 12.0, 60.0][order];
             let factorial = [1.0, 1.0, 2.0, 6.0][order];
             let z: Vec<f64> = (0..60)
                 .map(|k| {
@@ -240,7 +231,7 @@ mod tests {
                     0.3 * t + part
                 })
                 .collect();
-            let found = breaks_of(&z, h, &JumpThresholds::default());
+            let found = breaks_of(&z, &JumpThresholds::default());
             assert_eq!(found.len(), 1, "order {order}: {found:?}");
             assert_eq!(found[0].order, order, "{found:?}");
             assert_eq!(found[0].multiplicity(), 4 - order);
@@ -253,13 +244,13 @@ mod tests {
         // One in five of these would pass the paper's threshold of the third derivative.
         let noise = |k: usize| {
             let x = libm::sin((k as f64 + 1.0) * 12.9898) * 43_758.547;
-            (x - libm::floor(x) - 0.5) * 0.1
+            (x - libm::floor(x) - 0.5) * 0.8
         };
         let z: Vec<f64> = (0..400).map(noise).collect();
-        let printed = breaks_of(&z, 0.5, &JumpThresholds::default());
+        let printed = breaks_of(&z, &JumpThresholds::default());
         assert!(printed.len() > 5, "{}", printed.len());
-        let raised = JumpThresholds::default().above_noise(0.1 / 12.0_f64.sqrt(), 0.5);
-        assert_eq!(breaks_of(&z, 0.5, &raised), []);
+        let raised = JumpThresholds::default().above_noise(0.8 / 12.0_f64.sqrt());
+        assert_eq!(breaks_of(&z, &raised), []);
         assert!(JumpThresholds([1.0, 0.0, 1.0, 1.0]).validate().is_err());
     }
 }

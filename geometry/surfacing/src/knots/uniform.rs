@@ -7,7 +7,7 @@ use crate::knots::Knots;
 use crate::problem::Problem;
 
 /// Equal spans of powers of two along each direction: of all pairs within the tolerance that
-/// with the fewest control points, or the finest that the nodes carry.
+/// with the fewest control points, or that which comes nearest.
 ///
 /// # Errors
 /// [`Cancelled`] at the monitor's wish.
@@ -31,16 +31,25 @@ pub(crate) fn place(problem: &Problem, monitor: &dyn Monitor) -> Result<Knots, C
         })
         .collect();
     pairs.sort_by_key(|knots| (knots.control_points(), knots.u.control_count()));
-    for knots in &pairs {
+    let mut nearest: Option<(f64, Knots)> = None;
+    for knots in pairs {
         monitor.check()?;
-        if let Some(fit) = problem.fit(knots)
-            && fit.score.max <= problem.tolerance
-        {
-            return Ok(knots.clone());
+        let Some(fit) = problem.fit(&knots) else {
+            continue;
+        };
+        let max = fit.score.max;
+        if max <= problem.tolerance {
+            return Ok(knots);
+        }
+        if nearest.as_ref().is_none_or(|(least, _)| max < *least) {
+            nearest = Some((max, knots));
         }
     }
-    Ok(pairs.pop().unwrap_or_else(|| Knots {
-        u: Breaks::none(problem.columns),
-        v: Breaks::none(problem.rows),
-    }))
+    Ok(nearest.map_or_else(
+        || Knots {
+            u: Breaks::none(problem.columns),
+            v: Breaks::none(problem.rows),
+        },
+        |(_, knots)| knots,
+    ))
 }

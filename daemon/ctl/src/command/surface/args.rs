@@ -35,8 +35,8 @@ pub(crate) struct Args {
     /// How knots are placed
     #[arg(long, value_name = "HOW", value_enum, default_value_t = KnotsName::Optimal)]
     knots: KnotsName,
-    /// Jumps of z (mm), slope, second (1/mm) and third derivative (1/mm2) that are breaks, for
-    /// derivative knots; raised where noise asks for more
+    /// Jumps of z and its first three derivatives that are breaks, millimetres, the parameter
+    /// counting grid points; for derivative knots. Raised where noise asks for more
     #[arg(long, value_name = "C0,C1,C2,C3", value_delimiter = ',', default_values_t = JumpThresholds::default().0)]
     thresholds: Vec<f64>,
     /// Move grid points by up to this before, millimetres, so that curvature varies less; feature
