@@ -145,7 +145,7 @@ fn wrong_usage_is_told_in_one_line_and_leaves_no_file() {
     };
     refused(&[], 2, "--tolerance-mm");
     refused(&["--tolerance-mm", "0"], 2, "must be above 0");
-    refused(&["--tolerance-mm", "1", "--fair-mm", "-1"], 2, "--fair-mm");
+    refused(&["--tolerance-mm", "1", "--fair-mm", "0"], 2, "--fair-mm");
     refused(
         &["--tolerance-mm", "1", "--thresholds", "1,2"],
         2,

@@ -19,7 +19,7 @@ const UNUSUAL: f64 = 8.0;
 const SHARE: f64 = 0.6;
 /// Least jump, in tolerances, over one node, of z and of the slope: a smooth surface would
 /// bridge lower ones.
-const MATTERS: [f64; 2] = [4.0, 0.5];
+const MATTERS: [f64; 2] = [4.0, 1.0];
 /// Fewest lines that can tell, and as a part of all.
 const FEWEST_LINES: usize = 4;
 const LEAST_PART: usize = 4;

@@ -7,11 +7,7 @@
 //! ```
 
 // Surfaces in closed form, as in the crate's own tests.
-#[allow(
-    dead_code,
-    clippy::unwrap_used,
-    reason = "shared with tests: one is not measured here, and closed forms make sound grids"
-)]
+#[allow(dead_code, reason = "shared with tests; one is not measured here")]
 #[path = "../../../geometry/surfacing/tests/common/mod.rs"]
 mod common;
 mod paper;

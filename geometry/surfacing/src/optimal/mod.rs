@@ -1,6 +1,7 @@
 //! As few knots as the tolerance allows, over the whole grid: ours.
 //!
-//! 1. Lines along the grid on which the slope breaks get triple knots ([`crate::character`]).
+//! 1. Lines along the grid on which the slope breaks get triple knots ([`crate::character`]), which
+//!    stay.
 //! 2. For each direction by itself a density of knots is found under which every span's
 //!    greatest deviation is the same share of the tolerance ([`density`]): a cubic's falls
 //!    with the fourth power of its span.
@@ -82,7 +83,7 @@ pub(crate) fn place(
     if !is_near {
         return Ok(every_node(problem));
     }
-    polish::polish(problem, knots, monitor)
+    polish::polish(problem, knots, fixed, monitor)
 }
 
 /// Halves the spans that exceed the tolerance until none does, or all nodes have a knot.

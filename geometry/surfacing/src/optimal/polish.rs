@@ -42,6 +42,8 @@ struct State {
 
 struct Polish<'a> {
     problem: &'a mut Problem,
+    /// Knots of creases along x and y, which stay where they are.
+    fixed: &'a [Vec<f64>; 2],
     monitor: &'a dyn Monitor,
     fits_left: usize,
     fits: usize,
@@ -51,6 +53,7 @@ struct Polish<'a> {
 pub(super) fn polish(
     problem: &mut Problem,
     knots: Knots,
+    fixed: &[Vec<f64>; 2],
     monitor: &dyn Monitor,
 ) -> Result<Knots, Cancelled> {
     let fits = MOST_VISITS / problem.nodes().max(1);
@@ -64,6 +67,7 @@ pub(super) fn polish(
     }
     let mut polish = Polish {
         problem,
+        fixed,
         monitor,
         fits_left: fits,
         fits,
@@ -176,6 +180,18 @@ impl Polish<'_> {
         state.score = score;
     }
 
+    fn is_fixed(&self, along: Along, knot: f64) -> bool {
+        self.fixed[usize::from(along == Along::V)].contains(&knot)
+    }
+
+    /// Where a knot, or all that lie with it, could go.
+    fn moves(&self, along: Along, breaks: &Breaks, index: usize, step: f64) -> Vec<Breaks> {
+        match breaks.inner.get(index) {
+            Some(&knot) if !self.is_fixed(along, knot) => moved(breaks, index, step),
+            _ => Vec::new(),
+        }
+    }
+
     fn told(&self) -> Result<(), Cancelled> {
         let used = 1.0 - self.fits_left as f64 / self.fits.max(1) as f64;
         self.monitor.progress(0.4 + 0.6 * used);
@@ -202,7 +218,7 @@ impl Polish<'_> {
             let mut previous = f64::NAN;
             for index in 0..breaks.inner.len() {
                 // Of repeated knots each is as good as the next.
-                if breaks.inner[index] == previous {
+                if breaks.inner[index] == previous || self.is_fixed(along, breaks.inner[index]) {
                     continue;
                 }
                 previous = breaks.inner[index];
@@ -314,7 +330,7 @@ impl Polish<'_> {
         while step > 3.0 * LAST_STEP {
             let mut is_better = false;
             for index in from..to {
-                for other in moved(&breaks, index, step) {
+                for other in self.moves(along, &breaks, index, step) {
                     let Some(tried) = self.try_other(state, along, &other) else {
                         continue;
                     };
@@ -349,7 +365,7 @@ impl Polish<'_> {
                 let mut index = 0;
                 while index < breaks_of(state, along).inner.len() {
                     let breaks = breaks_of(state, along).clone();
-                    for other in moved(&breaks, index, step) {
+                    for other in self.moves(along, &breaks, index, step) {
                         if let Some(score) = self.try_other(state, along, &other)
                             && cost(&score) < GAIN * cost(&state.score)
                         {

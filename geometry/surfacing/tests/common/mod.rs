@@ -1,5 +1,7 @@
 //! Surfaces in closed form.
 
+#![allow(clippy::unwrap_used, reason = "closed forms make sound grids")]
+
 use libm::{cos, exp, fabs, sin};
 use surfacing::HeightGrid;
 
