@@ -121,8 +121,9 @@ fn the_schemas_are_schemas() {
         assert!(schema["$schema"].as_str().unwrap().contains("2020-12"));
     }
     for command in [
-        "compare", "convert", "demo", "scan", "abort", "resume", "status", "scans", "jobs",
-        "retry", "cancel", "rerun", "watch", "fetch", "doctor", "token", "laser", "webhooks",
+        "compare", "convert", "surface", "demo", "scan", "abort", "resume", "status", "scans",
+        "jobs", "retry", "cancel", "rerun", "watch", "fetch", "doctor", "token", "laser",
+        "webhooks",
     ] {
         let reference = format!("commands.schema.json#/$defs/{command}");
         assert!(
@@ -210,6 +211,22 @@ fn the_report_of_a_comparison() {
         assert_eq!(told["passed"], true, "{told:#}");
         let free = told["report"]["alignment"]["free"].as_array().unwrap();
         assert_eq!(free.len(), freedoms, "{told:#}");
+    }
+}
+
+#[test]
+fn what_a_surface_tells() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    fs::write(at.join("roof.xyz"), text(&roof())).unwrap();
+    let options = ["surface", "roof.xyz", "--json", "--tolerance-mm", "0.1"];
+    for more in [
+        &[][..],
+        &["--fair-mm", "0.05", "--compare", "--pictures", "drawn"],
+        &["--knots", "derivative", "--pitch-mm", "1"],
+    ] {
+        let told = document(&relief(at, &[&options[..], more].concat()));
+        check("commands.schema.json#/$defs/surface", &told);
     }
 }
 

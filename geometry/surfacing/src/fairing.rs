@@ -5,7 +5,9 @@
 //! third differences along both directions, under the bound. The weight follows from the
 //! noise by Stein's estimate of the risk (1981): of those weights with nearly the least
 //! expected distance from the noiseless surface the greatest, so that fairing takes away
-//! noise and leaves shape. No difference reaches across a feature line.
+//! noise and leaves shape. No difference reaches across a feature line, and where the points
+//! would move to one side all around, by more than noise explains, the weight is lowered: shape
+//! that is sharper than the rest does not keep the rest from being faired.
 
 use range_image::{Cancelled, Monitor};
 
@@ -14,14 +16,24 @@ use crate::grid::HeightGrid;
 
 /// Weights tried: powers of four from the first.
 const FIRST_WEIGHT: f64 = 0.25;
-const WEIGHTS: usize = 11;
+const WEIGHTS: usize = 9;
+const GREATEST_WEIGHT: f64 = 20_000.0;
 /// How far above the least risk the chosen weight's may lie.
 const RISK_SLACK: f64 = 1.05;
 /// Rounds in which points at the bound are found.
 const MOST_ROUNDS: usize = 30;
-/// Steps of conjugate gradients, and the drop of the residual at which they end.
+/// Steps of conjugate gradients, and the drop of the residual at which they end, while weights
+/// are tried and for the last word.
 const MOST_STEPS: usize = 600;
+const ROUGH_DROP: f64 = 1e-3;
 const DROP: f64 = 1e-6;
+/// Nodes to either side over which moves are averaged, and the standard deviations of noise at
+/// which their average is shape.
+const AROUND: usize = 2;
+const SHAPE_FACTOR: f64 = 3.0;
+/// What the weight is lowered to there, each time, and how often at most.
+const LOWERED: f64 = 1.0 / 16.0;
+const MOST_TIMES: usize = 4;
 /// Moves this near to the bound count as at it.
 const AT_BOUND: f64 = 1.0 - 1e-9;
 
@@ -49,9 +61,11 @@ pub struct FairingReport {
 /// Third differences that are asked to be small.
 struct Energy {
     rows: usize,
-    /// First nodes of those along x and along y.
-    along_x: Vec<usize>,
-    along_y: Vec<usize>,
+    /// First nodes of those along x and along y, each with its part of the weight.
+    along_x: Vec<(usize, f64)>,
+    along_y: Vec<(usize, f64)>,
+    /// How often the weight was lowered at each node.
+    lowered: Vec<usize>,
 }
 
 impl Energy {
@@ -66,10 +80,10 @@ impl Energy {
             for j in 0..rows {
                 let n = i * rows + j;
                 if i + 3 < columns && whole(n, rows, &features.along_x) {
-                    along_x.push(n);
+                    along_x.push((n, 1.0));
                 }
                 if j + 3 < rows && whole(n, 1, &features.along_y) {
-                    along_y.push(n);
+                    along_y.push((n, 1.0));
                 }
             }
         }
@@ -77,22 +91,80 @@ impl Energy {
             rows,
             along_x,
             along_y,
+            lowered: vec![0; columns * rows],
         }
+    }
+
+    /// Lowers the weight where points move together by more than noise does; false where they
+    /// nowhere do.
+    fn lower(&mut self, grid: &HeightGrid, moves: &[f64], noise_mm: f64) -> bool {
+        let (columns, rows) = (grid.columns(), grid.rows());
+        let z = grid.raw_z_mm();
+        let is_shape = |n: usize| {
+            let (i, j) = (n / rows, n % rows);
+            let (mut sum, mut count) = (0.0, 0.0);
+            for i in i.saturating_sub(AROUND)..(i + AROUND + 1).min(columns) {
+                for j in j.saturating_sub(AROUND)..(j + AROUND + 1).min(rows) {
+                    if !z[i * rows + j].is_nan() {
+                        sum += moves[i * rows + j];
+                        count += 1.0;
+                    }
+                }
+            }
+            count > 0.0 && f64::abs(sum) > SHAPE_FACTOR * noise_mm * f64::sqrt(count)
+        };
+        let mut marked = vec![false; columns * rows];
+        for n in (0..columns * rows).filter(|&n| is_shape(n)) {
+            let (i, j) = (n / rows, n % rows);
+            for i in i.saturating_sub(AROUND)..(i + AROUND + 1).min(columns) {
+                for j in j.saturating_sub(AROUND)..(j + AROUND + 1).min(rows) {
+                    marked[i * rows + j] = true;
+                }
+            }
+        }
+        for (lowered, _) in self.lowered.iter_mut().zip(&marked).filter(|(_, m)| **m) {
+            *lowered += 1;
+        }
+        for (starts, stride) in [(&mut self.along_x, rows), (&mut self.along_y, 1)] {
+            for (n, part) in starts.iter_mut() {
+                if (0..4).any(|k| marked[*n + k * stride]) {
+                    *part *= LOWERED;
+                }
+            }
+        }
+        marked.contains(&true)
     }
 
     fn third(z: &[f64], n: usize, stride: usize) -> f64 {
         z[n + 3 * stride] - 3.0 * z[n + 2 * stride] + 3.0 * z[n + stride] - z[n]
     }
 
-    fn lines(&self) -> [(&[usize], usize); 2] {
+    fn lines(&self) -> [(&[(usize, f64)], usize); 2] {
         [(&self.along_x, self.rows), (&self.along_y, 1)]
+    }
+
+    /// Trace of the smoothing operator per node with a value.
+    fn kept_share(&self, weight: f64, is_data: &[bool]) -> f64 {
+        let mut nodes = [0_usize; MOST_TIMES + 1];
+        for (&lowered, _) in self.lowered.iter().zip(is_data).filter(|(_, is)| **is) {
+            nodes[lowered.min(MOST_TIMES)] += 1;
+        }
+        let all = nodes.iter().sum::<usize>().max(1) as f64;
+        let (mut sum, mut weight) = (0.0, weight);
+        for count in nodes {
+            if count > 0 {
+                sum += count as f64 / all * kept_share(weight);
+            }
+            weight *= LOWERED;
+        }
+        sum
     }
 
     /// Mean square of the third differences.
     fn mean_square(&self, z: &[f64]) -> f64 {
         let mut sum = 0.0;
         for (starts, stride) in self.lines() {
-            for &n in starts {
+            for &(n, _) in starts {
                 let third = Self::third(z, n, stride);
                 sum += third * third;
             }
@@ -104,8 +176,8 @@ impl Energy {
     fn apply(&self, z: &[f64], weight: f64) -> Vec<f64> {
         let mut out = z.to_vec();
         for (starts, stride) in self.lines() {
-            for &n in starts {
-                let third = weight * Self::third(z, n, stride);
+            for &(n, part) in starts {
+                let third = weight * part * Self::third(z, n, stride);
                 out[n + 3 * stride] += third;
                 out[n + 2 * stride] -= 3.0 * third;
                 out[n + stride] += 3.0 * third;
@@ -118,9 +190,9 @@ impl Energy {
     fn diagonal(&self, nodes: usize, weight: f64) -> Vec<f64> {
         let mut out = vec![1.0; nodes];
         for (starts, stride) in self.lines() {
-            for &n in starts {
+            for &(n, part) in starts {
                 for (k, square) in [1.0, 9.0, 9.0, 1.0].into_iter().enumerate() {
-                    out[n + k * stride] += weight * square;
+                    out[n + k * stride] += weight * part * square;
                 }
             }
         }
@@ -135,7 +207,7 @@ impl Energy {
         weight: f64,
         start: &[f64],
         is_free: &[bool],
-        monitor: &dyn Monitor,
+        (drop, monitor): (f64, &dyn Monitor),
     ) -> Result<Vec<f64>, Cancelled> {
         let mut z = start.to_vec();
         let image = self.apply(&z, weight);
@@ -146,7 +218,7 @@ impl Energy {
         let diagonal = self.diagonal(z.len(), weight);
         let mut direction: Vec<f64> = residual.iter().zip(&diagonal).map(|(r, d)| r / d).collect();
         let mut size = dot(&residual, &direction);
-        let enough = size * DROP * DROP;
+        let enough = size * drop * drop;
         for _ in 0..MOST_STEPS {
             if size <= enough || size <= 0.0 {
                 break;
@@ -186,7 +258,7 @@ pub fn fair(
     let raw = grid.raw_z_mm();
     let noise_mm = grid.noise_mm();
     let features = Features::of(grid, noise_mm);
-    let energy = Energy::new(grid, &features);
+    let mut energy = Energy::new(grid, &features);
     let is_data: Vec<bool> = raw.iter().map(|z| !z.is_nan()).collect();
     // Around 0, so that sums keep their digits; masked nodes lie in no difference.
     let mean = raw.iter().filter(|z| !z.is_nan()).sum::<f64>() / grid.valid_nodes().max(1) as f64;
@@ -194,7 +266,19 @@ pub fn fair(
         .iter()
         .map(|z| if z.is_nan() { 0.0 } else { z - mean })
         .collect();
-    let (weight, start) = chosen_weight(&energy, &data, &is_data, noise_mm, monitor)?;
+    let mut times = 0;
+    let mut first = FIRST_WEIGHT;
+    let (weight, start) = loop {
+        let share = |fraction: f64| (times as f64 + fraction) / (MOST_TIMES + 1) as f64;
+        let of_part = Part(monitor, &share);
+        let (weight, z) = chosen_weight(&energy, (&data, &is_data), noise_mm, first, &of_part)?;
+        first = weight;
+        times += 1;
+        let moves: Vec<f64> = z.iter().zip(&data).map(|(z, d)| z - d).collect();
+        if times > MOST_TIMES || !energy.lower(grid, &moves, noise_mm) {
+            break (weight, z);
+        }
+    };
     let z = bounded(&energy, &data, weight, start, bound_mm, monitor)?;
     let faired: Vec<f64> = z
         .iter()
@@ -235,24 +319,40 @@ fn moved(raw_mm: f64, by_mm: f64, bound_mm: f64) -> f64 {
     z_mm
 }
 
+/// Progress as a part of the whole.
+struct Part<'a>(&'a dyn Monitor, &'a (dyn Fn(f64) -> f64 + Sync));
+
+impl Monitor for Part<'_> {
+    fn is_cancelled(&self) -> bool {
+        self.0.is_cancelled()
+    }
+
+    fn progress(&self, fraction: f64) {
+        self.0.progress((self.1)(fraction));
+    }
+}
+
 /// The greatest weight with nearly the least risk, and the points under it without a bound.
 fn chosen_weight(
     energy: &Energy,
-    data: &[f64],
-    is_data: &[bool],
+    (data, is_data): (&[f64], &[bool]),
     noise_mm: f64,
+    first: f64,
     monitor: &dyn Monitor,
 ) -> Result<(f64, Vec<f64>), Cancelled> {
     let nodes = is_data.iter().filter(|is_data| **is_data).count().max(1) as f64;
     let all_free = vec![true; data.len()];
     let mut tried: Vec<(f64, f64, Vec<f64>)> = Vec::new();
     let mut start = data.to_vec();
-    let mut weight = FIRST_WEIGHT;
+    let mut weight = first;
     for round in 0..WEIGHTS {
-        let z = energy.solve(data, weight, &start, &all_free, monitor)?;
-        monitor.progress(0.8 * (round + 1) as f64 / WEIGHTS as f64);
+        if weight > GREATEST_WEIGHT {
+            break;
+        }
+        let z = energy.solve(data, weight, &start, &all_free, (ROUGH_DROP, monitor))?;
+        monitor.progress((round + 1) as f64 / WEIGHTS as f64);
         let off: f64 = z.iter().zip(data).map(|(z, d)| (z - d) * (z - d)).sum();
-        let kept = kept_share(weight);
+        let kept = energy.kept_share(weight, is_data);
         let risk = off / nodes + (2.0 * kept - 1.0) * noise_mm * noise_mm;
         let is_past = tried
             .iter()
@@ -313,8 +413,8 @@ fn bounded(
         both.map(|(z, d)| d + (z - d).clamp(-bound_mm, bound_mm))
             .collect()
     };
-    let mut z = start;
-    let mut is_free = vec![true; z.len()];
+    let mut is_free = vec![true; start.len()];
+    let mut z = energy.solve(data, weight, &start, &is_free, (DROP, monitor))?;
     for _ in 0..MOST_ROUNDS {
         let held = clamped(&z);
         let image = energy.apply(&z, weight);
@@ -333,7 +433,7 @@ fn bounded(
             return Ok(held);
         }
         is_free = next;
-        z = energy.solve(data, weight, &held, &is_free, monitor)?;
+        z = energy.solve(data, weight, &held, &is_free, (DROP, monitor))?;
     }
     Ok(clamped(&z))
 }

@@ -118,6 +118,10 @@ impl HeightGrid {
         if !(pitch_mm > 0.0 && pitch_mm.is_finite()) {
             return None;
         }
+        // Over the longest column, so that the rounding of coordinates in a file does not add up.
+        let lengths = columns.iter().filter_map(Column::y_extent_mm);
+        let length_mm = lengths.map(|(low, high)| high - low).fold(0.0, f64::max);
+        let pitch_mm = length_mm / (length_mm / pitch_mm).round();
         let filled = || columns.iter().filter(|column| !column.samples().is_empty());
         let least = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, f64::min);
         let x_mm = least(&mut filled().map(Column::x_mm));

@@ -69,12 +69,19 @@ pub(crate) fn measure(short: bool, scan: Option<&Path>, data: Option<&Path>) -> 
     }
     println!();
     println!(
-        "| surface with noise of 0.05 mm | bound mm | variation before | after | falls by | greatest move | at the bound | rms to the truth before | after |"
+        "| surface with noise of 0.05 mm, 200 mm wide | bound mm | variation of the truth | before | after | falls by | greatest move | at the bound | rms to the truth before | after |"
     );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for (name, z, _) in surfaces {
         for bound_mm in [0.05, 0.15] {
-            fairing(name, z, bound_mm, side, &mut missed)?;
+            // At about a scanner's pitch: on coarser grids shape is most of the variation.
+            fairing(
+                name,
+                z,
+                bound_mm,
+                if short { 161 } else { 401 },
+                &mut missed,
+            )?;
         }
     }
     if !missed.is_empty() {
@@ -170,7 +177,7 @@ fn fairing(
     side: usize,
     missed: &mut Vec<String>,
 ) -> Result<()> {
-    let truth = grid(side, side, 1.0, z);
+    let truth = grid(side, side, 200.0 / (side - 1) as f64, z);
     let noise = draws(side * side);
     let measured = truth.raw_z_mm().iter().zip(&noise);
     let measured = truth.with_z(measured.map(|(z, d)| z + 0.05 * d).collect())?;
@@ -182,11 +189,16 @@ fn fairing(
             .map(|(z, t)| (z - t) * (z - t));
         (squares.sum::<f64>() / z.len() as f64).sqrt()
     };
+    let (_, of_truth) = surfacing::fair(&truth, bound_mm, &Unmonitored)?;
     let (before, after) = (rms(measured.raw_z_mm()), rms(&faired));
     let falls = report.variation_before / report.variation_after;
     println!(
-        "| {name} | {bound_mm} | {:.3e} | {:.3e} | {falls:.1} | {:.4} | {} | {before:.4} | {after:.4} |",
-        report.variation_before, report.variation_after, report.greatest_move_mm, report.at_bound
+        "| {name} | {bound_mm} | {:.3e} | {:.3e} | {:.3e} | {falls:.1} | {:.4} | {} | {before:.4} | {after:.4} |",
+        of_truth.variation_before,
+        report.variation_before,
+        report.variation_after,
+        report.greatest_move_mm,
+        report.at_bound
     );
     if report.greatest_move_mm > bound_mm {
         missed.push(format!("{name}: a point moved over its bound"));
