@@ -30,7 +30,7 @@ pub(super) fn told(surfaced: &Surfaced) -> String {
     lines.push(format!(
         "grid         {} points at {} mm{}, noise {:.4} mm; tolerance {} mm",
         surfaced.surface.nodes,
-        surfaced.pitch_mm,
+        (surfaced.pitch_mm * 1e6).round() / 1e6,
         if surfaced.as_measured {
             " as measured"
         } else {
