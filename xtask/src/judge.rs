@@ -13,6 +13,9 @@ const PACKAGES: [&str; 2] = ["cadquery-ocp==8.0.1.1.0", "numpy"];
 /// Meshes the files, where that is asked for.
 const GMSH: &str = "gmsh==4.15.2";
 
+/// Fits surfaces, where that is asked for.
+pub(crate) const SCIPY: &str = "scipy==1.17.1";
+
 /// The simulated objects, and what is asked of their scans.
 const OBJECTS: [&str; 2] = ["house", "cylinder"];
 

@@ -142,6 +142,10 @@ fn full() -> anyhow::Result<()> {
     study::run(&study::Study::Parts {
         options: ["--gmsh", "--check"].map(Into::into).to_vec(),
     })?;
+    study::run(&study::Study::Surfaces {
+        short: false,
+        scan: None,
+    })?;
     study::run(&study::Study::Segmentation {
         options: ["--set", "judge", "--full", "--peers", "--check"]
             .map(Into::into)

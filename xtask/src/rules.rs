@@ -38,6 +38,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &["nurbs", "range-image", "reconstruct", "shapes"],
     ),
     ("compare", &["range-image"]),
+    ("skin", &["nurbs", "range-image"]),
+    ("surfacing", &["nurbs", "range-image"]),
     (
         "pipeline",
         &[
@@ -82,6 +84,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("relief-tests", &EVERYTHING),
     ("relief-studies", &STUDIES),
+    (
+        "relief-surfaces",
+        &["nurbs", "range-image", "regrid", "scan-files", "surfacing"],
+    ),
     ("relief-vm-systemd", &["sim-scanner"]),
     (
         "relief-vm-usb",
@@ -130,7 +136,7 @@ const DAEMON: [&str; 15] = [
     "storage",
 ];
 
-const COMMAND_LINE: [&str; 18] = [
+const COMMAND_LINE: [&str; 20] = [
     "cad-exchange",
     "compare",
     "deliverables",
@@ -147,8 +153,10 @@ const COMMAND_LINE: [&str; 18] = [
     "segment",
     "shapes",
     "sim-scanner",
+    "skin",
     "solids",
     "storage",
+    "surfacing",
 ];
 
 const EVERYTHING: [&str; 15] = [

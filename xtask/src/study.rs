@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 use std::fs;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Subcommand;
@@ -83,6 +84,15 @@ pub(crate) enum Study {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
+    /// Place the knots of B-spline surfaces in every way, and hold them against SciPy's.
+    Surfaces {
+        /// Small grids and one tolerance each, without the recorded scan and `bisplrep`
+        #[arg(long)]
+        short: bool,
+        /// A recorded scan to be measured, too (PLY in metres)
+        #[arg(long, value_name = "FILE")]
+        scan: Option<PathBuf>,
+    },
 }
 
 pub(crate) fn run(study: &Study) -> Result<()> {
@@ -106,6 +116,7 @@ pub(crate) fn run(study: &Study) -> Result<()> {
         Study::Regrid { options } => program("study-regrid", options),
         Study::Segmentation { options } => program("study-segmentation", options),
         Study::Shapes { options } => program("study-shapes", options),
+        Study::Surfaces { short, scan } => surfaces(*short, scan.as_deref()),
         Study::Throughput { usb, options } => {
             let mut options = options.clone();
             if *usb {
@@ -116,6 +127,26 @@ pub(crate) fn run(study: &Study) -> Result<()> {
             program("study-throughput", &options)
         }
     }
+}
+
+/// Our surfaces first, whose control points SciPy is then asked to match.
+fn surfaces(short: bool, scan: Option<&Path>) -> Result<()> {
+    let place = shell::root().join("target");
+    let data = place.join("studies/surfaces");
+    if data.exists() {
+        fs::remove_dir_all(&data)?;
+    }
+    let data = data.display().to_string();
+    let mut words: Vec<OsString> = vec!["--data".into(), data.clone().into()];
+    words.extend(short.then(|| "--short".into()));
+    if let Some(scan) = scan {
+        words.extend(["--scan".into(), scan.into()]);
+    }
+    program_of("relief-surfaces", "study-surfaces", &words)?;
+    let python = judge::python(&place.join("judges"), &[judge::SCIPY])?;
+    let mut check = vec!["-B", "tests/judges/surfacing/check.py", &data];
+    check.extend((!short).then_some("--bisplrep"));
+    shell::run(&python, &check)
 }
 
 /// Builds the service, which those programs look for beside themselves that run it.
@@ -135,7 +166,7 @@ pub(crate) fn program(name: &str, options: &[OsString]) -> Result<()> {
     program_of("relief-studies", name, options)
 }
 
-fn program_of(package: &str, name: &str, options: &[OsString]) -> Result<()> {
+pub(crate) fn program_of(package: &str, name: &str, options: &[OsString]) -> Result<()> {
     let mut words: Vec<String> = ["run", "--release", "--package", package, "--bin", name]
         .map(String::from)
         .to_vec();

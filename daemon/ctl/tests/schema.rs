@@ -16,8 +16,8 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use common::schema::{check, published, validator};
 use common::{relief, roof, text};
-use jsonschema::{Retrieve, Uri, Validator};
 use reliefd::config::WebhookConfig;
 use reliefd::{Config, Daemon};
 use serde_json::{Value, json};
@@ -30,78 +30,6 @@ const FILES: [&str; 4] = [
     "manifest.schema.json",
     "commands.schema.json",
 ];
-
-fn published(name: &str) -> Value {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/schema");
-    let text = fs::read_to_string(folder.join(name)).unwrap();
-    serde_json::from_str(&text).unwrap()
-}
-
-/// The schemas as published, or, strictly, with every key forbidden that they do not name.
-struct Published {
-    strict: bool,
-}
-
-impl Retrieve for Published {
-    fn retrieve(
-        &self,
-        uri: &Uri<String>,
-    ) -> Result<Value, Box<dyn std::error::Error + Send + Sync>> {
-        let name = uri.path().as_str().trim_start_matches('/');
-        let mut schema = published(name);
-        if self.strict {
-            close(&mut schema);
-        }
-        Ok(schema)
-    }
-}
-
-/// Forbids keys without a description.
-fn close(schema: &mut Value) {
-    match schema {
-        Value::Object(keys) => {
-            // The keys of an event depend on its kind, which `properties` does not tell.
-            if keys.contains_key("properties")
-                && keys.contains_key("required")
-                && !keys.contains_key("allOf")
-            {
-                keys.insert("additionalProperties".into(), false.into());
-            }
-            keys.values_mut().for_each(close);
-        }
-        Value::Array(items) => items.iter_mut().for_each(close),
-        _ => {}
-    }
-}
-
-fn validator(reference: &str, strict: bool) -> Validator {
-    jsonschema::options()
-        .with_base_uri("json-schema:///")
-        .with_retriever(Published { strict })
-        .build(&json!({ "$ref": reference }))
-        .unwrap()
-}
-
-#[track_caller]
-fn check(reference: &str, document: &Value) {
-    // What an event holds beside its kind is told by the kind.
-    let modes: &[bool] = if reference.ends_with("/watch") {
-        &[false]
-    } else {
-        &[false, true]
-    };
-    for &strict in modes {
-        let schema = validator(reference, strict);
-        let problems: Vec<String> = schema
-            .iter_errors(document)
-            .map(|error| format!("{}: {error}", error.instance_path()))
-            .collect();
-        assert!(
-            problems.is_empty(),
-            "{reference}, strict {strict}: {problems:#?}\n{document:#}"
-        );
-    }
-}
 
 fn document(output: &Output) -> Value {
     let told = String::from_utf8_lossy(&output.stderr);
@@ -121,8 +49,9 @@ fn the_schemas_are_schemas() {
         assert!(schema["$schema"].as_str().unwrap().contains("2020-12"));
     }
     for command in [
-        "compare", "convert", "demo", "scan", "abort", "resume", "status", "scans", "jobs",
-        "retry", "cancel", "rerun", "watch", "fetch", "doctor", "token", "laser", "webhooks",
+        "compare", "convert", "skin", "surface", "demo", "scan", "abort", "resume", "status",
+        "scans", "jobs", "retry", "cancel", "rerun", "watch", "fetch", "doctor", "token", "laser",
+        "webhooks",
     ] {
         let reference = format!("commands.schema.json#/$defs/{command}");
         assert!(
@@ -210,6 +139,22 @@ fn the_report_of_a_comparison() {
         assert_eq!(told["passed"], true, "{told:#}");
         let free = told["report"]["alignment"]["free"].as_array().unwrap();
         assert_eq!(free.len(), freedoms, "{told:#}");
+    }
+}
+
+#[test]
+fn what_a_surface_tells() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    fs::write(at.join("roof.xyz"), text(&roof())).unwrap();
+    let options = ["surface", "roof.xyz", "--json", "--tolerance-mm", "0.1"];
+    for more in [
+        &[][..],
+        &["--fair-mm", "0.05", "--compare", "--pictures", "drawn"],
+        &["--knots", "derivative", "--pitch-mm", "1"],
+    ] {
+        let told = document(&relief(at, &[&options[..], more].concat()));
+        check("commands.schema.json#/$defs/surface", &told);
     }
 }
 

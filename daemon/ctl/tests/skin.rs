@@ -14,6 +14,7 @@ use std::path::Path;
 use std::process::Output;
 
 use cad_exchange::iges::read_surfaces;
+use common::schema::check;
 use common::{relief, roof, text};
 use serde_json::Value;
 
@@ -62,6 +63,7 @@ fn a_barrel_becomes_a_surface_that_holds_its_points() {
         let output = skin(folder.path(), &file, &more);
         assert!(output.status.success(), "{}", stderr(&output));
         let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        check("commands.schema.json#/$defs/skin", &told);
         assert!(told["deviation"]["max_mm"].as_f64().unwrap() <= 0.2);
         assert_eq!(told["deviation"]["within_tolerance_share"], 1.0);
         assert_eq!(told["sections"].as_array().unwrap().len(), 6);

@@ -124,11 +124,13 @@ pub fn write_surfaces(
     surfaces: &[iges::NamedSurface<'_>],
     name: &str,
     timestamp: Timestamp,
+    author: &str,
     mut sink: impl Write,
 ) -> Result<iges::Summary, WriteError> {
     let stem = file_stem(name);
     let mut options = iges::WriteOptions::new(stem.clone(), iges_time(timestamp));
     options.file_name = format!("{stem}.igs");
+    author.clone_into(&mut options.author);
     Ok(iges::write_surfaces(surfaces, &options, &mut sink)?)
 }
 

@@ -23,6 +23,7 @@ mod setting;
 mod shown;
 pub(crate) mod skin;
 pub(crate) mod status;
+pub(crate) mod surface;
 mod timestamp;
 pub(crate) mod token;
 pub(crate) mod watch;
@@ -50,6 +51,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Retry(args) => block_on(change::retry(args, json)),
         Command::Cancel(args) => block_on(change::cancel(args, json)),
         Command::Rerun(args) => block_on(rerun::run(args, json)),
+        Command::Surface(args) => block_on(surface::run(args, json)),
         Command::Watch(args) => block_on(watch::run(args, json)),
         Command::Doctor(args) => block_on(doctor::run(args, json)),
         Command::Fetch(args) => block_on(fetch::run(args, json)),

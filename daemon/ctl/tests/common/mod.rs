@@ -1,5 +1,11 @@
 //! Shared by the tests.
-#![allow(dead_code, reason = "each test file uses its own part")]
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    reason = "each test file uses its own part, and says where it cannot go on"
+)]
+
+pub(crate) mod schema;
 
 use std::fmt::Write as _;
 use std::path::Path;

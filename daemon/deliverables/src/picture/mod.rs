@@ -3,6 +3,7 @@
 mod borders;
 mod canvas;
 mod deviations;
+mod heights;
 mod inliers;
 mod plot;
 mod range;
@@ -74,6 +75,68 @@ pub fn write_deviations(
     sink: impl Write,
 ) -> std::io::Result<()> {
     encode(&deviations::draw(image, comparison, tolerance, name), sink)
+}
+
+/// Draws how far the nodes lie off a surface along z (`deviations`: millimetres, column by
+/// column, NaN where there is none, and the tolerance, which is where the colours end), and
+/// writes it as PNG.
+///
+/// # Errors
+/// What the sink reports.
+pub fn write_off_surface(
+    image: &RangeImage,
+    (deviations_mm, tolerance_mm): (&[f64], f64),
+    name: &str,
+    sink: impl Write,
+) -> std::io::Result<()> {
+    encode(
+        &heights::off_surface(image, deviations_mm, tolerance_mm, name),
+        sink,
+    )
+}
+
+/// Draws lines of equal z this far apart, and writes them as PNG.
+///
+/// # Errors
+/// What the sink reports.
+pub fn write_contours(
+    image: &RangeImage,
+    step_mm: f64,
+    name: &str,
+    sink: impl Write,
+) -> std::io::Result<()> {
+    encode(&heights::contours(image, step_mm, name), sink)
+}
+
+/// Draws the curvature of the grid, 1/mm, in colours that end at `limit`, and writes it as PNG.
+///
+/// # Errors
+/// What the sink reports.
+pub fn write_curvature(
+    image: &RangeImage,
+    limit: f64,
+    name: &str,
+    sink: impl Write,
+) -> std::io::Result<()> {
+    encode(&heights::curvatures(image, limit, name), sink)
+}
+
+/// The curvature, 1/mm, that all but the most curved nodes stay below.
+#[must_use]
+pub fn curvature_limit(image: &RangeImage) -> f64 {
+    heights::curvature_limit(image)
+}
+
+/// The least of 1, 2 and 5 times a power of ten that is not below `step`; 1 for what is no
+/// positive number.
+#[must_use]
+pub fn round_step(step: f64) -> f64 {
+    if !(step > 0.0 && step.is_finite()) {
+        return 1.0;
+    }
+    let power = libm::pow(10.0, libm::floor(libm::log10(step)));
+    let mut steps = [1.0, 2.0, 5.0, 10.0].into_iter().map(|f| f * power);
+    steps.find(|s| *s >= step * 0.999_999).unwrap_or(step)
 }
 
 /// Draws the share of inliers among the samples around each node, ready to be written as

@@ -417,7 +417,7 @@ impl Args {
 }
 
 /// The input's name without `.gz` and the ending of its format, fit for a file.
-fn input_stem(input: &Path) -> String {
+pub(crate) fn input_stem(input: &Path) -> String {
     let name = input
         .file_name()
         .map(|name| name.to_string_lossy().into_owned())
@@ -432,7 +432,7 @@ fn input_stem(input: &Path) -> String {
     file_stem(stem)
 }
 
-fn same_file(a: &Path, b: &Path) -> bool {
+pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
     match (a.canonicalize(), b.canonicalize()) {
         (Ok(a), Ok(b)) => a == b,
         _ => false,

@@ -3,5 +3,5 @@
 mod args;
 mod run;
 
-pub(crate) use args::Args;
+pub(crate) use args::{Args, input_stem, same_file};
 pub(crate) use run::run;

@@ -109,7 +109,7 @@ fn skin_file(args: &Args, shown: &Shown) -> Result<Skinned, Failure> {
         is_closed: [found.is_closed, false],
     };
     write_atomically::<deliverables::DeliverError>(&output, |sink| {
-        deliverables::write_surfaces(&[named], &name, timestamp, sink)?;
+        deliverables::write_surfaces(&[named], &name, timestamp, "", sink)?;
         Ok(())
     })
     .map_err(|error| Failure::at(format!("cannot write {}", output.display()), &error))?;

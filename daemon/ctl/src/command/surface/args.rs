@@ -1,0 +1,216 @@
+//! What the user may say, and what follows from it.
+
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use jiff::Timestamp;
+use regrid::RegridSettings;
+use scan_files::Units;
+use surfacing::{JumpThresholds, Placement, Settings, SurfaceError};
+
+use crate::command::convert::{input_stem, same_file};
+use crate::command::part::{Limits, limits};
+use crate::failure::Failure;
+
+/// Make one B-spline surface of a scan, without a service
+///
+/// Reads a scan file as `convert` does and fits an open cubic B-spline surface to its grid by
+/// least squares. Knots are placed as few as the tolerance allows (optimal), in equal spans
+/// (uniform), at the vertices of the reference sections' polylines (polyline), or where derivatives
+/// of these sections break (derivative); the latter two do not promise the tolerance, and it is said
+/// when they exceed it. Where z jumps along a line of the grid, the surface comes in pieces; where
+/// the slope does, pieces meet on that line.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// The scan file
+    #[arg(value_name = "SCAN")]
+    pub(super) scan: PathBuf,
+    /// The file to write; its ending picks the format: IGES (.igs or .iges), or STEP (.step or
+    /// .stp). Default: the scan's name with .igs, in the current directory
+    #[arg(short, long, value_name = "OUT")]
+    output: Option<PathBuf>,
+    /// Greatest distance in z between surface and grid, millimetres
+    #[arg(long, value_name = "MM")]
+    pub(super) tolerance_mm: f64,
+    /// How knots are placed
+    #[arg(long, value_name = "HOW", value_enum, default_value_t = KnotsName::Optimal)]
+    knots: KnotsName,
+    /// Jumps of z and its first three derivatives that are breaks, millimetres, the parameter
+    /// counting grid points; for derivative knots. Raised where noise asks for more
+    #[arg(long, value_name = "C0,C1,C2,C3", value_delimiter = ',', default_values_t = JumpThresholds::default().0)]
+    thresholds: Vec<f64>,
+    /// Move grid points by up to this before, millimetres, so that curvature varies less; feature
+    /// lines stay sharp
+    #[arg(long, value_name = "MM")]
+    pub(super) fair_mm: Option<f64>,
+    /// Also tell what each placement of knots comes to
+    #[arg(long)]
+    pub(super) compare: bool,
+    /// Draw deviations.png, and contours and curvature before and after fairing, into this
+    /// directory, too
+    #[arg(long, value_name = "DIR")]
+    pub(super) pictures: Option<PathBuf>,
+    /// Distance of the grid's nodes, millimetres; default: after the scan's density. Samples that
+    /// lie on a uniform grid already are taken as they are unless this, or a --roi, is given
+    #[arg(long, value_name = "MM")]
+    pub(super) pitch_mm: Option<f64>,
+    /// Unit of the coordinates in the file; default: millimetres, or what the file says
+    #[arg(long, value_name = "UNIT", value_enum)]
+    units: Option<UnitName>,
+    /// Ignore samples with x outside of these limits, millimetres; one may be left out, as
+    /// in `-50,`
+    #[arg(long, value_name = "MIN,MAX", value_parser = limits, allow_hyphen_values = true)]
+    roi_x_mm: Option<Limits>,
+    /// The same for y (up)
+    #[arg(long, value_name = "MIN,MAX", value_parser = limits, allow_hyphen_values = true)]
+    roi_y_mm: Option<Limits>,
+    /// The same for z (towards the camera)
+    #[arg(long, value_name = "MIN,MAX", value_parser = limits, allow_hyphen_values = true)]
+    roi_z_mm: Option<Limits>,
+    /// Seed of every random draw
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Threads to use; 0 for all processors. The result does not depend on it
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Name of the surface in the file; default: that kept with the scan, or the scan's name
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
+    /// Time in the file, such as 2026-11-21T09:30:00Z. Default: SOURCE_DATE_EPOCH (seconds since
+    /// 1970), else when the scan was taken, else when the scan file was last changed
+    #[arg(long, value_name = "TIME")]
+    pub(super) timestamp: Option<Timestamp>,
+    /// Author in the file
+    #[arg(long, value_name = "NAME")]
+    pub(super) author: Option<String>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum KnotsName {
+    Uniform,
+    Polyline,
+    Derivative,
+    Optimal,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum UnitName {
+    Mm,
+    M,
+    Inch,
+}
+
+impl Args {
+    /// Where the surface goes, and whether as STEP.
+    pub(super) fn output(&self) -> Result<(PathBuf, bool), Failure> {
+        let path = match &self.output {
+            Some(path) => path.clone(),
+            None => PathBuf::from(format!("{}.igs", input_stem(&self.scan))),
+        };
+        let ending = path
+            .extension()
+            .map(|e| e.to_string_lossy().to_ascii_lowercase());
+        let is_step = match ending.as_deref() {
+            Some("igs" | "iges") => false,
+            Some("step" | "stp") => true,
+            _ => {
+                return Err(Failure::Usage(format!(
+                    "the ending of {} names no format that a surface is written in; known: .igs, \
+                     .iges, .step, .stp",
+                    path.display()
+                )));
+            }
+        };
+        if same_file(&path, &self.scan) {
+            return Err(Failure::Usage(format!(
+                "{} is the scan file itself; name another output with -o",
+                path.display()
+            )));
+        }
+        Ok((path, is_step))
+    }
+
+    /// Name of the surface.
+    pub(super) fn name(&self, kept: Option<&str>) -> String {
+        let given = self
+            .name
+            .as_deref()
+            .or(kept)
+            .filter(|name| !name.trim().is_empty());
+        given.map_or_else(|| input_stem(&self.scan), str::to_owned)
+    }
+
+    pub(super) fn units(&self) -> Option<Units> {
+        self.units.map(|units| match units {
+            UnitName::Mm => Units::Millimetre,
+            UnitName::M => Units::Metre,
+            UnitName::Inch => Units::Inch,
+        })
+    }
+
+    /// How the surface is made.
+    pub(super) fn settings(&self) -> Result<Settings, Failure> {
+        let thresholds = <[f64; 4]>::try_from(self.thresholds.as_slice()).map_err(|_| {
+            Failure::Usage(format!(
+                "--thresholds takes 4 numbers, for the derivatives 0 to 3, but {} were given",
+                self.thresholds.len()
+            ))
+        })?;
+        let settings = Settings {
+            tolerance_mm: self.tolerance_mm,
+            placement: match self.knots {
+                KnotsName::Uniform => Placement::Uniform,
+                KnotsName::Polyline => Placement::Polyline,
+                KnotsName::Derivative => Placement::Derivative,
+                KnotsName::Optimal => Placement::Optimal,
+            },
+            thresholds: JumpThresholds(thresholds),
+            fair_mm: self.fair_mm,
+        };
+        settings.validate().map_err(|error| {
+            let option = match &error {
+                SurfaceError::Setting { what, .. } if what.contains("fairing") => "--fair-mm",
+                SurfaceError::Threshold { .. } => "--thresholds",
+                _ => "--tolerance-mm",
+            };
+            Failure::Usage(format!("{option}: {error}"))
+        })?;
+        Ok(settings)
+    }
+
+    /// How the scan is regridded: as it would be for `convert`, but for what the user says.
+    pub(super) fn regrid(&self, mut settings: RegridSettings) -> Result<RegridSettings, Failure> {
+        if let Some(pitch_mm) = self.pitch_mm {
+            settings.pitch_mm = pitch_mm;
+        }
+        if let Some(seed) = self.seed {
+            settings.seed = seed;
+        }
+        for (place, given) in [
+            (&mut settings.roi.x_mm, self.roi_x_mm),
+            (&mut settings.roi.y_mm, self.roi_y_mm),
+            (&mut settings.roi.z_mm, self.roi_z_mm),
+        ] {
+            if let Some(limits) = given {
+                *place = limits.mm();
+            }
+        }
+        settings.threads = self.threads;
+        settings
+            .validate()
+            .map_err(|error| Failure::Usage(error.to_string()))?;
+        Ok(settings)
+    }
+
+    /// Whether samples are to be brought onto another grid even if they lie on one already.
+    pub(super) fn asks_for_a_grid(&self) -> bool {
+        let limits = [self.roi_x_mm, self.roi_y_mm, self.roi_z_mm];
+        self.pitch_mm.is_some() || limits.iter().any(Option::is_some)
+    }
+
+    /// The scan's file, for titles.
+    pub(super) fn scan_name(&self) -> String {
+        let name = self.scan.file_name().unwrap_or(Path::as_os_str(&self.scan));
+        name.to_string_lossy().into_owned()
+    }
+}

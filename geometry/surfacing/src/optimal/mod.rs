@@ -1,0 +1,166 @@
+//! As few knots as the tolerance allows, over the whole grid: ours.
+//!
+//! 1. Lines along the grid on which the slope breaks get triple knots ([`crate::character`]), which
+//!    stay.
+//! 2. For each direction by itself a density of knots is found under which every span's
+//!    greatest deviation is the same share of the tolerance ([`density`]): a cubic's falls
+//!    with the fourth power of its span.
+//! 3. Where that does not reach the tolerance, spans that exceed it are halved.
+//! 4. Knots are taken away while the tolerance holds, and moved to lower the deviations,
+//!    in turn ([`polish`]).
+//!
+//! Masked nodes are filled anew from the surface between the steps, so that they ask for no
+//! knots of their own.
+
+mod density;
+mod polish;
+
+use range_image::{Cancelled, Monitor};
+
+use crate::axis::{Axis, Breaks};
+use crate::knots::Knots;
+use crate::problem::Problem;
+use density::Direction;
+
+/// Shares of the tolerance that each direction may take, tried from the largest.
+const SHARES: [f64; 8] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.42, 0.35];
+
+/// Times that holes are filled anew once the tolerance holds.
+const REFILLS: usize = 2;
+
+/// Places the knots. `fixed` are those that character lines ask for, along x and y.
+///
+/// # Errors
+/// [`Cancelled`] at the monitor's wish.
+pub(crate) fn place(
+    problem: &mut Problem,
+    fixed: &[Vec<f64>; 2],
+    monitor: &dyn Monitor,
+) -> Result<Knots, Cancelled> {
+    let mut u = Direction::new(problem.columns, fixed[0].clone());
+    let mut v = Direction::new(problem.rows, fixed[1].clone());
+    if !problem.is_full {
+        // A first surface, so that the holes are filled from more than their neighbours.
+        problem.refill(&Knots {
+            u: Breaks::uniform(problem.columns, 8).solvable(),
+            v: Breaks::uniform(problem.rows, 8).solvable(),
+        });
+    }
+    let mut knots = None;
+    for (step, share) in SHARES.into_iter().enumerate() {
+        monitor.check()?;
+        let target = share * problem.tolerance;
+        let candidate = Knots {
+            u: u.spread(target, |axis| problem.columns_off(axis)),
+            v: v.spread(target, |axis| problem.rows_off(axis)),
+        };
+        monitor.progress(0.3 * (step + 1) as f64 / SHARES.len() as f64);
+        let is_near = problem
+            .fit(&candidate)
+            .is_some_and(|fit| fit.score.max <= problem.tolerance);
+        if !problem.is_full && step < 3 {
+            problem.refill(&candidate);
+        }
+        knots = Some(candidate);
+        if is_near {
+            break;
+        }
+    }
+    let knots = knots.unwrap_or_else(|| Knots {
+        u: Breaks::none(problem.columns),
+        v: Breaks::none(problem.rows),
+    });
+    let mut knots = halve_until_near(problem, knots, monitor)?;
+    // Filling the holes anew moves the surface a little, as long as it has not settled.
+    for _ in 0..REFILLS {
+        problem.refill(&knots);
+        knots = halve_until_near(problem, knots, monitor)?;
+    }
+    monitor.progress(0.4);
+    let is_near = problem
+        .fit(&knots)
+        .is_some_and(|fit| fit.score.max <= problem.tolerance);
+    if !is_near {
+        return Ok(every_node(problem));
+    }
+    polish::polish(problem, knots, fixed, monitor)
+}
+
+/// Halves the spans that exceed the tolerance until none does, or all nodes have a knot.
+fn halve_until_near(
+    problem: &mut Problem,
+    mut knots: Knots,
+    monitor: &dyn Monitor,
+) -> Result<Knots, Cancelled> {
+    loop {
+        monitor.check()?;
+        let Some(fit) = problem.fit(&knots) else {
+            return Ok(every_node(problem));
+        };
+        if fit.score.max <= problem.tolerance {
+            return Ok(knots);
+        }
+        let (Some(u), Some(v)) = (Axis::new(&knots.u), Axis::new(&knots.v)) else {
+            return Ok(every_node(problem));
+        };
+        let mut target = 0.5 * problem.tolerance;
+        let mut finer = knots.clone();
+        let (columns_off, rows_off) = (problem.columns_off(&u), problem.rows_off(&v));
+        // Both directions may be within their share, and yet not their sum.
+        for _ in 0..6 {
+            finer.u = halved(&knots.u, &columns_off, target);
+            finer.v = halved(&knots.v, &rows_off, target);
+            if finer != knots {
+                break;
+            }
+            target *= 0.7;
+        }
+        if finer == knots {
+            let every = every_node(problem);
+            let is_better = problem
+                .fit(&every)
+                .is_some_and(|every| every.score.max < fit.score.max);
+            return Ok(if is_better { every } else { knots });
+        }
+        problem.refill(&finer);
+        knots = finer;
+    }
+}
+
+/// A knot at every node but those next to the ends: the interpolating spline.
+pub(crate) fn every_node(problem: &Problem) -> Knots {
+    let every = |nodes: usize| {
+        let inner = (2..nodes.saturating_sub(2)).map(|k| k as f64).collect();
+        Breaks::new(nodes, inner)
+    };
+    Knots {
+        u: every(problem.columns),
+        v: every(problem.rows),
+    }
+}
+
+/// Knots with those spans halved in which a node is farther off than the target, as far as
+/// the nodes hold them.
+fn halved(breaks: &Breaks, off: &[f64], target: f64) -> Breaks {
+    let mut breaks = breaks.clone();
+    for span in breaks.edges().windows(2) {
+        let &[low, high] = span else { continue };
+        if worst_within(off, low, high) <= target {
+            continue;
+        }
+        let mut inner = breaks.inner.clone();
+        inner.push((low + high) / 2.0);
+        let finer = Breaks::new(breaks.nodes, inner);
+        if finer.inner.len() > breaks.inner.len() && Axis::new(&finer).is_some() {
+            breaks = finer;
+        }
+    }
+    breaks
+}
+
+/// The greatest of the nodes' values within a span, the nodes at its ends included.
+fn worst_within(off: &[f64], low: f64, high: f64) -> f64 {
+    let (from, to) = (low.floor() as usize, high.ceil() as usize);
+    let nodes = off.get(from..(to + 1).min(off.len())).unwrap_or_default();
+    nodes.iter().copied().fold(0.0, f64::max)
+}

@@ -1,0 +1,243 @@
+//! Placements of knots beside each other, and fairing of noisy points.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use range_image::{Column, Sample, Unmonitored};
+use regrid::RegridSettings;
+use scan_files::{ReadOptions, Units};
+use serde::Serialize;
+use surfacing::{Breaks, HeightGrid, Knots, Placement, Settings, fit_with, make};
+
+use crate::common::{draws, face, franke, grid, peaks};
+
+/// What the judge is told: the grid, and what our surfaces of it come to.
+#[derive(Serialize)]
+struct Case {
+    name: String,
+    columns: usize,
+    rows: usize,
+    /// Column by column; null where masked.
+    z_mm: Vec<Option<f64>>,
+    ours: Vec<Ours>,
+}
+
+#[derive(Serialize)]
+struct Ours {
+    tolerance_mm: f64,
+    control_points: usize,
+    max_mm: f64,
+    rms_mm: f64,
+}
+
+type Surface = (&'static str, fn(f64, f64) -> f64, [f64; 3]);
+
+/// Measures, prints tables, leaves data; fails where a bar is missed.
+pub(crate) fn measure(short: bool, scan: Option<&Path>, data: Option<&Path>) -> Result<()> {
+    let surfaces: [Surface; 3] = [
+        ("franke", franke, [0.5, 0.1, 0.02]),
+        ("peaks", peaks, [0.5, 0.1, 0.02]),
+        ("face", face, [0.5, 0.1, 0.02]),
+    ];
+    let side = if short { 61 } else { 121 };
+    let mut missed = Vec::new();
+    println!(
+        "| surface | tolerance mm | uniform 2^k | max | polyline | max | derivative | max | optimal | max | rms | fewest uniform as near | ratio |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    for (name, z, tolerances) in surfaces {
+        let grid = grid(side, side, 200.0 / (side - 1) as f64, z);
+        let tolerances = if short {
+            &tolerances[1..2]
+        } else {
+            &tolerances[..]
+        };
+        let case = compare(name, &grid, tolerances, &mut missed)?;
+        leave(data, &case)?;
+    }
+    if let Some(path) = scan {
+        let whole = recorded(path, None)?;
+        let flank = recorded(path, Some([(-20.0, 40.0), (55.0, 92.0)]))?;
+        for (name, grid, tolerances) in [
+            ("scan, flank", &flank, &[1.0, 0.5, 0.2][..]),
+            ("scan, whole", &whole, &[5.0, 2.0][..]),
+        ] {
+            let case = compare(name, grid, tolerances, &mut missed)?;
+            leave(data, &case)?;
+        }
+    }
+    println!();
+    println!(
+        "| surface with noise of 0.05 mm, 200 mm wide | bound mm | variation of the truth | before | after | falls by | greatest move | at the bound | rms to the truth before | after |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    for (name, z, _) in surfaces {
+        for bound_mm in [0.05, 0.15] {
+            // At about a scanner's pitch: on coarser grids shape is most of the variation.
+            fairing(
+                name,
+                z,
+                bound_mm,
+                if short { 161 } else { 401 },
+                &mut missed,
+            )?;
+        }
+    }
+    if !missed.is_empty() {
+        bail!("missed:\n  {}", missed.join("\n  "));
+    }
+    Ok(())
+}
+
+fn compare(
+    name: &str,
+    grid: &HeightGrid,
+    tolerances: &[f64],
+    missed: &mut Vec<String>,
+) -> Result<Case> {
+    let mut ours = Vec::new();
+    for &tolerance_mm in tolerances {
+        let mut cells = vec![name.to_owned(), tolerance_mm.to_string()];
+        for placement in Placement::ALL {
+            let settings = Settings {
+                placement,
+                ..Settings::new(tolerance_mm)
+            };
+            let report = make(grid, &settings, &Unmonitored)?.report;
+            cells.push(report.control_points.to_string());
+            cells.push(format!("{:.4}", report.max_mm));
+            if placement == Placement::Optimal {
+                cells.push(format!("{:.4}", report.rms_mm));
+                let fewest = fewest_uniform(grid, report.max_mm);
+                let told = fewest.map_or("none".to_owned(), |n| n.to_string());
+                let ratio =
+                    fewest.map_or(f64::INFINITY, |n| n as f64 / report.control_points as f64);
+                cells.extend([told, format!("{ratio:.2}")]);
+                ours.push(Ours {
+                    tolerance_mm,
+                    control_points: report.control_points,
+                    max_mm: report.max_mm,
+                    rms_mm: report.rms_mm,
+                });
+                let doubled: usize = cells[2].parse().unwrap_or(0);
+                let near: f64 = cells[3].parse().unwrap_or(f64::INFINITY);
+                if near <= tolerance_mm && 2 * report.control_points > doubled {
+                    missed.push(format!(
+                        "{name} at {tolerance_mm} mm: {} control points are more than half of {doubled} with spans doubled",
+                        report.control_points
+                    ));
+                }
+            }
+        }
+        println!("| {} |", cells.join(" | "));
+    }
+    Ok(Case {
+        name: name.to_owned(),
+        columns: grid.columns(),
+        rows: grid.rows(),
+        z_mm: grid
+            .raw_z_mm()
+            .iter()
+            .map(|z| (!z.is_nan()).then_some(*z))
+            .collect(),
+        ours,
+    })
+}
+
+/// Fewest control points of any numbers of equal spans that come as near; full grids only,
+/// since each of some ten thousand fits of others takes a second.
+fn fewest_uniform(grid: &HeightGrid, max_mm: f64) -> Option<usize> {
+    if !grid.is_full() {
+        return None;
+    }
+    let mut fewest = None;
+    for u in 1..grid.columns() - 3 {
+        for v in 1..grid.rows() - 3 {
+            let count = (u + 3) * (v + 3);
+            if fewest.is_some_and(|fewest| count >= fewest) {
+                break;
+            }
+            let knots = Knots {
+                u: Breaks::uniform(grid.columns(), u),
+                v: Breaks::uniform(grid.rows(), v),
+            };
+            if fit_with(grid, &knots).is_ok_and(|(_, max, _)| max <= max_mm) {
+                fewest = Some(count);
+            }
+        }
+    }
+    fewest
+}
+
+fn fairing(
+    name: &str,
+    z: fn(f64, f64) -> f64,
+    bound_mm: f64,
+    side: usize,
+    missed: &mut Vec<String>,
+) -> Result<()> {
+    let truth = grid(side, side, 200.0 / (side - 1) as f64, z);
+    let noise = draws(side * side);
+    let measured = truth.raw_z_mm().iter().zip(&noise);
+    let measured = truth.with_z(measured.map(|(z, d)| z + 0.05 * d).collect())?;
+    let (faired, report) = surfacing::fair(&measured, bound_mm, &Unmonitored)?;
+    let rms = |z: &[f64]| {
+        let squares = z
+            .iter()
+            .zip(truth.raw_z_mm())
+            .map(|(z, t)| (z - t) * (z - t));
+        (squares.sum::<f64>() / z.len() as f64).sqrt()
+    };
+    let (_, of_truth) = surfacing::fair(&truth, bound_mm, &Unmonitored)?;
+    let (before, after) = (rms(measured.raw_z_mm()), rms(&faired));
+    let falls = report.variation_before / report.variation_after;
+    println!(
+        "| {name} | {bound_mm} | {:.3e} | {:.3e} | {:.3e} | {falls:.1} | {:.4} | {} | {before:.4} | {after:.4} |",
+        of_truth.variation_before,
+        report.variation_before,
+        report.variation_after,
+        report.greatest_move_mm,
+        report.at_bound
+    );
+    if report.greatest_move_mm > bound_mm {
+        missed.push(format!("{name}: a point moved over its bound"));
+    }
+    if after >= before {
+        missed.push(format!("{name}: fairing led away from the truth"));
+    }
+    Ok(())
+}
+
+/// A recorded scan on the grid of its density, or what of it lies within limits in x and y.
+fn recorded(path: &Path, limits_mm: Option<[(f64, f64); 2]>) -> Result<HeightGrid> {
+    let options = ReadOptions {
+        units: Some(Units::Metre),
+        ..ReadOptions::default()
+    };
+    let scan = scan_files::read(path, &options)?;
+    let mut settings = RegridSettings::with_pitch(scan.recommended_pitch_mm());
+    if let Some([x_mm, y_mm]) = limits_mm {
+        settings.roi.x_mm = x_mm;
+        settings.roi.y_mm = y_mm;
+    }
+    let columns = scan.columns.into_iter().map(|column| {
+        let samples = column.samples.into_iter().map(|sample| Sample {
+            y_mm: sample.y_mm,
+            z_mm: sample.z_mm,
+            intensity: sample.intensity,
+        });
+        Column::new(column.x_mm, samples.collect())
+    });
+    let image = regrid::regrid(columns, &settings, &Unmonitored)
+        .with_context(|| format!("cannot regrid {}", path.display()))?;
+    Ok(HeightGrid::from_image(&image)?)
+}
+
+fn leave(data: Option<&Path>, case: &Case) -> Result<()> {
+    let Some(folder) = data else { return Ok(()) };
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let path = folder.join(format!("{}.json", case.name.replace(", ", "-")));
+    let text = serde_json::to_string(case)?;
+    fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+}
