@@ -103,7 +103,10 @@ fn one(seed: u64, points: usize, folder: &Path) {
     .unwrap();
 
     let mut told = String::new();
-    let arcs = moves.iter().filter(|m| matches!(m.travel, Travel::Arc(_))).count();
+    let arcs = moves
+        .iter()
+        .filter(|m| matches!(m.travel, Travel::Arc(_)))
+        .count();
     writeln!(told, "{{").unwrap();
     for (name, value) in [
         ("radius_mm", cutter.radius_mm()),

@@ -97,7 +97,7 @@ fn on_corner(cutter: &Cutter, slope: f64, apart: f64) -> f64 {
         let rho = disc + r * w;
         (rho, (rho * rho - square).max(0.0).sqrt())
     };
-    let (mut low, mut high) = (((apart - disc) / r).max(0.0), 1.0);
+    let (mut low, mut high) = (((apart - disc) / r).clamp(0.0, 1.0), 1.0);
     let mut w = (slope / (1.0 + slope * slope).sqrt()).clamp(low, high);
     for _ in 0..ROUNDS {
         let (rho, s) = along(w);
@@ -173,7 +173,9 @@ mod tests {
         for (slope, apart) in [(0.3, 0.0), (0.3, 2.9), (0.3, 3.1), (5.0, 4.5), (200.0, 1.0)] {
             let s = on_corner(&cutter, slope, apart);
             let value = |s: f64| slope * s - height(&cutter, apart * apart + s * s);
-            for step in [1e-4, -1e-4, 1e-6, -1e-6] {
+            let reach = (25.0_f64 - apart * apart).sqrt();
+            let steps = [1e-4, -1e-4, 1e-6, -1e-6];
+            for step in steps.into_iter().filter(|step| s + step < reach) {
                 assert!(value(s) >= value(s + step) - 1e-12, "{slope} {apart}");
             }
         }

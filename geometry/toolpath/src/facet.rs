@@ -6,6 +6,8 @@ use crate::edge::Edge;
 /// Slopes across an edge that differ by more than this make a valley: rounding is far below.
 const VALLEY: f64 = 1e-9;
 
+/// Cosine of the angle by which the surface turns at a sharp edge: 30 degrees.
+const SHARP: f64 = 0.866_025;
 /// A plane whose unit normal has less than this of z is as good as vertical: cutters touch its edges
 /// within nanometres of where they touch it, and slopes have lost too many digits.
 const STEEPEST: f64 = 1e-7;
@@ -19,31 +21,27 @@ pub(crate) struct Facet {
     plane: Option<([f64; 2], f64)>,
     /// Highest corner.
     pub(crate) top_mm: f64,
-    /// Corners that no other triangle looks after.
-    owned: [bool; 3],
-    /// Edges that no other triangle looks after, and that a cutter can touch.
-    edges: [Option<Edge>; 3],
+    /// Corners that no other triangle looks after, and whether a sharp edge ends there.
+    owned: [Option<bool>; 3],
+    /// Edges that no other triangle looks after, and that a cutter can touch; whether they are sharp.
+    edges: [Option<(Edge, bool)>; 3],
 }
 
-/// The highest tip so far, and whether it is a face that the cutter touches there.
+/// Where a cutter stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// Height of the tip, millimetres.
     pub z_mm: f64,
-    /// The cutter touches a triangle inside, not an edge or a corner.
-    pub on_face: bool,
+    /// The cutter touches the surface's outline or an edge at which it turns by more than 30
+    /// degrees, not a face or an edge within one.
+    pub on_edge: bool,
 }
 
 impl Facet {
     /// A triangle that looks after nothing but its inside; `None` where it has no area.
     pub(crate) fn new(mut corners: [[f64; 3]; 3], turned: &mut bool) -> Option<Self> {
         let [a, b, c] = corners;
-        let (p, q) = (minus(b, a), minus(c, a));
-        let normal = [
-            p[1] * q[2] - p[2] * q[1],
-            p[2] * q[0] - p[0] * q[2],
-            p[0] * q[1] - p[1] * q[0],
-        ];
+        let normal = normal(&corners);
         let length = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
         if length == 0.0 {
             return None;
@@ -61,7 +59,7 @@ impl Facet {
             plane,
             top_mm: a[2].max(b[2]).max(c[2]),
             corners,
-            owned: [false; 3],
+            owned: [None; 3],
             edges: [const { None }; 3],
         })
     }
@@ -71,13 +69,21 @@ impl Facet {
     }
 
     /// Looks after a corner from now on.
-    pub(crate) fn own_corner(&mut self, corner: usize) {
-        self.owned[corner] = true;
+    pub(crate) fn own_corner(&mut self, corner: usize, is_sharp: bool) {
+        self.owned[corner] = Some(is_sharp);
     }
 
     /// Looks after the edge from a corner to the next.
-    pub(crate) fn own_edge(&mut self, side: usize) {
-        self.edges[side] = Edge::new(self.corners[side], self.corners[(side + 1) % 3]);
+    pub(crate) fn own_edge(&mut self, side: usize, is_sharp: bool) {
+        let edge = Edge::new(self.corners[side], self.corners[(side + 1) % 3]);
+        self.edges[side] = edge.map(|edge| (edge, is_sharp));
+    }
+
+    /// Whether the surface turns sharply between two triangles.
+    pub(crate) fn is_sharp(a: &Self, b: &Self) -> bool {
+        let (p, q) = (normal(&a.corners), normal(&b.corners));
+        let dot = |p: [f64; 3], q: [f64; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
+        dot(p, q) < SHARP * (dot(p, p) * dot(q, q)).sqrt()
     }
 
     /// How steeply it rises away from a side, to its inside; `None` where it is vertical.
@@ -110,17 +116,20 @@ impl Facet {
         }
         let radius = cutter.radius_mm();
         for corner in 0..3 {
-            if let Some(edge) = &self.edges[corner]
+            if let Some((edge, on_edge)) = &self.edges[corner]
                 && let Some(z_mm) = edge.tip_mm(cutter, at)
                 && z_mm > best.z_mm
             {
                 *best = Contact {
                     z_mm,
-                    on_face: false,
+                    on_edge: *on_edge,
                 };
             }
+            let Some(on_edge) = self.owned[corner] else {
+                continue;
+            };
             let [x, y, z] = self.corners[corner];
-            if !self.owned[corner] || z <= best.z_mm {
+            if z <= best.z_mm {
                 continue;
             }
             let (dx, dy) = (x - at[0], y - at[1]);
@@ -128,10 +137,7 @@ impl Facet {
             if square <= radius * radius {
                 let z_mm = z - height(cutter, square);
                 if z_mm > best.z_mm {
-                    *best = Contact {
-                        z_mm,
-                        on_face: false,
-                    };
+                    *best = Contact { z_mm, on_edge };
                 }
             }
         }
@@ -165,7 +171,7 @@ impl Facet {
         if z_mm > best.z_mm {
             *best = Contact {
                 z_mm,
-                on_face: true,
+                on_edge: false,
             };
         }
         true
@@ -181,6 +187,16 @@ pub(crate) fn height(cutter: &Cutter, square: f64) -> f64 {
         Kind::Ball => r - (r * r - square).max(0.0).sqrt(),
         Kind::Bull => cutter.profile(square.sqrt()),
     }
+}
+
+/// The cross product of two sides.
+fn normal([a, b, c]: &[[f64; 3]; 3]) -> [f64; 3] {
+    let (p, q) = (minus(*b, *a), minus(*c, *a));
+    [
+        p[1] * q[2] - p[2] * q[1],
+        p[2] * q[0] - p[0] * q[2],
+        p[0] * q[1] - p[1] * q[0],
+    ]
 }
 
 fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

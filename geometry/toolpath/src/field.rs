@@ -53,11 +53,20 @@ impl<'a> Field<'a> {
     }
 
     /// Height of the tip where the cutter mills the surface: it touches a face, or stands above the
-    /// surface. Elsewhere it would only roll around the surface's outline.
+    /// surface. Elsewhere it would only roll around the outline.
     pub(crate) fn tip(&self, at: [f64; 2]) -> Option<f64> {
+        self.contact(at).map(|(tip, _)| tip)
+    }
+
+    fn contact(&self, at: [f64; 2]) -> Option<(f64, bool)> {
         let contact = self.surface.drop_cutter(&self.cutter, at)?;
-        let mills = contact.on_face || self.surface.height_mm(at).is_some();
-        mills.then_some(contact.z_mm)
+        let mills = !contact.on_edge || self.surface.height_mm(at).is_some();
+        mills.then_some((contact.z_mm, contact.on_edge))
+    }
+
+    /// The height for a way and a place across, and whether the cutter is on an edge there.
+    pub(crate) fn contact_at(&self, s: f64, t: f64) -> Option<(f64, bool)> {
+        self.contact(self.place(s, t))
     }
 
     /// The same for a way and a place across.

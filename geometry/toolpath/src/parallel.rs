@@ -28,12 +28,13 @@ pub(crate) struct Passes {
 /// Heights of a pass at the stations.
 struct Line {
     across: f64,
-    tips: Vec<Option<f64>>,
+    /// Heights of the tip, and whether the cutter is on an edge there.
+    tips: Vec<Option<(f64, bool)>>,
 }
 
 impl Line {
     fn new(field: &Field<'_>, stations: &[f64], across: f64) -> Self {
-        let tips = stations.par_iter().map(|s| field.tip_at(*s, across));
+        let tips = stations.par_iter().map(|s| field.contact_at(*s, across));
         Self {
             across,
             tips: tips.collect(),
@@ -51,7 +52,14 @@ pub(crate) fn passes(
     let line = |across: f64| Line::new(field, &stations, across);
     let level = cusp::level_step_mm(&field.cutter, cusp_mm).max(1e-3);
     let widest = (WIDEST * 2.0 * field.cutter.radius_mm()).min(3.0 * level);
-    let least = level * STEEP * 0.5;
+    // On a slope it is the corner alone that leaves cusps, and flat ends leave steps.
+    let corner = level - 2.0 * field.cutter.disc_mm();
+    let cautious = if corner > 0.0 {
+        0.5 * corner
+    } else {
+        0.25 * level
+    };
+    let least = (corner * STEEP * 0.5).max(cusp_mm);
     let Some([first, last]) = limits(field, level, monitor)? else {
         return Ok(None);
     };
@@ -70,12 +78,20 @@ pub(crate) fn passes(
             let tally = tally(field, &stations, &here, &next, &amid);
             let reached = next.across - here.across;
             let is_last = next.across >= last;
-            // A step far too wide for steep places has no cusp to tell there.
-            let cusp = tally.highest;
+            // Where nothing can be told, as at the outline, the next pass is near enough anyhow.
+            let is_told = tally.all > 0 || reached <= cautious;
+            let cusp = if is_told {
+                tally.highest
+            } else {
+                f64::INFINITY
+            };
             let fits = cusp <= cusp_mm;
             if fits {
                 low = reached;
-                let done = cusp >= (1.0 - NEAR_ENOUGH) * cusp_mm || reached >= widest || is_last;
+                let done = cusp >= (1.0 - NEAR_ENOUGH) * cusp_mm
+                    || reached >= widest
+                    || is_last
+                    || tally.all == 0;
                 best = Some((next, tally));
                 if done {
                     break;
@@ -96,7 +112,8 @@ pub(crate) fn passes(
             } else {
                 2.0 * reached
             }
-            .clamp(least, widest);
+            .max(least)
+            .min(widest);
         }
         let (next, tally) = match best {
             Some(found) => found,
@@ -129,22 +146,29 @@ fn tally(field: &Field<'_>, stations: &[f64], a: &Line, b: &Line, amid: &Line) -
     let near = |line: &Line, k: usize| {
         let [before, tip, behind] =
             [k.checked_sub(1)?, k, k + 1].map(|k| line.tips.get(k).copied().flatten());
-        let (before, tip, behind) = (before?, tip?, behind?);
-        Some(Near {
+        let ((before, _), (tip, on_edge), (behind, _)) = (before?, tip?, behind?);
+        let near = Near {
             across: line.across,
             tip,
             slope: (behind - before) / (stations[k + 1] - stations[k - 1]),
-        })
+        };
+        Some((near, on_edge))
     };
     let of = |k: usize| {
         let mut tally = Tally::default();
-        let (Some(a), Some(b), Some(amid)) = (near(a, k), near(b, k), near(amid, k)) else {
+        let (Some((a, _)), Some((b, _))) = (near(a, k), near(b, k)) else {
+            return tally;
+        };
+        // Where it rolls around an edge, there is no surface to leave cusps on.
+        let Some((amid, false)) = near(amid, k) else {
             return tally;
         };
         tally.all = 1;
-        match cusp::height_mm(&field.cutter, a, b, amid) {
-            Some((cusp, nz)) if nz >= STEEP => tally.highest = cusp,
-            _ => tally.steep = 1,
+        let (cusp, nz) = cusp::height_mm(&field.cutter, a, b, amid);
+        if nz >= STEEP {
+            tally.highest = cusp;
+        } else {
+            tally.steep = 1;
         }
         tally
     };

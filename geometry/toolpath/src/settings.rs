@@ -66,12 +66,15 @@ impl Settings {
                 return Err(ToolpathError::Setting { name, value, must });
             }
         }
-        let corner = self.finish.corner_mm();
-        if corner > 0.0 && self.scallop_mm >= 0.5 * corner {
+        let corner = match self.finish.corner_mm() {
+            0.0 => self.finish.radius_mm(),
+            corner => corner,
+        };
+        if self.scallop_mm >= 0.5 * corner {
             return Err(ToolpathError::Setting {
                 name: "scallop_mm",
                 value: self.scallop_mm,
-                must: "less than half the radius of the finishing cutter's corner",
+                must: "less than half the radius of the finishing cutter, or of its corner",
             });
         }
         if self.pattern == Pattern::Scallop && self.finish.disc_mm() > 0.0 {

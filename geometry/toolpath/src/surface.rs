@@ -109,7 +109,7 @@ impl Surface {
     pub fn drop_cutter(&self, cutter: &Cutter, at_mm: [f64; 2]) -> Option<Contact> {
         let mut best = Contact {
             z_mm: f64::NEG_INFINITY,
-            on_face: false,
+            on_edge: false,
         };
         let mut waiting = [(0_u32, 0.0_f64); WAITING];
         let mut count = 0;
@@ -170,27 +170,40 @@ impl Branch {
 
 /// Gives every corner and every edge that a cutter can touch to one of its triangles.
 fn share_out(facets: &mut [Facet], indices: &[[usize; 3]], vertices: usize) {
-    let mut is_owned = vec![false; vertices];
     let mut sides: Vec<([usize; 2], usize, usize)> = Vec::with_capacity(3 * facets.len());
     for (facet, triangle) in indices.iter().enumerate() {
         for side in 0..3 {
             let (a, b) = (triangle[side], triangle[(side + 1) % 3]);
             sides.push(([a.min(b), a.max(b)], facet, side));
-            if !is_owned[a] {
-                is_owned[a] = true;
-                facets[facet].own_corner(side);
-            }
         }
     }
     sides.sort_unstable();
+    let mut is_sharp = vec![false; vertices];
     for shared in sides.chunk_by(|p, q| p.0 == q.0) {
-        if let [(_, a, i), (_, b, j)] = *shared
-            && Facet::is_valley((&facets[a], i), (&facets[b], j))
-        {
-            continue;
+        let (ends, facet, side) = shared[0];
+        let sharp = match *shared {
+            [(_, a, i), (_, b, j)] => {
+                if Facet::is_valley((&facets[a], i), (&facets[b], j)) {
+                    continue;
+                }
+                Facet::is_sharp(&facets[a], &facets[b])
+            }
+            // The outline, or more than two sheets.
+            _ => true,
+        };
+        facets[facet].own_edge(side, sharp);
+        for end in ends {
+            is_sharp[end] |= sharp;
         }
-        let (_, facet, side) = shared[0];
-        facets[facet].own_edge(side);
+    }
+    let mut is_owned = vec![false; vertices];
+    for (facet, triangle) in indices.iter().enumerate() {
+        for (corner, &vertex) in triangle.iter().enumerate() {
+            if !is_owned[vertex] {
+                is_owned[vertex] = true;
+                facets[facet].own_corner(corner, is_sharp[vertex]);
+            }
+        }
     }
 }
 
