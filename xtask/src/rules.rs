@@ -38,6 +38,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &["nurbs", "range-image", "reconstruct", "shapes"],
     ),
     ("compare", &["range-image"]),
+    ("toolpath", &["range-image"]),
     (
         "pipeline",
         &[
@@ -130,7 +131,7 @@ const DAEMON: [&str; 15] = [
     "storage",
 ];
 
-const COMMAND_LINE: [&str; 18] = [
+const COMMAND_LINE: [&str; 19] = [
     "cad-exchange",
     "compare",
     "deliverables",
@@ -149,6 +150,7 @@ const COMMAND_LINE: [&str; 18] = [
     "sim-scanner",
     "solids",
     "storage",
+    "toolpath",
 ];
 
 const EVERYTHING: [&str; 15] = [

@@ -7,13 +7,14 @@ use clap::{Parser, Subcommand};
 
 use crate::command::{
     abort, change, compare, convert, demo, doctor, fetch, jobs, laser, manual, rerun, resume, scan,
-    scans, status, token, watch, webhooks,
+    scans, status, token, toolpath, watch, webhooks,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
 ///
 /// `relief demo` shows the whole road with a simulated scanner; `relief convert` takes an
-/// existing scan file, and `relief compare` holds one against its nominal; `relief doctor` finds out why something does not work. The other
+/// existing scan file, `relief compare` holds one against its nominal, and `relief toolpath` mills a
+/// model; `relief doctor` finds out why something does not work. The other
 /// commands speak to the service, reliefd.
 #[derive(Debug, Parser)]
 #[command(name = "relief", version, max_term_width = 100)]
@@ -31,6 +32,7 @@ pub(crate) enum Command {
     Demo(demo::Args),
     Convert(convert::Args),
     Compare(compare::Args),
+    Toolpath(toolpath::Args),
     Scan(scan::Args),
     Abort(abort::Args),
     Resume(resume::Args),

@@ -126,6 +126,18 @@ pub enum ToolpathError {
         /// Its top.
         top_mm: f64,
     },
+    /// The simulation found a rapid move in material.
+    #[error(
+        "the simulation found a rapid move {depth_mm:.3} mm deep in material near x {:.2}, y {:.2} \
+         mm: rough first, or raise safe_z_mm",
+        at_mm[0], at_mm[1]
+    )]
+    RapidCut {
+        /// How deep.
+        depth_mm: f64,
+        /// Where.
+        at_mm: [f64; 2],
+    },
     /// The pattern is not for this cutter.
     #[error("constant-scallop passes are for ball cutters, not {0}: choose parallel passes")]
     NeedsBall(Cutter),

@@ -100,21 +100,18 @@ fn shapes() -> [(&'static str, Facets); 5] {
         ("across", graph(size, 4.0, |_, y| 0.6 * y)),
         ("along", graph(size, 4.0, |x, _| 0.6 * x)),
         ("askew", graph(size, 4.0, |x, y| 0.7 * x + 0.4 * y)),
-        ("dome", graph(size, 0.05, dome)),
+        ("dome", graph(size, 0.1, dome)),
     ]
 }
 
 #[test]
 fn cusps_of_parallel_passes_are_as_high_as_asked_for() {
     for (name, facets) in shapes() {
-        if std::env::var("DBG").is_ok() && name != "dome" {
-            continue;
-        }
         let surface = surface(&facets);
         for cutter in ["ball:6", "bull:6:1.5"] {
             let machine = machine(&surface, &[cutter]);
             let plan = planned(&surface, &machine, &settings(cutter, 0.02));
-            let (gouge, left, _) = simulated(&surface, &machine, &plan, 0.027);
+            let (gouge, left, _) = simulated(&surface, &machine, &plan, 0.037);
             // A bull-nose leaves nothing on what is level but between its corners.
             assert!(gouge < 4e-4, "{name} {cutter}: {gouge}");
             assert!((left / 0.02 - 1.0).abs() < 0.05, "{name} {cutter}: {left}");
@@ -132,7 +129,7 @@ fn cusps_of_constant_scallop_passes_are_all_as_high_as_asked_for() {
             ..settings("ball:6", 0.02)
         };
         let plan = planned(&surface, &machine, &settings);
-        let (gouge, left, _) = simulated(&surface, &machine, &plan, 0.027);
+        let (gouge, left, _) = simulated(&surface, &machine, &plan, 0.037);
         assert!(gouge < 4e-4, "{name}: {gouge}");
         assert!((left / 0.02 - 1.0).abs() < 0.05, "{name}: {left}");
     }
@@ -221,7 +218,6 @@ fn a_cylinder_is_milled_in_arcs() {
         "{arcs} of {}",
         operation.passes
     );
-    for m in operation.moves.iter().take(45) { println!("[{:?} {:?}", m.to_mm, m.travel); }
     let moves = operation.moves.len();
     assert!(
         moves < 12 * operation.passes,

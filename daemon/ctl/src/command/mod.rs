@@ -22,6 +22,7 @@ pub(crate) mod scans;
 mod setting;
 pub(crate) mod status;
 pub(crate) mod token;
+pub(crate) mod toolpath;
 pub(crate) mod watch;
 pub(crate) mod webhooks;
 
@@ -36,6 +37,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
     match invocation.command {
         Command::Demo(args) => block_on(demo::run(args, json)),
         Command::Compare(args) => block_on(compare::run(args, json)),
+        Command::Toolpath(args) => block_on(toolpath::run(args, json)),
         Command::Convert(args) => block_on(convert::run(args, json)),
         Command::Scan(args) => block_on(scan::run(args, json)),
         Command::Abort(args) => block_on(abort::run(args, json)),

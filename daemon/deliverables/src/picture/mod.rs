@@ -4,6 +4,7 @@ mod borders;
 mod canvas;
 mod deviations;
 mod inliers;
+mod machined;
 mod plot;
 mod range;
 mod regions;
@@ -74,6 +75,20 @@ pub fn write_deviations(
     sink: impl Write,
 ) -> std::io::Result<()> {
     encode(&deviations::draw(image, comparison, tolerance, name), sink)
+}
+
+/// Draws how far a machined surface lies above its model, which the image has in the place of
+/// heights, and writes it as PNG: blue where too much is gone, red where something is left.
+///
+/// # Errors
+/// What the sink reports.
+pub fn write_machined(
+    deviations: &RangeImage,
+    name: &str,
+    subtitle: &str,
+    sink: impl Write,
+) -> std::io::Result<()> {
+    encode(&machined::draw(deviations, name, subtitle), sink)
 }
 
 /// Draws the share of inliers among the samples around each node, ready to be written as

@@ -1,0 +1,9 @@
+//! `relief toolpath`.
+
+mod args;
+mod machine;
+mod run;
+mod summary;
+
+pub(crate) use args::Args;
+pub(crate) use run::run;
