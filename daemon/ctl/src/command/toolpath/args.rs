@@ -10,15 +10,15 @@ use crate::failure::Failure;
 
 /// Mill a model: NC code for a machine, without a service
 ///
-/// Reads a STEP file, or an STL file in millimetres, z towards the spindle, and leads the cutter over
-/// its faces: exact contact, nothing is cut too deep, and the cusps between passes are as high as
+/// Reads a STEP file, an IGES file as `convert` writes it, or an STL file in millimetres, z towards
+/// the spindle, and leads the cutter over its faces: exact contact, nothing is cut too deep, and the cusps between passes are as high as
 /// asked for. Roughing before, if a cutter for it is named. Travel, stock, fixtures, tools, feeds and
 /// the control's dialect come from the machine's file, in the model's coordinates but for the travel.
 /// The result is checked by a simulated removal of the stock.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The model: a STEP or STL file
-    #[arg(value_name = "MODEL.step|MODEL.stl")]
+    /// The model: a STEP, IGES or STL file
+    #[arg(value_name = "MODEL.step|MODEL.igs|MODEL.stl")]
     pub(super) model: PathBuf,
     /// The machine, what is clamped on it, and its tools; config/machine.toml shows every key
     #[arg(long, value_name = "M.toml")]

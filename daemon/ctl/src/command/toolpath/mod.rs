@@ -2,6 +2,7 @@
 
 mod args;
 mod machine;
+mod model;
 mod run;
 mod summary;
 

@@ -9,8 +9,7 @@ use range_image::{Lattice, Monitor, RangeImage};
 use serde::Serialize;
 use toolpath::{Header, HeightField, Machine, Plan, Surface, ToolpathError, Travel};
 
-use super::{Args, machine, summary};
-use crate::command::compare::nominal;
+use super::{Args, machine, model, summary};
 use crate::command::places;
 use crate::failure::Failure;
 use crate::output;
@@ -132,7 +131,7 @@ fn mill(args: &Args, shown: &Shown) -> Result<Planned, Failure> {
     args.picture.as_deref().map_or(Ok(()), places::check_file)?;
     let timestamp = args.timestamp()?;
     let machine = machine::read(&args.machine)?;
-    let (vertices, triangles) = nominal::triangles(&args.model, None, "a model to be milled")?;
+    let (vertices, triangles) = model::read(&args.model)?;
     let refused = |error: ToolpathError| match error {
         ToolpathError::Cancelled(_) => Failure::Interrupted,
         ToolpathError::Machine(error) => Failure::at(args.machine.display(), &error),
