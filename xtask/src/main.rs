@@ -9,6 +9,7 @@ mod rules;
 mod safety;
 mod shell;
 mod study;
+mod toolpath;
 mod units;
 mod vm;
 
@@ -36,6 +37,10 @@ enum Chore {
     ///
     /// Needs Python 3; installs the judge's packages into `target/judges`.
     Judge(judge::Options),
+    /// Let opencamlib judge our cutters and finishing paths, and be raced; LinuxCNC the NC code.
+    ///
+    /// Needs Python 3; installs the judge's packages into `target/judges/toolpath`.
+    JudgeToolpath(toolpath::Options),
     /// Repeat the experiments of Shim & Lee 1995 and write `docs/reproduction.md`.
     ///
     /// For the figures' pictures it needs Python 3, as `judge` does; `--check` and `--print`
@@ -77,6 +82,7 @@ fn main() -> anyhow::Result<()> {
     match Arguments::parse().chore {
         Chore::Rules => rules::check(),
         Chore::Judge(options) => judge::run(&options),
+        Chore::JudgeToolpath(options) => toolpath::run(&options),
         Chore::Reproduce(options) => reproduce::run(&options),
         Chore::Fuzz(options) => fuzz::run(&options),
         Chore::Study(study) => study::run(&study),
@@ -114,6 +120,10 @@ fn full() -> anyhow::Result<()> {
         gmsh: true,
         within_s: Some(SLOWEST_S),
         out: None,
+    })?;
+    toolpath::run(&toolpath::Options {
+        surfaces: 20,
+        linuxcnc: true,
     })?;
     vm::run(&vm::Vm::Usb(vm::Options::default()))?;
     fuzz::run(&fuzz::Options {
