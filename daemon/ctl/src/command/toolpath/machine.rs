@@ -197,8 +197,8 @@ mod tests {
         for (from, to, expected) in [
             ("safe_z_mm", "save_z_mm", "unknown field `save_z_mm`"),
             (
-                "\"linuxcnc\"",
-                "\"heidenhain\"",
+                "dialect = \"linuxcnc\"",
+                "dialect = \"heidenhain\"",
                 "unknown variant `heidenhain`",
             ),
             (
