@@ -212,24 +212,6 @@ fn the_report_of_a_comparison() {
         let free = told["report"]["alignment"]["free"].as_array().unwrap();
         assert_eq!(free.len(), freedoms, "{told:#}");
     }
-    let machine = include_str!("../../../config/machine.toml");
-    fs::write(at.join("m.toml"), machine).unwrap();
-    let options = [
-        "toolpath",
-        "part.stl",
-        "--json",
-        "--machine",
-        "m.toml",
-        "--tool",
-        "ball:6",
-        "--scallop-mm",
-        "0.3",
-        "--picture",
-        "p.png",
-    ];
-    let told = document(&relief(at, &options));
-    check("commands.schema.json#/$defs/toolpath", &told);
-    assert_eq!(told["operations"][0]["name"], "finishing", "{told:#}");
 }
 
 #[test]

@@ -77,6 +77,11 @@ fn a_relief_becomes_a_program_and_a_picture() {
     let (stdout, stderr) = told(&done);
     assert_eq!(done.status.code(), Some(0), "{stderr}");
     let document: Value = serde_json::from_str(&stdout).unwrap();
+    let published = include_str!("../../../docs/schema/commands.schema.json");
+    let published: Value = serde_json::from_str(published).unwrap();
+    let schema = jsonschema::validator_for(&published["$defs"]["toolpath"]).unwrap();
+    assert!(schema.is_valid(&document), "{stdout}");
+    assert!(!schema.is_valid(&serde_json::json!({"output": "x"})));
     let simulation = &document["simulation"];
     assert!(simulation["gouge_mm"].as_f64().unwrap() < 1e-3, "{stdout}");
     assert!(
