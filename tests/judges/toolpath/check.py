@@ -28,7 +28,9 @@ TIP_MM = 1e-5
 ASIDE_MM = 2e-4
 NOTHING = -1e6
 # Points of a path that are asked for, spread over all of it: opencamlib takes its time.
-MOST_POINTS = 1500
+MOST_POINTS = 1200
+# The same of the places; our time is taken for as many.
+MOST_PLACES = 300
 
 
 def surface(path):
@@ -87,6 +89,8 @@ def judge(folder):
     told = json.loads((folder / "told.json").read_text())
     facets = surface(folder / "surface.stl")
     tips = np.fromfile(folder / "tips.f64").reshape(-1, 3)
+    ours_s = told["drop_s"] * min(1.0, MOST_PLACES / len(tips))
+    tips = tips[:MOST_PLACES]
     tool = cutter(told)
     z, took = drop(facets, tool, tips[:, :2])
     theirs = z > NOTHING
@@ -111,8 +115,8 @@ def judge(folder):
         "above_um": 1e3 * above,
         "path_points": len(path),
         "ocl_s": took,
-        "ours_s": told["drop_s"],
-        "times": took / told["drop_s"],
+        "ours_s": ours_s,
+        "times": took / ours_s,
         "build_s": told["build_s"],
         "plan_s": told["plan_s"],
     }
@@ -124,13 +128,17 @@ def main():
     parser.add_argument("--check", action="store_true", help="fail where a bar is missed")
     parser.add_argument("--faster", type=float, default=5.0, help="how many times opencamlib")
     options = parser.parse_args()
-    rows = [judge(folder) for folder in sorted(options.folder.iterdir()) if folder.is_dir()]
-    names = list(rows[0])
-    print("| " + " | ".join(names) + " |")
-    print("|" + " --- |" * len(names))
-    for row in rows:
+    rows = []
+    for folder in sorted(options.folder.iterdir()):
+        if not folder.is_dir():
+            continue
+        row = judge(folder)
+        rows.append(row)
+        if len(rows) == 1:
+            print("| " + " | ".join(row) + " |")
+            print("|" + " --- |" * len(row))
         cells = [f"{v:.4g}" if isinstance(v, float) else str(v) for v in row.values()]
-        print("| " + " | ".join(cells) + " |")
+        print("| " + " | ".join(cells) + " |", flush=True)
     theirs, ours = sum(r["ocl_s"] for r in rows), sum(r["ours_s"] for r in rows)
     gouge = max(r["gouge_um"] for r in rows)
     tip = max(r["tip_999_um"] for r in rows)
