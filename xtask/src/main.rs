@@ -10,6 +10,7 @@ mod rules;
 mod safety;
 mod shell;
 mod study;
+mod toolpath;
 mod units;
 mod vm;
 
@@ -40,6 +41,10 @@ enum Chore {
     /// Hold a command against what other programs make of the same task.
     #[command(subcommand)]
     Peers(peers::Peers),
+    /// Let opencamlib judge our cutters and finishing paths, and be raced; LinuxCNC the NC code.
+    ///
+    /// Needs Python 3; installs the judge's packages into `target/judges/toolpath`.
+    JudgeToolpath(toolpath::Options),
     /// Repeat the experiments of Shim & Lee 1995 and write `docs/reproduction.md`.
     ///
     /// For the figures' pictures it needs Python 3, as `judge` does; `--check` and `--print`
@@ -82,6 +87,7 @@ fn main() -> anyhow::Result<()> {
         Chore::Rules => rules::check(),
         Chore::Judge(options) => judge::run(&options),
         Chore::Peers(peers) => peers::run(&peers),
+        Chore::JudgeToolpath(options) => toolpath::run(&options),
         Chore::Reproduce(options) => reproduce::run(&options),
         Chore::Fuzz(options) => fuzz::run(&options),
         Chore::Study(study) => study::run(&study),
@@ -121,6 +127,10 @@ fn full() -> anyhow::Result<()> {
         out: None,
     })?;
     peers::run(&peers::Peers::Skin(peers::Options { short: false }))?;
+    toolpath::run(&toolpath::Options {
+        surfaces: 20,
+        linuxcnc: true,
+    })?;
     vm::run(&vm::Vm::Usb(vm::Options::default()))?;
     fuzz::run(&fuzz::Options {
         seconds: 600,

@@ -40,6 +40,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("compare", &["range-image"]),
     ("skin", &["nurbs", "range-image"]),
     ("surfacing", &["nurbs", "range-image"]),
+    ("toolpath", &["range-image"]),
     (
         "pipeline",
         &[
@@ -136,7 +137,7 @@ const DAEMON: [&str; 15] = [
     "storage",
 ];
 
-const COMMAND_LINE: [&str; 20] = [
+const COMMAND_LINE: [&str; 21] = [
     "cad-exchange",
     "compare",
     "deliverables",
@@ -157,6 +158,7 @@ const COMMAND_LINE: [&str; 20] = [
     "solids",
     "storage",
     "surfacing",
+    "toolpath",
 ];
 
 const EVERYTHING: [&str; 15] = [

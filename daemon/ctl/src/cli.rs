@@ -7,15 +7,15 @@ use clap::{Parser, Subcommand};
 
 use crate::command::{
     abort, change, compare, convert, demo, doctor, fetch, jobs, laser, manual, rerun, resume, scan,
-    scans, skin, status, surface, token, watch, webhooks,
+    scans, skin, status, surface, token, toolpath, watch, webhooks,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
 ///
 /// `relief demo` shows the whole road with a simulated scanner; `relief convert` takes an
 /// existing scan file, `relief surface` makes one B-spline surface of it, and `relief compare` holds
-/// it against its nominal; `relief skin` makes a surface of cross-sections; `relief doctor` finds out
-/// why something does not work. The other
+/// it against its nominal; `relief skin` makes a surface of cross-sections, `relief toolpath` mills a
+/// model; `relief doctor` finds out why something does not work. The other
 /// commands speak to the service, reliefd.
 #[derive(Debug, Parser)]
 #[command(name = "relief", version, max_term_width = 100)]
@@ -35,6 +35,7 @@ pub(crate) enum Command {
     Compare(compare::Args),
     Skin(skin::Args),
     Surface(surface::Args),
+    Toolpath(toolpath::Args),
     Scan(scan::Args),
     Abort(abort::Args),
     Resume(resume::Args),

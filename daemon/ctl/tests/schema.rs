@@ -51,7 +51,7 @@ fn the_schemas_are_schemas() {
     for command in [
         "compare", "convert", "skin", "surface", "demo", "scan", "abort", "resume", "status",
         "scans", "jobs", "retry", "cancel", "rerun", "watch", "fetch", "doctor", "token", "laser",
-        "webhooks",
+        "toolpath", "webhooks",
     ] {
         let reference = format!("commands.schema.json#/$defs/{command}");
         assert!(

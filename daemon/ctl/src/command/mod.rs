@@ -26,6 +26,7 @@ pub(crate) mod status;
 pub(crate) mod surface;
 mod timestamp;
 pub(crate) mod token;
+pub(crate) mod toolpath;
 pub(crate) mod watch;
 pub(crate) mod webhooks;
 
@@ -40,6 +41,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
     match invocation.command {
         Command::Demo(args) => block_on(demo::run(args, json)),
         Command::Compare(args) => block_on(compare::run(args, json)),
+        Command::Toolpath(args) => block_on(toolpath::run(args, json)),
         Command::Convert(args) => block_on(convert::run(args, json)),
         Command::Skin(args) => block_on(skin::run(args, json)),
         Command::Scan(args) => block_on(scan::run(args, json)),

@@ -5,6 +5,7 @@ mod canvas;
 mod deviations;
 mod heights;
 mod inliers;
+mod machined;
 mod plot;
 mod range;
 mod regions;
@@ -137,6 +138,20 @@ pub fn round_step(step: f64) -> f64 {
     let power = libm::pow(10.0, libm::floor(libm::log10(step)));
     let mut steps = [1.0, 2.0, 5.0, 10.0].into_iter().map(|f| f * power);
     steps.find(|s| *s >= step * 0.999_999).unwrap_or(step)
+}
+
+/// Draws how far a machined surface lies above its model, which the image has in the place of
+/// heights, and writes it as PNG: blue where too much is gone, red where something is left.
+///
+/// # Errors
+/// What the sink reports.
+pub fn write_machined(
+    deviations: &RangeImage,
+    name: &str,
+    subtitle: &str,
+    sink: impl Write,
+) -> std::io::Result<()> {
+    encode(&machined::draw(deviations, name, subtitle), sink)
 }
 
 /// Draws the share of inliers among the samples around each node, ready to be written as

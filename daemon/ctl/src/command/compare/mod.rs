@@ -1,7 +1,7 @@
 //! `relief compare`.
 
 mod args;
-mod nominal;
+pub(crate) mod nominal;
 mod run;
 mod summary;
 

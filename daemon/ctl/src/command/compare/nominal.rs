@@ -1,4 +1,4 @@
-//! The nominal from its file.
+//! Triangles of a part from its file: the nominal of a comparison, or a model to be milled.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -24,9 +24,19 @@ const COARSER: f64 = 3.0;
 /// Longest file: twice as long as the longest text with the most facets.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// Reads a STEP file, which has its own unit, or an STL file, text or binary, whose lengths are of
-/// `unit_mm`, millimetres where that is not said.
+/// Reads the nominal from a STEP file, which has its own unit, or from an STL file, text or binary,
+/// whose lengths are of `unit_mm`, millimetres where that is not said.
 pub(super) fn read(path: &Path, unit_mm: Option<f64>) -> Result<Nominal, Failure> {
+    let name = path.display();
+    let (vertices, facets) = triangles(path, unit_mm, "a nominal")?;
+    Nominal::new(&vertices, &facets).map_err(|error| match error {
+        NominalError::Empty => Failure::Failed(format!("{name}: holds no facet")),
+        other => Failure::Failed(format!("{name}: {other}")),
+    })
+}
+
+/// Vertices, millimetres, and triangles of such a file; `role` is what it is read as, in messages.
+pub(crate) fn triangles(path: &Path, unit_mm: Option<f64>, role: &str) -> Result<Indexed, Failure> {
     let name = path.display().to_string();
     let failed = |why: &str| Failure::Failed(format!("{name}: {why}"));
     if path.is_dir() {
@@ -61,8 +71,8 @@ pub(super) fn read(path: &Path, unit_mm: Option<f64>) -> Result<Nominal, Failure
     }
     if let Some(format) = other_format(&head) {
         return Err(failed(&format!(
-            "is {format}, which is not read as a nominal; only STEP and STL are: export the model \
-             as STEP, or as STL with a chord error well below the tolerance"
+            "is {format}, which is not read as {role}; only STEP and STL are: export the model as \
+             STEP, or as STL with a chord error well below the tolerance"
         )));
     }
     let unit_mm = unit_mm.unwrap_or(1.0);
@@ -78,31 +88,32 @@ pub(super) fn read(path: &Path, unit_mm: Option<f64>) -> Result<Nominal, Failure
         let length = head.len();
         Reheaded::new(&mut source, head, length)
     };
-    let (vertices, facets) = facets(&mut solid, unit_mm).map_err(|why| failed(&why))?;
-    Nominal::new(&vertices, &facets).map_err(|error| match error {
-        NominalError::Empty => failed("holds no facet"),
-        other => failed(&other.to_string()),
-    })
+    facets(&mut solid, unit_mm).map_err(|why| failed(&why))
 }
 
 /// The faces of a STEP file.
-fn of_solids(source: &mut impl Read) -> Result<Nominal, String> {
+fn of_solids(source: &mut impl Read) -> Result<Indexed, String> {
     let body = step::read_body(source).map_err(|error| error.to_string())?;
+    of_body(&body)
+}
+
+/// Triangles of faces, as fine as their number allows.
+pub(crate) fn of_body(body: &solids::Body) -> Result<Indexed, String> {
     let mut tolerance_mm = CHORD_MM;
     let facets = loop {
         let settings = FacetSettings {
             tolerance_mm,
             most: FACETS_MAX,
         };
-        match solids::facets(&body, &settings) {
+        match solids::facets(body, &settings) {
             Err(solids::BodyError::TooMany { .. }) if tolerance_mm < COARSEST_MM => {
                 tolerance_mm = (COARSER * tolerance_mm).min(COARSEST_MM);
             }
             done => break done.map_err(|error| error.to_string())?,
         }
     };
-    let points: Vec<[f64; 3]> = facets.points_mm.iter().map(|p| [p.x, p.y, p.z]).collect();
-    Nominal::new(&points, &facets.triangles).map_err(|error| error.to_string())
+    let points = facets.points_mm.iter().map(|p| [p.x, p.y, p.z]).collect();
+    Ok((points, facets.triangles))
 }
 
 /// Whether the number of facets fits the file's length: some binary files begin with `solid`, too.
@@ -178,7 +189,8 @@ impl<R: Read + Seek> Seek for Reheaded<'_, R> {
     }
 }
 
-type Indexed = (Vec<[f64; 3]>, Vec<[usize; 3]>);
+/// Vertices, and triangles by their indices.
+pub(crate) type Indexed = (Vec<[f64; 3]>, Vec<[usize; 3]>);
 
 /// Vertices, each once, and facets as indices of them.
 fn facets(source: &mut (impl Read + Seek), unit_mm: f64) -> Result<Indexed, String> {

@@ -1,0 +1,10 @@
+//! `relief toolpath`.
+
+mod args;
+mod machine;
+mod model;
+mod run;
+mod summary;
+
+pub(crate) use args::Args;
+pub(crate) use run::run;

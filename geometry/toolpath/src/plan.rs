@@ -1,0 +1,231 @@
+//! The whole road from a surface to the moves of its tools.
+
+use range_image::Monitor;
+use rayon::prelude::*;
+
+use crate::check;
+use crate::error::ToolpathError;
+use crate::field::Field;
+use crate::link::Links;
+use crate::machine::Machine;
+use crate::motion::{Move, Operation};
+use crate::parallel::{self, Passes};
+use crate::quantize::quantized;
+use crate::rough::Rough;
+use crate::scallop;
+use crate::settings::{Pattern, Settings};
+use crate::strand::{Drawing, Strand, along};
+use crate::surface::Surface;
+use crate::trace::Fineness;
+
+/// Share of the cusps' height that may come from tips that are higher than they could be.
+const SHARE_OF_CUSP: f64 = 0.04;
+/// How far between samples the tip may be off their line: a fifth of a micrometre.
+const WOBBLE_MM: f64 = 2e-4;
+/// Samples beside a wall are this close.
+const LEAST_MM: f64 = 1e-4;
+/// Passes farther apart than this many steps are linked in the air.
+const LINKED_STEPS: f64 = 4.0;
+
+/// The moves of all tools, and what is worth knowing of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// In the order in which they are made: roughing, if any, and finishing.
+    pub operations: Vec<Operation>,
+    /// What is odd about them, in words.
+    pub notes: Vec<String>,
+}
+
+/// Plans the milling of a surface on a machine.
+///
+/// # Errors
+/// [`ToolpathError`]
+pub fn plan(
+    surface: &Surface,
+    machine: &Machine,
+    settings: &Settings,
+    monitor: &dyn Monitor,
+) -> Result<Plan, ToolpathError> {
+    machine.validate()?;
+    settings.validate()?;
+    check::before(surface, machine, settings)?;
+    let mut notes = Vec::new();
+    let mut operations = Vec::new();
+    if let Some(cutter) = settings.rough {
+        let part = Part::new(monitor, 0.0, 0.3);
+        let rough = Rough {
+            surface,
+            grown: cutter.grown(settings.allowance_mm),
+            allowance_mm: settings.allowance_mm,
+            step_down_mm: machine.tool(&cutter)?.step_down_mm,
+            step_over_mm: machine.tool(&cutter)?.step_over_mm,
+            top_mm: machine.stock.z_mm[1],
+            arcs: settings.arcs,
+        };
+        operations.push(roughing(machine, cutter, &rough, &part)?);
+    }
+    let from = if settings.rough.is_some() { 0.3 } else { 0.0 };
+    let part = Part::new(monitor, from, 1.0);
+    let (finish, steep_share) = finishing(surface, machine, settings, &part)?;
+    if steep_share > 0.0 {
+        notes.push(format!(
+            "{:.2} % of the passes' places are steeper than 75 degrees or at a wall: there passes \
+             lie farther apart than the scallop asks for",
+            100.0 * steep_share
+        ));
+    }
+    operations.push(finish);
+    for operation in &operations {
+        check::after(machine, operation)?;
+    }
+    monitor.progress(1.0);
+    Ok(Plan { operations, notes })
+}
+
+fn operation(
+    machine: &Machine,
+    cutter: crate::Cutter,
+    name: &str,
+    passes: usize,
+    moves: &[Move],
+) -> Result<Operation, ToolpathError> {
+    let tool = machine.tool(&cutter)?;
+    Ok(Operation {
+        name: name.to_owned(),
+        tool: tool.number,
+        cutter,
+        spindle_rpm: machine.spindle_rpm(tool),
+        coolant: machine.coolant,
+        moves: quantized(moves, machine.decimals),
+        passes,
+    })
+}
+
+fn roughing(
+    machine: &Machine,
+    cutter: crate::Cutter,
+    rough: &Rough<'_>,
+    monitor: &dyn Monitor,
+) -> Result<Operation, ToolpathError> {
+    let levels = rough.levels(monitor)?;
+    let feeds_mm_per_min = machine.feeds_mm_per_min(machine.tool(&cutter)?);
+    let mut moves = Vec::new();
+    let mut passes = 0;
+    for level in &levels {
+        monitor.check()?;
+        let tip = |at: [f64; 2]| rough.tip(at).map(|z| z.max(level.height_mm));
+        let links = Links {
+            safe_z_mm: machine.safe_z_mm,
+            feeds_mm_per_min,
+            most_mm: 1.5 * rough.step_over_mm,
+            drawing: rough.drawing(),
+            tip: &tip,
+        };
+        links.add(
+            &mut moves,
+            &level.strands,
+            level.above_mm,
+            Some(cutter.radius_mm()),
+        );
+        links.retract(&mut moves);
+        passes += level.strands.len();
+    }
+    operation(machine, cutter, "roughing", passes, &moves)
+}
+
+fn finishing(
+    surface: &Surface,
+    machine: &Machine,
+    settings: &Settings,
+    monitor: &dyn Monitor,
+) -> Result<(Operation, f64), ToolpathError> {
+    let cutter = settings.finish;
+    let field = Field::new(surface, cutter, settings.angle_deg);
+    // What the corridor adds to cusps is taken from them, half of it: it adds all or nothing.
+    let tolerance_mm = settings
+        .tolerance_mm
+        .min(SHARE_OF_CUSP * settings.scallop_mm);
+    let cusp_mm = settings.scallop_mm - tolerance_mm / 2.0;
+    let drawing = Drawing {
+        fineness: Fineness::of(cutter.corner_mm(), WOBBLE_MM, LEAST_MM),
+        tolerance_mm,
+        arcs: settings.arcs,
+    };
+    let ways = Part::new(monitor, 0.0, 0.6);
+    let Some((lines, steep_share)) = (match settings.pattern {
+        Pattern::Parallel => {
+            let found = parallel::passes(&field, cusp_mm, &ways)?;
+            found.map(
+                |Passes {
+                     across_mm,
+                     steep_share,
+                 }| {
+                    let [from, to] = field.s;
+                    let line = |t: &f64| vec![field.place(from, *t), field.place(to, *t)];
+                    (across_mm.iter().map(line).collect(), steep_share)
+                },
+            )
+        }
+        Pattern::Scallop => scallop::passes(&field, cusp_mm, &ways)?,
+    }) else {
+        return Err(ToolpathError::Nowhere(cutter));
+    };
+    let lines: Vec<Vec<[f64; 2]>> = lines;
+    let ways = Part::new(monitor, 0.6, 1.0);
+    let tip = |at: [f64; 2]| field.tip(at);
+    let drawn: Result<Vec<Vec<Strand>>, ToolpathError> = (0..lines.len())
+        .into_par_iter()
+        .map(|k| {
+            ways.check()?;
+            let mut line = lines[k].clone();
+            if k % 2 == 1 {
+                line.reverse();
+            }
+            Ok(along(&line, &drawing, &tip))
+        })
+        .collect();
+    let drawn = drawn?;
+    let passes = drawn.iter().filter(|strands| !strands.is_empty()).count();
+    let strands: Vec<Strand> = drawn.into_iter().flatten().collect();
+    if strands.is_empty() {
+        return Err(ToolpathError::Nowhere(cutter));
+    }
+    let touching = |at: [f64; 2]| surface.drop_cutter(&cutter, at).map(|contact| contact.z_mm);
+    let links = Links {
+        safe_z_mm: machine.safe_z_mm,
+        feeds_mm_per_min: machine.feeds_mm_per_min(machine.tool(&cutter)?),
+        most_mm: LINKED_STEPS * crate::cusp::level_step_mm(&cutter, cusp_mm).max(0.1),
+        drawing,
+        tip: &touching,
+    };
+    let mut moves = Vec::new();
+    links.add(&mut moves, &strands, machine.stock.z_mm[1], None);
+    links.retract(&mut moves);
+    let finish = operation(machine, cutter, "finishing", passes, &moves)?;
+    Ok((finish, steep_share))
+}
+
+/// A part of the whole, whose progress is a part of that of the whole.
+struct Part<'a> {
+    whole: &'a dyn Monitor,
+    from: f64,
+    to: f64,
+}
+
+impl<'a> Part<'a> {
+    fn new(whole: &'a dyn Monitor, from: f64, to: f64) -> Self {
+        Self { whole, from, to }
+    }
+}
+
+impl Monitor for Part<'_> {
+    fn is_cancelled(&self) -> bool {
+        self.whole.is_cancelled()
+    }
+
+    fn progress(&self, fraction: f64) {
+        let share = fraction.clamp(0.0, 1.0);
+        self.whole
+            .progress(self.from + share * (self.to - self.from));
+    }
+}

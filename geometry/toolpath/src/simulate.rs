@@ -1,0 +1,333 @@
+//! What the moves leave of the stock: a field of heights from which cutters take material.
+//!
+//! Nothing here knows how the moves were found. At each node the height that a move leaves is the
+//! least of `z(t) + h(rho(t))` over the way `t` of the tool, `h` being the cutter's profile and
+//! `rho` the distance from its axis: convex along a straight move, and found by the sign of its
+//! derivative. Arcs are taken as chords.
+
+use range_image::{Cancelled, Monitor};
+use rayon::prelude::*;
+
+use crate::cutter::Cutter;
+use crate::error::ToolpathError;
+use crate::machine::Cuboid;
+use crate::motion::{Operation, Travel};
+use crate::surface::Surface;
+
+/// Nodes at most.
+const MOST_NODES: usize = 16_000_000;
+/// How far chords may lie off arcs.
+const CHORD_MM: f64 = 5e-5;
+/// Rounds of halving for the way of a tool.
+const ROUNDS: usize = 40;
+/// Rapid moves that take more than this run into material.
+const RAPID_MM: f64 = 1e-3;
+/// Rows that a task looks after.
+const BAND: usize = 16;
+
+/// Heights over a grid, columns along x, rows along y. Millimetres.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeightField {
+    /// Place of the first node.
+    pub origin_mm: [f64; 2],
+    /// Distance of nodes.
+    pub pitch_mm: f64,
+    /// Along x.
+    pub columns: usize,
+    /// Along y.
+    pub rows: usize,
+    /// By rows.
+    pub heights_mm: Vec<f64>,
+}
+
+/// What was removed, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Removal {
+    /// What is left.
+    pub field: HeightField,
+    /// Deepest that a rapid move cut into material, and where; 0 where none did.
+    pub rapid_cut_mm: f64,
+    /// Where that was.
+    pub rapid_cut_at_mm: [f64; 2],
+}
+
+/// A straight move of a cutter.
+struct Stroke {
+    cutter: usize,
+    from: [f64; 3],
+    to: [f64; 3],
+    is_rapid: bool,
+}
+
+impl HeightField {
+    /// The top of a box, over the part of it that is within the given limits along x and y.
+    ///
+    /// # Errors
+    /// [`ToolpathError::TooMany`]
+    pub fn of_stock(
+        stock: &Cuboid,
+        within_mm: [[f64; 2]; 2],
+        pitch_mm: f64,
+    ) -> Result<Self, ToolpathError> {
+        let side = |[low, high]: [f64; 2]| ((high - low) / pitch_mm).floor().max(0.0) as usize + 1;
+        let (columns, rows) = (side(within_mm[0]), side(within_mm[1]));
+        let wanted = columns.saturating_mul(rows);
+        if wanted > MOST_NODES {
+            return Err(ToolpathError::TooMany {
+                what: "nodes of the simulation",
+                wanted,
+                most: MOST_NODES,
+                mend: "choose a larger pitch",
+            });
+        }
+        Ok(Self {
+            origin_mm: [within_mm[0][0], within_mm[1][0]],
+            pitch_mm,
+            columns,
+            rows,
+            heights_mm: vec![stock.z_mm[1]; wanted],
+        })
+    }
+
+    /// Place of a node.
+    #[must_use]
+    pub fn place_mm(&self, column: usize, row: usize) -> [f64; 2] {
+        [
+            self.origin_mm[0] + column as f64 * self.pitch_mm,
+            self.origin_mm[1] + row as f64 * self.pitch_mm,
+        ]
+    }
+
+    /// Takes away what the operations take, in their order.
+    ///
+    /// # Errors
+    /// [`Cancelled`]
+    pub fn remove(
+        mut self,
+        operations: &[Operation],
+        monitor: &dyn Monitor,
+    ) -> Result<Removal, Cancelled> {
+        let cutters: Vec<Cutter> = operations.iter().map(|o| o.cutter).collect();
+        let mut strokes = Vec::new();
+        for (cutter, operation) in operations.iter().enumerate() {
+            let mut from = operation
+                .moves
+                .first()
+                .map_or([0.0; 3], |first| first.to_mm);
+            for step in &operation.moves {
+                for to in step.points_mm(from, CHORD_MM) {
+                    strokes.push(Stroke {
+                        cutter,
+                        from,
+                        to,
+                        is_rapid: step.travel == Travel::Rapid,
+                    });
+                    from = to;
+                }
+            }
+        }
+        let (origin, pitch, columns) = (self.origin_mm, self.pitch_mm, self.columns);
+        let bands: Result<Vec<(f64, [f64; 2])>, Cancelled> = self
+            .heights_mm
+            .par_chunks_mut(BAND * columns.max(1))
+            .enumerate()
+            .map(|(band, heights)| {
+                monitor.check()?;
+                let mut band = Band {
+                    origin: [origin[0], origin[1] + (band * BAND) as f64 * pitch],
+                    pitch,
+                    columns,
+                    heights,
+                    worst: (0.0, [0.0; 2]),
+                };
+                for stroke in &strokes {
+                    if let Some(cutter) = cutters.get(stroke.cutter) {
+                        band.cut(cutter, stroke);
+                    }
+                }
+                Ok(band.worst)
+            })
+            .collect();
+        let worst = bands?
+            .into_iter()
+            .fold((0.0, [0.0; 2]), |a, b| if b.0 > a.0 { b } else { a });
+        Ok(Removal {
+            field: self,
+            rapid_cut_mm: worst.0,
+            rapid_cut_at_mm: worst.1,
+        })
+    }
+
+    /// How far each node lies above the surface below it, along that one's normal; `None` beside
+    /// the surface and at its walls.
+    #[must_use]
+    pub fn deviations_mm(&self, surface: &Surface) -> Vec<Option<f64>> {
+        let probe = self.pitch_mm / 50.0;
+        let of = |node: usize| {
+            let at = self.place_mm(node % self.columns, node / self.columns);
+            let here = surface.height_mm(at)?;
+            let slope = |axis: usize| {
+                let beside = |sign: f64| {
+                    let mut place = at;
+                    place[axis] += sign * probe;
+                    surface.height_mm(place)
+                };
+                let (low, high) = (beside(-1.0), beside(1.0));
+                // At the outline there is one side only.
+                match (low, high) {
+                    (Some(low), Some(high)) => Some((high - low) / (2.0 * probe)),
+                    (Some(low), None) => Some((here - low) / probe),
+                    (None, Some(high)) => Some((high - here) / probe),
+                    (None, None) => None,
+                }
+            };
+            let (gx, gy) = (slope(0)?, slope(1)?);
+            let nz = 1.0 / (1.0 + gx * gx + gy * gy).sqrt();
+            (nz > crate::parallel::STEEP).then(|| (self.heights_mm[node] - here) * nz)
+        };
+        (0..self.heights_mm.len()).into_par_iter().map(of).collect()
+    }
+}
+
+/// Some rows of the field.
+struct Band<'a> {
+    origin: [f64; 2],
+    pitch: f64,
+    columns: usize,
+    heights: &'a mut [f64],
+    worst: (f64, [f64; 2]),
+}
+
+impl Band<'_> {
+    fn cut(&mut self, cutter: &Cutter, stroke: &Stroke) {
+        let radius = cutter.radius_mm();
+        let (a, b) = (stroke.from, stroke.to);
+        let rows = self.heights.len() / self.columns.max(1);
+        let range = |axis: usize, count: usize| {
+            let low = a[axis].min(b[axis]) - radius - self.origin[axis];
+            let high = a[axis].max(b[axis]) + radius - self.origin[axis];
+            let from = (low / self.pitch).ceil().max(0.0) as usize;
+            let to = (high / self.pitch).floor();
+            let to = if to < 0.0 { 0 } else { to as usize + 1 };
+            from..to.min(count)
+        };
+        let rows = range(1, rows);
+        if rows.is_empty() {
+            return;
+        }
+        let columns = range(0, self.columns);
+        let way = Way::new(a, b);
+        for row in rows {
+            let y = self.origin[1] + row as f64 * self.pitch;
+            for column in columns.clone() {
+                let height = &mut self.heights[row * self.columns + column];
+                // Nothing of the cutter is lower than its tip.
+                if *height <= way.lowest {
+                    continue;
+                }
+                let x = self.origin[0] + column as f64 * self.pitch;
+                let Some(left) = way.leaves(cutter, [x, y], *height) else {
+                    continue;
+                };
+                if left < *height {
+                    let taken = *height - left;
+                    *height = left;
+                    if stroke.is_rapid && taken > RAPID_MM && taken > self.worst.0 {
+                        self.worst = (taken, [x, y]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A straight way as seen from above.
+struct Way {
+    from: [f64; 3],
+    along: [f64; 2],
+    length: f64,
+    slope: f64,
+    lowest: f64,
+}
+
+impl Way {
+    fn new(a: [f64; 3], b: [f64; 3]) -> Self {
+        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+        let length = (dx * dx + dy * dy).sqrt();
+        let lowest = a[2].min(b[2]);
+        if length < 1e-9 {
+            // Straight down or up: what its lowest place takes.
+            return Self {
+                from: [a[0], a[1], lowest],
+                along: [1.0, 0.0],
+                length: 0.0,
+                slope: 0.0,
+                lowest,
+            };
+        }
+        Self {
+            from: a,
+            along: [dx / length, dy / length],
+            length,
+            slope: (b[2] - a[2]) / length,
+            lowest,
+        }
+    }
+
+    /// The height that is left at a place; `None` out of reach, or where that is above `height`
+    /// anyhow.
+    fn leaves(&self, cutter: &Cutter, at: [f64; 2], height: f64) -> Option<f64> {
+        let (px, py) = (at[0] - self.from[0], at[1] - self.from[1]);
+        let foot = px * self.along[0] + py * self.along[1];
+        let aside = px * self.along[1] - py * self.along[0];
+        let aside = aside * aside;
+        let radius = cutter.radius_mm();
+        let reach = radius * radius - aside;
+        if reach < 0.0 {
+            return None;
+        }
+        let reach = reach.sqrt();
+        let (mut low, mut high) = ((foot - reach).max(0.0), (foot + reach).min(self.length));
+        if low > high {
+            return None;
+        }
+        let nearest = foot.clamp(low, high) - foot;
+        let least = cutter.profile((aside + nearest * nearest).sqrt());
+        if self.lowest + least >= height {
+            return None;
+        }
+        let value = |t: f64| {
+            let off = t - foot;
+            self.from[2] + self.slope * t + cutter.profile((aside + off * off).sqrt())
+        };
+        // The derivative of what is left, by way.
+        let falls = |t: f64| {
+            let off = t - foot;
+            let rho = (aside + off * off).sqrt();
+            let out = rho - cutter.disc_mm();
+            if out <= 0.0 {
+                return self.slope < 0.0;
+            }
+            let rise = ((cutter.corner_mm() - out) * (cutter.corner_mm() + out))
+                .max(0.0)
+                .sqrt();
+            // out / rise off / rho + slope < 0, without dividing by nothing.
+            out * off + self.slope * rho * rise < 0.0
+        };
+        if !falls(low) {
+            return Some(value(low));
+        }
+        if falls(high) {
+            return Some(value(high));
+        }
+        for _ in 0..ROUNDS {
+            let middle = f64::midpoint(low, high);
+            if falls(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Some(value(low).min(value(high)))
+    }
+}

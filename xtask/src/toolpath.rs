@@ -1,0 +1,75 @@
+//! Lets opencamlib and LinuxCNC judge cutters, paths and NC code.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::Args;
+
+use crate::{apt, shell};
+
+/// The judge's packages, pinned: another release may judge otherwise.
+const PACKAGES: [&str; 2] = ["opencamlib==2023.1.11", "numpy"];
+/// Seeds begin here; lower ones were looked at while the paths were made.
+const FIRST_SEED: &str = "101";
+/// Places at which either drops its cutter, for each surface.
+const PLACES: &str = "1000";
+
+#[derive(Debug, Args)]
+pub(crate) struct Options {
+    /// Surfaces, each with a cutter of its own.
+    #[arg(long, default_value_t = 4)]
+    pub(crate) surfaces: u32,
+    /// Also have LinuxCNC's interpreter read the NC code (Debian package `linuxcnc-uspace`).
+    #[arg(long)]
+    pub(crate) linuxcnc: bool,
+}
+
+/// Makes surfaces and paths, and has them judged.
+pub(crate) fn run(options: &Options) -> Result<()> {
+    let place = shell::root().join("target/judges/toolpath");
+    let python = python(&place)?;
+    let out = place.join("surfaces");
+    if out.exists() {
+        std::fs::remove_dir_all(&out).with_context(|| format!("cannot empty {}", out.display()))?;
+    }
+    let folder = out.display().to_string();
+    let surfaces = options.surfaces.to_string();
+    let program = ["--package", "toolpath", "--example", "judge_toolpath", "--"];
+    let words = [
+        &["run", "--quiet", "--release"],
+        &program[..],
+        &[&folder, FIRST_SEED, &surfaces, PLACES],
+    ];
+    shell::run("cargo", &words.concat())?;
+    let check = "tests/judges/toolpath/check.py";
+    shell::run(&python, &[check, &folder, "--check"])?;
+    if options.linuxcnc {
+        apt::need(&[("rs274", "linuxcnc-uspace")])?;
+        let check = "tests/judges/toolpath/rs274_check.py";
+        shell::run(&python, &[check, &folder])?;
+    }
+    Ok(())
+}
+
+/// A Python with the judge's packages, made once. Apart from that of the other judges: both pin
+/// what they need.
+fn python(place: &Path) -> Result<String> {
+    let home: PathBuf = place.join("python");
+    let python = home.join("bin/python").display().to_string();
+    let ready = home.join("ready");
+    let wanted = PACKAGES.join("\n");
+    if std::fs::read_to_string(&ready).is_ok_and(|had| had == wanted) {
+        return Ok(python);
+    }
+    shell::run("python3", &["-m", "venv", &home.display().to_string()])?;
+    let pip = [
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--disable-pip-version-check",
+    ];
+    shell::run(&python, &[&pip[..], &PACKAGES].concat())?;
+    std::fs::write(&ready, wanted).with_context(|| format!("cannot write {}", ready.display()))?;
+    Ok(python)
+}
