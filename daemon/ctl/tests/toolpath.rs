@@ -182,3 +182,50 @@ fn what_cannot_be_milled_is_told_in_one_line() {
         assert!(!at.join(model).with_extension("nc").exists(), "{model}");
     }
 }
+
+#[test]
+fn a_surface_of_a_scan_is_milled_as_it_was_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut scan = String::new();
+    for i in -24..=24 {
+        for j in -24..=24 {
+            let (x, y) = (0.5 * f64::from(i), 0.5 * f64::from(j));
+            scan.push_str(&format!("{x} {y} {}\n", hill(x, y)));
+        }
+    }
+    fs::write(at.join("hill.xyz"), scan).unwrap();
+    fs::write(at.join("m.toml"), MACHINE).unwrap();
+    let surface = [
+        "surface",
+        "hill.xyz",
+        "--tolerance-mm",
+        "0.01",
+        "-o",
+        "hill.igs",
+    ];
+    let made = relief(at, &surface);
+    assert!(made.status.success(), "{}", told(&made).1);
+    let options = [
+        "toolpath",
+        "hill.igs",
+        "--machine",
+        "m.toml",
+        "--tool",
+        "ball:6",
+    ];
+    let more = ["--scallop-mm", "0.05", "--json"];
+    let output = relief(at, &[&options[..], &more].concat());
+    assert!(output.status.success(), "{}", told(&output).1);
+    let planned: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let simulation = &planned["simulation"];
+    assert!(
+        simulation["gouge_mm"].as_f64().unwrap() < 0.001,
+        "{simulation}"
+    );
+    assert!(
+        simulation["nodes"].as_u64().unwrap() > 10_000,
+        "{simulation}"
+    );
+    assert!(at.join("hill.nc").exists());
+}

@@ -115,7 +115,7 @@ def sampled(surface, count):
     net = np.array(surface.ctrlpts).reshape(surface.ctrlpts_size_u, surface.ctrlpts_size_v, 3)
     at = [np.linspace(0, 1, n) for n in count]
     basis = [BSpline.design_matrix(t, k, 3).toarray() for t, k in zip(at, knots)]
-    return np.einsum("ai,bj,ijd->abd", basis[0], basis[1], net).reshape(-1, 3)
+    return np.einsum("ai,bj,ijd->abd", basis[0], basis[1], net, optimize=True).reshape(-1, 3)
 
 
 def by_geomdl(sections, closed, tolerance):

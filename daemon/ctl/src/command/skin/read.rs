@@ -56,7 +56,7 @@ fn kind(path: &Path) -> Result<Kind, Failure> {
     if head.len() > 72 && head[72] == b'S' {
         return Ok(Kind::Curves);
     }
-    if head.starts_with(b"ply") || head.iter().any(|byte| *byte == 0) {
+    if head.starts_with(b"ply") || head.contains(&0) {
         return Ok(Kind::Scan);
     }
     let mut text = String::new();

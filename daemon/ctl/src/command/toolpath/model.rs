@@ -16,7 +16,8 @@ use crate::failure::Failure;
 /// How exactly pieces of splines are joined where they are.
 const JOIN_MM: f64 = 1e-9;
 
-/// Reads a STEP or STL file, or an IGES file as `relief convert` writes it.
+/// Reads a STEP or STL file, or an IGES file as `relief convert`, `relief surface` or `relief skin`
+/// write it.
 pub(super) fn read(path: &Path) -> Result<Indexed, Failure> {
     let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
     if !path.is_file() || (ending != "igs" && ending != "iges") {
@@ -26,9 +27,25 @@ pub(super) fn read(path: &Path) -> Result<Indexed, Failure> {
     let file =
         File::open(path).map_err(|error| Failure::at(format!("cannot read {name}"), &error))?;
     let failed = |why: String| Failure::Failed(format!("{name}: {why}"));
-    let model =
-        iges::read_model(BufReader::new(file)).map_err(|error| failed(error.to_string()))?;
     let mut body = Body::default();
+    let model = match iges::read_model(BufReader::new(file)) {
+        Ok(model) => model,
+        // As `relief surface` and `relief skin` write them.
+        Err(iges::ReadError::Nothing { .. }) => {
+            let file = File::open(path)
+                .map_err(|error| Failure::at(format!("cannot read {name}"), &error))?;
+            let surfaces = iges::read_surfaces(BufReader::new(file))
+                .map_err(|error| failed(error.to_string()))?;
+            for (number, own) in (1..).zip(&surfaces) {
+                let label = format!("surface {number}");
+                add_whole(&mut body, &own.surface, &label).ok_or_else(|| {
+                    failed(format!("{label}: its control points cannot be made out"))
+                })?;
+            }
+            return nominal::of_body(&body).map_err(failed);
+        }
+        Err(error) => return Err(failed(error.to_string())),
+    };
     for (number, face) in (1..).zip(&model.faces) {
         let label = face
             .name
@@ -51,6 +68,47 @@ fn add(body: &mut Body, face: &TrimmedFace, name: &str) -> Option<()> {
         surface: surface(&face.surface)?,
         same_sense: true,
         loops,
+    });
+    Some(())
+}
+
+/// Adds a surface over its whole domain, between the curves of its four sides.
+fn add_whole(body: &mut Body, of: &BSplineSurface, name: &str) -> Option<()> {
+    let (columns, rows) = (of.u_knots().control_count(), of.v_knots().control_count());
+    let along_u = |j: usize| -> Option<BSplineCurve<3>> {
+        let points: Option<Vec<[f64; 3]>> = (0..columns).map(|i| of.point(i, j)).collect();
+        BSplineCurve::new(of.u_knots().clone(), points?).ok()
+    };
+    let along_v = |i: usize| -> Option<BSplineCurve<3>> {
+        let points: Option<Vec<[f64; 3]>> = (0..rows).map(|j| of.point(i, j)).collect();
+        BSplineCurve::new(of.v_knots().clone(), points?).ok()
+    };
+    // Counter-clockwise in the parameter plane.
+    let sides = [
+        along_u(0)?,
+        along_v(columns - 1)?,
+        along_u(rows - 1)?.reversed(),
+        along_v(0)?.reversed(),
+    ];
+    let first = body.vertices_mm.len();
+    let mut uses = Vec::new();
+    for (k, side) in sides.iter().enumerate() {
+        body.vertices_mm.push(Point::from(*side.points().first()?));
+        body.edges.push(Edge {
+            vertices: [first + k, first + (k + 1) % sides.len()],
+            curve: Curve::Spline(spline(side)?),
+            same_sense: true,
+        });
+        uses.push(EdgeUse {
+            edge: body.edges.len() - 1,
+            is_reversed: false,
+        });
+    }
+    body.faces.push(Face {
+        name: name.to_owned(),
+        surface: patches(of)?,
+        same_sense: true,
+        loops: vec![uses],
     });
     Some(())
 }

@@ -40,7 +40,7 @@ pub(super) fn told(planned: &Planned) -> String {
     let simulation = &planned.simulation;
     lines.push(format!(
         "simulation   deepest gouge {:.4} mm, largest leftover {:.4} mm, 95 % within {:.4} mm; {} \
-         nodes at {} mm",
+         nodes at {:.3} mm",
         simulation.gouge_mm,
         simulation.leftover_mm,
         simulation.leftover_95_mm,

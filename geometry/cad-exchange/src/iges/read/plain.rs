@@ -92,7 +92,7 @@ pub fn read_surfaces(source: impl Read) -> Result<Vec<PlainSurface>, ReadError> 
             let scaled = BSplineSurface::new(knots.0, knots.1, points.collect());
             surfaces.push(PlainSurface {
                 line: entity.directory,
-                surface: scaled.map_err(|e| file.defect(entity, &e.to_string()))?,
+                surface: scaled.map_err(|e| file.defect(entity, e.to_string()))?,
             });
         }
     }
