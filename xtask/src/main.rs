@@ -124,6 +124,7 @@ fn full() -> anyhow::Result<()> {
         freecad: true,
         gmsh: true,
         within_s: Some(SLOWEST_S),
+        no_recorded: false,
         out: None,
     })?;
     peers::run(&peers::Peers::Skin(peers::Options { short: false }))?;

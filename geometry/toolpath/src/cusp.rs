@@ -11,7 +11,7 @@ use crate::cutter::Cutter;
 use crate::edge::highest;
 
 /// Rounds of halving for where the cusp is.
-const ROUNDS: usize = 20;
+const ROUNDS: usize = 32;
 
 /// A pass near a place.
 #[derive(Debug, Clone, Copy)]

@@ -2,7 +2,7 @@
 //! else up, over and down again.
 
 use crate::motion::{Move, distance};
-use crate::strand::{Drawing, Strand, along};
+use crate::strand::{Drawing, Strand, along, feed_mm_per_min};
 
 /// Rapids end so far above material, millimetres.
 const APPROACH_MM: f64 = 1.0;
@@ -33,7 +33,6 @@ impl Links<'_> {
         top_mm: f64,
         ramp: Option<f64>,
     ) {
-        let [cut, _] = self.feeds_mm_per_min;
         let mut is_first = true;
         for strand in strands {
             let here = moves.last().map(|last| last.to_mm);
@@ -45,7 +44,7 @@ impl Links<'_> {
                 Some(link) => moves.extend(link),
                 None => self.enter(moves, strand, top_mm, ramp),
             }
-            moves.extend(strand.moves(cut));
+            moves.extend(strand.moves(self.feeds_mm_per_min));
             is_first = false;
         }
     }
@@ -65,7 +64,6 @@ impl Links<'_> {
         if apart > self.most_mm {
             return None;
         }
-        let [cut, _] = self.feeds_mm_per_min;
         let ends = [[from[0], from[1]], [to[0], to[1]]];
         let mut moves = Vec::new();
         let mut at = from;
@@ -84,13 +82,17 @@ impl Links<'_> {
                 return None;
             }
             if strand.start != from {
-                moves.push(Move::line(strand.start, cut));
+                let feed = feed_mm_per_min(from, strand.start, self.feeds_mm_per_min);
+                moves.push(Move::line(strand.start, feed));
             }
-            moves.extend(strand.moves(cut));
+            moves.extend(strand.moves(self.feeds_mm_per_min));
             at = end;
         }
         if at != to {
-            moves.push(Move::line(to, cut));
+            moves.push(Move::line(
+                to,
+                feed_mm_per_min(at, to, self.feeds_mm_per_min),
+            ));
         }
         Some(moves)
     }

@@ -243,8 +243,13 @@ impl Machine {
             Feed::PerTooth(load) => positive("chip_load_mm", load)?,
         }
         let [slowest, fastest] = self.spindle_rpm;
-        // A surface speed asks for what the spindle may not reach; a number of turns must be one
-        // that it can do.
+        // A surface speed may ask for more turns than the spindle reaches, but not for fewer than it
+        // can do: those would be too fast for the cutter. A number of turns must be one that it can.
+        if let Speed::Surface(speed) = tool.speed {
+            let must = format!("so much that {slowest} turns a minute are not too fast for it");
+            let is_slow = self.spindle_rpm(tool) < slowest;
+            check(&key("surface_m_per_min"), speed, !is_slow, &must)?;
+        }
         if let Speed::Rpm(rpm) = tool.speed {
             let must = format!("{slowest} to {fastest}, as the spindle can");
             check(
@@ -286,8 +291,9 @@ impl Machine {
                 1000.0 * m_per_min / round_mm
             }
         };
-        let [slowest, fastest] = self.spindle_rpm;
-        rpm.clamp(slowest, fastest).round()
+        // Slower than asked for harms no cutter.
+        let [_, fastest] = self.spindle_rpm;
+        rpm.min(fastest).round()
     }
 
     /// Feeds of a tool, millimetres per minute: along the surface, and downwards into material.

@@ -98,7 +98,8 @@ impl<W: Write> Post<'_, W> {
             // There O begins a subroutine.
             Dialect::LinuxCnc => self.comment(&format!("program {}", self.machine.program))?,
         }
-        self.comment(&header.title)?;
+        // Some controls act on comments that begin with certain words.
+        self.comment(&format!("model: {}", header.title))?;
         self.comment(&format!("{} {}", header.author, header.timestamp))?;
         for operation in operations {
             self.comment(&format!(
@@ -154,6 +155,14 @@ impl<W: Write> Post<'_, W> {
             Travel::Arc(arc) if arc.counter_clockwise => "G3",
             Travel::Arc(_) => "G2",
         };
+        let is_there = (0..3).all(|axis| {
+            let number = self.number(step.to_mm[axis]);
+            self.words.at[axis].as_deref() == Some(number.as_str())
+        });
+        // Nothing is said of a line that leads nowhere, and nothing of it is remembered.
+        if is_there && !matches!(step.travel, Travel::Arc(_)) {
+            return Ok(());
+        }
         if let Travel::Arc(arc) = &step.travel
             && self.words.plane.unwrap_or(Plane::Xy) != arc.plane
         {
@@ -164,7 +173,6 @@ impl<W: Write> Post<'_, W> {
             words.push(motion.to_owned());
             self.words.motion = Some(motion);
         }
-        let mut moved = false;
         let in_arc = |axis: usize| match &step.travel {
             Travel::Arc(arc) => arc.plane.axes().contains(&axis),
             _ => false,
@@ -175,15 +183,11 @@ impl<W: Write> Post<'_, W> {
             // Of an arc both coordinates are said: without them some controls go once around.
             if changed || in_arc(axis) {
                 words.push(format!("{letter}{number}"));
-                moved = true;
                 self.words.at[axis] = Some(number);
             }
         }
         if let Travel::Arc(arc) = &step.travel {
             words.extend(self.centre(arc, from));
-        }
-        if !moved {
-            return Ok(());
         }
         if step.travel != Travel::Rapid {
             let feed = decimal(step.feed_mm_per_min, 1, self.machine.dialect);

@@ -22,13 +22,27 @@ impl Strand {
         self.steps.last().map_or(self.start, |step| step.to)
     }
 
-    pub(crate) fn moves(&self, feed_mm_per_min: f64) -> impl Iterator<Item = Move> + '_ {
-        self.steps.iter().map(move |step| Move {
+    /// The moves, with feeds along the surface and downwards.
+    pub(crate) fn moves(&self, feeds_mm_per_min: [f64; 2]) -> impl Iterator<Item = Move> + '_ {
+        let from = std::iter::once(self.start).chain(self.steps.iter().map(|step| step.to));
+        from.zip(&self.steps).map(move |(from, step)| Move {
             travel: step.arc.map_or(Travel::Line, Travel::Arc),
             to_mm: step.to,
-            feed_mm_per_min,
+            feed_mm_per_min: feed_mm_per_min(from, step.to, feeds_mm_per_min),
         })
     }
+}
+
+/// The feed from one place to another: that along the surface, but so slow that what of it leads
+/// downwards is no faster than the one downwards.
+pub(crate) fn feed_mm_per_min(from: [f64; 3], to: [f64; 3], [cut, plunge]: [f64; 2]) -> f64 {
+    let drop = from[2] - to[2];
+    if drop <= 0.0 {
+        return cut;
+    }
+    let off = [0, 1, 2].map(|d| to[d] - from[d]);
+    let length = off.iter().map(|c| c * c).sum::<f64>().sqrt();
+    cut.min(plunge * length / drop)
 }
 
 /// How strands are drawn.

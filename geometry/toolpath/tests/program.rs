@@ -72,7 +72,7 @@ fn written(machine: &Machine, operations: &[Operation]) -> String {
 #[test]
 fn a_program_for_linuxcnc() {
     let code = written(&set_up(Dialect::LinuxCnc), &[tiny()]);
-    let expected = "%\n(program 12)\n(part  1  ?)\n(relief 2026-01-02)\n(T3 ball:6: finishing)\n\
+    let expected = "%\n(program 12)\n(model: part  1  ?)\n(relief 2026-01-02)\n(T3 ball:6: finishing)\n\
         G21 G90 G94 G17\nG40 G49 G80\nG64 P0.001\nG54\n(finishing)\nG53 G0 Z0\nG17\nT3 M6\n\
         S12000 M3\nG0 X0 Y0\nG43 H3 Z15\nM8\nZ1\nG1 Z0 F300\nG18 G3 X10 Z0 I5 K0 F1200\nG1 Y0.5\n\
         X-0.063\nG0 Z15\nM9\nM5\nG53 G0 Z0\nG17\nM30\n%\n";
@@ -82,7 +82,7 @@ fn a_program_for_linuxcnc() {
 #[test]
 fn a_program_for_fanuc() {
     let code = written(&set_up(Dialect::Fanuc), &[tiny()]);
-    let expected = "%\nO0012\n(PART  1  ?)\n(RELIEF 2026-01-02)\n(T3 BALL:6: FINISHING)\n\
+    let expected = "%\nO0012\n(MODEL: PART  1  ?)\n(RELIEF 2026-01-02)\n(T3 BALL:6: FINISHING)\n\
         G21 G90 G94 G17\nG40 G49 G80\nG54\n(FINISHING)\nG91 G28 Z0.\nG90 G17\nT3 M6\nS12000 M3\n\
         G0 X0. Y0.\nG43 H3 Z15.\nM8\nZ1.\nG1 Z0. F300.\nG18 G3 X10. Z0. I5. K0. F1200.\nG1 Y0.5\n\
         X-0.063\nG0 Z15.\nM9\nM5\nG91 G28 Z0.\nG90 G17\nM30\n%\n";
@@ -197,4 +197,90 @@ fn times_are_lengths_by_speeds_and_longer_with_acceleration() {
     let slow = duration(&machine, &tiny());
     assert!(slow.cutting_s > time.cutting_s && slow.cutting_s < 3.0 * time.cutting_s);
     assert_eq!(slow.cutting_mm, time.cutting_mm);
+}
+
+/// A line that leads nowhere is left out, and must not turn the next one into a rapid move.
+#[test]
+fn what_is_left_out_is_not_remembered() {
+    let mut operation = tiny();
+    operation.moves = vec![
+        Move::rapid([0.0, 0.0, 1.0]),
+        Move::line([0.0, 0.0, 1.000_001], 300.0),
+        Move::line([0.0, 0.0, -5.0], 300.0),
+    ];
+    let code = written(&set_up(Dialect::LinuxCnc), &[operation]);
+    assert!(code.contains("\nG1 Z-5 F300\n"), "{code}");
+}
+
+#[test]
+fn a_tool_changes_after_all_is_up_and_still_and_turns_before_it_cuts() {
+    let code = written(&set_up(Dialect::LinuxCnc), &[tiny(), tiny()]);
+    let second = code.rmatch_indices("(finishing)").next().unwrap().0;
+    let before = code[..second].rfind("G53 G0 Z0");
+    let order = ["G53 G0 Z0", "T3 M6", "S12000 M3", "G0 X0 Y0", "G43 H3 Z15"];
+    let after = &code[second..];
+    let places: Vec<usize> = order[1..]
+        .iter()
+        .map(|word| after.find(word).unwrap())
+        .collect();
+    assert!(places.is_sorted(), "{code}");
+    let is_up = before.is_some() || after.find(order[0]) < after.find(order[1]);
+    let stop = code[..second + places[0]].rfind("M5").unwrap();
+    assert!(is_up && stop > code.find("M3").unwrap(), "{code}");
+}
+
+#[test]
+fn downwards_no_cut_is_fed_faster_than_a_plunge() {
+    let step = surface(&graph(
+        [30.0, 20.0],
+        1.0,
+        |x, _| if x > 0.0 { 4.0 } else { 0.0 },
+    ));
+    let machine = machine(&step, &["ball:6"]);
+    let plan = plan(
+        &step,
+        &machine,
+        &Settings::finishing("ball:6".parse().unwrap()),
+        &Unmonitored,
+    );
+    let plan = plan.unwrap();
+    let [_, plunge] = machine.feeds_mm_per_min(&machine.tools[0]);
+    let mut downwards = 0;
+    for operation in &plan.operations {
+        for pair in operation.moves.windows(2) {
+            let off = [0, 1, 2].map(|d| pair[1].to_mm[d] - pair[0].to_mm[d]);
+            let length = (off[0] * off[0] + off[1] * off[1] + off[2] * off[2]).sqrt();
+            if off[2] < 0.0 && matches!(pair[1].travel, Travel::Line) {
+                let down = pair[1].feed_mm_per_min * -off[2] / length;
+                // Heights are rounded after feeds are found.
+                assert!(
+                    down <= 1.01 * plunge || -off[2] < 0.01,
+                    "{down} at {:?}",
+                    pair[1]
+                );
+                downwards += usize::from(-off[2] > 0.5 * length);
+            }
+        }
+    }
+    assert!(downwards > 5, "{downwards}");
+}
+
+#[test]
+fn a_cutter_that_would_turn_too_fast_is_refused() {
+    let level = surface(&graph([30.0, 20.0], 5.0, |_, _| 0.0));
+    let mut machine = machine(&level, &["ball:6"]);
+    machine.spindle_rpm = [5000.0, 24_000.0];
+    machine.tools[0].speed = toolpath::Speed::Surface(100.0);
+    assert_eq!(machine.validate(), Ok(()));
+    // 5305 turns a minute would be 100 m a minute; the spindle turns no slower than 12000.
+    machine.spindle_rpm = [12_000.0, 24_000.0];
+    let error = machine.validate().unwrap_err().to_string();
+    assert!(
+        error.contains("surface_m_per_min") && error.contains("12000"),
+        "{error}"
+    );
+    machine.spindle_rpm = [1000.0, 4000.0];
+    assert_eq!(machine.validate(), Ok(()));
+    let rpm = machine.spindle_rpm(&machine.tools[0]);
+    assert!(rpm <= 4000.0, "{rpm}");
 }

@@ -149,6 +149,9 @@ def main():
     missed = []
     if gouge > 1e3 * GOUGE_MM:
         missed.append(f"a gouge of {gouge:.3f} um")
+    lone = sum(result["one_sees_none"] for result in rows)
+    if lone > 0:
+        missed.append(f"{lone} places where only one of both finds a contact")
     if tip > 1e3 * TIP_MM:
         missed.append(f"tips differ by {tip:.4f} um")
     if theirs / ours < options.faster:

@@ -1,5 +1,6 @@
 //! The machine's file.
 
+use std::io::Read;
 use std::path::Path;
 
 use serde::Deserialize;
@@ -78,11 +79,23 @@ fn first_offset() -> u32 {
     54
 }
 
+/// Longest file that is read.
+const MOST_BYTES: u64 = 1 << 20;
+
 /// Reads and checks the machine's file.
 pub(super) fn read(path: &Path) -> Result<Machine, Failure> {
     let name = path.display().to_string();
-    let text = std::fs::read_to_string(path)
+    let file = std::fs::File::open(path)
         .map_err(|error| Failure::at(format!("cannot read {name}"), &error))?;
+    let mut text = String::new();
+    file.take(MOST_BYTES + 1)
+        .read_to_string(&mut text)
+        .map_err(|error| Failure::at(format!("cannot read {name}"), &error))?;
+    if text.len() as u64 > MOST_BYTES {
+        return Err(Failure::Failed(format!(
+            "{name}: is larger than 1 MiB, and no machine's file"
+        )));
+    }
     parse(&text).map_err(|why| Failure::Failed(format!("{name}: {why}")))
 }
 

@@ -10,7 +10,7 @@ use serde::Serialize;
 use toolpath::{Header, HeightField, Machine, Plan, Surface, ToolpathError, Travel};
 
 use super::{Args, machine, model, summary};
-use crate::command::places;
+use crate::command::{convert, places};
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
@@ -18,6 +18,9 @@ use crate::progress::Progress;
 /// Nodes along the longer side of the simulation, and the finest that it is.
 const NODES: f64 = 1000.0;
 const FINEST_MM: f64 = 0.02;
+
+/// A program that cuts deeper than this, millimetres, is not written.
+const MOST_GOUGE_MM: f64 = 0.01;
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -128,6 +131,16 @@ fn mill(args: &Args, shown: &Shown) -> Result<Planned, Failure> {
     let settings = args.settings()?;
     let output = args.output();
     places::check_file(&output)?;
+    for input in [&args.model, &args.machine] {
+        for written in std::iter::once(&output).chain(&args.picture) {
+            if convert::same_file(input, written) {
+                return Err(Failure::Usage(format!(
+                    "{} is read, and cannot be written as well; choose another name",
+                    input.display()
+                )));
+            }
+        }
+    }
     args.picture.as_deref().map_or(Ok(()), places::check_file)?;
     let timestamp = args.timestamp()?;
     let machine = machine::read(&args.machine)?;
@@ -145,6 +158,14 @@ fn mill(args: &Args, shown: &Shown) -> Result<Planned, Failure> {
     let field = simulated(&surface, &machine, &plan, pitch_mm, shown).map_err(refused)?;
     let deviations = field.deviations_mm(&surface);
     let simulation = measured(&field, &deviations);
+    if simulation.gouge_mm > MOST_GOUGE_MM {
+        return Err(Failure::Failed(format!(
+            "{}: the simulation cuts {:.4} mm too deep; nothing is written. Please report it with the \
+             model and the machine's file",
+            args.model.display(),
+            simulation.gouge_mm
+        )));
+    }
     if let Some(path) = &args.picture {
         let image = image(&field, &deviations);
         let (low, high) = (-simulation.gouge_mm, simulation.leftover_mm);
