@@ -97,7 +97,7 @@ fn a_relief_becomes_a_program_and_a_picture() {
     assert!(document["total_s"].as_f64().unwrap() > 60.0);
     let code = fs::read_to_string(at.join("hill.nc")).unwrap();
     assert!(
-        code.starts_with("%\n(program 1)\n(hill.stl)\n"),
+        code.starts_with("%\n(program 1)\n(model: hill.stl)\n"),
         "{}",
         &code[..80]
     );
