@@ -192,6 +192,13 @@ fn bad_sections_are_refused_in_one_line_and_nothing_is_written() {
     refused("", &[], &["a.txt"], 1);
     let output = relief(folder.path(), &["skin", "a.txt", "--tolerance-mm", "0"]);
     assert_eq!(output.status.code(), Some(2));
+    fs::write(folder.path().join("b.igs"), plain()).unwrap();
+    let onto = ["skin", "b.igs", "--tolerance-mm", "1"];
+    assert_eq!(relief(folder.path(), &onto).status.code(), Some(2));
+    assert_eq!(
+        fs::read_to_string(folder.path().join("b.igs")).unwrap(),
+        plain()
+    );
     let output = relief(folder.path(), &["skin", "none.txt", "--tolerance-mm", "1"]);
     assert!(stderr(&output).contains("none.txt"));
 }

@@ -75,7 +75,8 @@ pub(crate) fn skin(
         points_around: surface.u_knots().control_count(),
         rows: surface.v_knots().control_count(),
     };
-    finished(stack, surface, (&feet, before_mm), counts, monitor)
+    let asked = (tolerance_mm, monitor);
+    finished(stack, surface, (&feet, before_mm), counts, asked)
 }
 
 /// A curve with what its data points are off it.

@@ -183,7 +183,7 @@ fn solved(
 ) -> Option<Vec<[f64; 3]>> {
     let (functions, rows, degree) = (basis.functions(), across.control_count(), across.degree());
     let size = functions * rows;
-    let mut matrix = BandedMatrix::zero(size, (degree + 1) * functions - 1);
+    let mut matrix = BandedMatrix::zero(size, (degree.max(2) + 1) * functions - 1);
     let mut sums = vec![[0.0; 3]; size];
     let mut count = 0;
     let of_courses = stack.courses.iter().zip(&stack.heights);

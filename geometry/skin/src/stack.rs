@@ -277,8 +277,10 @@ fn same_along(before: &Loose, own: &Loose) -> Option<bool> {
     let (same, other) = (off(&mut b.iter()), off(&mut b.iter().rev()));
     if other < OTHER_WAY * same {
         Some(false)
+    } else if same < OTHER_WAY * other {
+        Some(true)
     } else {
-        (same < OTHER_WAY * other).then_some(true)
+        (cosine.abs() >= CLEAR).then_some(cosine > 0.0)
     }
 }
 
@@ -390,18 +392,17 @@ fn passed(
             axis
         };
         let up = times(up, if dot(up, between) < 0.0 { -1.0 } else { 1.0 });
-        let above: Vec<f64> = if is_closed {
-            let of_next = pair[1].points.iter();
-            of_next
-                .map(|place| dot(minus(*place, loose[k].center), up))
-                .collect()
-        } else {
-            let [a, b] = [0, 1].map(|side| samples(&pair[side].points, false, 0.0));
-            a.iter()
-                .zip(&b)
-                .map(|(a, b)| dot(minus(*b, *a), up))
-                .collect()
-        };
+        // Place by place from the common start, so that sections may be wavy as long as both are.
+        let [a, b] = [0, 1].map(|side| {
+            let course = &pair[side];
+            samples(
+                &course.points,
+                is_closed,
+                1.0 - course.at[0] * f64::from(is_closed),
+            )
+        });
+        let both = a.iter().zip(&b);
+        let above: Vec<f64> = both.map(|(a, b)| dot(minus(*b, *a), up)).collect();
         let usual = above.iter().map(|gap| gap.abs()).sum::<f64>() / above.len() as f64;
         let is_beyond = |sign: f64| above.iter().any(|gap| sign * gap > ACROSS * usual);
         if is_beyond(1.0) && is_beyond(-1.0) {

@@ -12,6 +12,9 @@ use crate::settings::Settings;
 use crate::spread::Net;
 use crate::stack::Stack;
 
+/// What rounding may add to a tolerance, as a part of it.
+const ROUNDING: f64 = 1e-9;
+
 /// Places around at which a surface is looked at for where it crosses itself.
 const AROUND: usize = 200;
 
@@ -117,7 +120,8 @@ pub(crate) fn skin(
         points_around: surface.u_knots().control_count(),
         rows: surface.v_knots().control_count(),
     };
-    finished(stack, surface, (&feet, Vec::new()), counts, monitor)
+    let asked = (settings.tolerance_mm, monitor);
+    finished(stack, surface, (&feet, Vec::new()), counts, asked)
 }
 
 /// Measures a surface and looks at it.
@@ -126,9 +130,18 @@ pub(crate) fn finished(
     surface: BSplineSurface,
     (feet, before_mm): (&[Vec<f64>], Vec<f64>),
     counts: Counts,
-    monitor: &dyn Monitor,
+    (tolerance_mm, monitor): (f64, &dyn Monitor),
 ) -> Result<Skin, SkinError> {
     let deviations = deviations(&surface, &stack, feet, monitor)?;
+    // Whatever was found on the way: the surface that is handed out holds the tolerance.
+    let is_held = |own: &&Deviation| own.off_mm <= tolerance_mm * (1.0 + ROUNDING);
+    if let Some(off) = deviations.iter().find(|own| !is_held(own)) {
+        return Err(SkinError::OutOfReach {
+            section: stack.courses[off.section].name.clone(),
+            reached_mm: off.off_mm,
+            tolerance_mm,
+        });
+    }
     let mut warnings = stack.warnings;
     if stack.is_closed {
         warnings.extend(crossing(&surface, &stack.heights));

@@ -233,3 +233,33 @@ fn open_sections_give_an_open_surface_from_whichever_end_they_come() {
     let [start, end] = [0.0, 1.0].map(|u| found.surface.evaluate(u, 0.5));
     assert!(start[0] > 90.0 && end[0] < -90.0, "{start:?} {end:?}");
 }
+
+#[test]
+fn every_degree_across_holds_the_tolerance_with_few_sections_and_many() {
+    for count in [2, 3, 7] {
+        for degree_across in 1..=5 {
+            for method in [Method::Relief, Method::Jo] {
+                let settings = Settings {
+                    method,
+                    degree_across,
+                    ..Settings::new(1.0)
+                };
+                let found = skinned(&vase(count), &settings).unwrap();
+                assert!(found.most_mm() <= 1.0, "{count} {degree_across} {method:?}");
+                let degree = found.surface.v_knots().degree();
+                assert_eq!(degree, degree_across.min(count - 1));
+            }
+        }
+    }
+}
+
+#[test]
+fn wavy_sections_above_each_other_do_not_cross() {
+    let mut sections = vase(6);
+    for section in &mut sections {
+        for [x, y, z] in &mut section.points {
+            *z = 0.1 * *z + 10.0 * libm::cos(2.0 * libm::atan2(*y, *x));
+        }
+    }
+    assert!(skinned(&sections, &Settings::new(1.0)).is_ok());
+}

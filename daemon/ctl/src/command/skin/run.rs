@@ -8,8 +8,8 @@ use serde::Serialize;
 use skin::{Method, Skin, SkinError};
 
 use super::{Args, read, summary};
-use crate::command::places;
 use crate::command::shown::{self, Shown};
+use crate::command::{convert, places};
 use crate::failure::Failure;
 use crate::output;
 
@@ -89,6 +89,14 @@ fn skin_file(args: &Args, shown: &Shown) -> Result<Skinned, Failure> {
     let settings = args.settings()?;
     let output = args.output()?;
     places::check_file(&output)?;
+    for written in std::iter::once(&output).chain(&args.report) {
+        if convert::same_file(written, &args.input) {
+            return Err(Failure::Usage(format!(
+                "{} is read, and cannot be written as well; choose another name with -o",
+                written.display()
+            )));
+        }
+    }
     args.report.as_deref().map_or(Ok(()), places::check_file)?;
     let timestamp = args.timestamp()?;
     let read = read::read(args, shown)?;
