@@ -7,6 +7,7 @@ pub(crate) mod convert;
 pub(crate) mod demo;
 pub(crate) mod doctor;
 pub(crate) mod fetch;
+mod grid;
 pub(crate) mod jobs;
 pub(crate) mod laser;
 pub(crate) mod manual;
@@ -27,6 +28,7 @@ pub(crate) mod surface;
 mod timestamp;
 pub(crate) mod token;
 pub(crate) mod toolpath;
+mod units;
 pub(crate) mod watch;
 pub(crate) mod webhooks;
 

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 use compare::{Alignment, CompareSettings, Tolerance};
-use regrid::RegridSettings;
 use scan_files::Units;
 
-use crate::command::part::{Limits, limits};
+use crate::command::grid::GridArgs;
+use crate::command::units::UnitName;
 use crate::failure::Failure;
 
 /// Hold a scan against its nominal, without a service
@@ -68,9 +68,6 @@ pub(crate) struct Args {
     /// Draw a map of the deviations with a histogram, too
     #[arg(long, value_name = "FILE.png")]
     pub(super) map: Option<PathBuf>,
-    /// Distance of the grid's nodes, millimetres; default: after the scan's density
-    #[arg(long, value_name = "MM")]
-    pub(super) pitch_mm: Option<f64>,
     /// Unit of the coordinates in the scan file; default: millimetres, or what the file says
     #[arg(long, value_name = "UNIT", value_enum)]
     units: Option<UnitName>,
@@ -78,22 +75,8 @@ pub(crate) struct Args {
     /// millimetres
     #[arg(long, value_name = "UNIT", value_enum)]
     nominal_units: Option<UnitName>,
-    /// Ignore samples with x outside of these limits, millimetres; one may be left out, as
-    /// in `-50,`
-    #[arg(long, value_name = "MIN,MAX", value_parser = limits, allow_hyphen_values = true)]
-    roi_x_mm: Option<Limits>,
-    /// The same for y (up)
-    #[arg(long, value_name = "MIN,MAX", value_parser = limits, allow_hyphen_values = true)]
-    roi_y_mm: Option<Limits>,
-    /// The same for z (towards the camera)
-    #[arg(long, value_name = "MIN,MAX", value_parser = limits, allow_hyphen_values = true)]
-    roi_z_mm: Option<Limits>,
-    /// Seed of every random draw
-    #[arg(long, value_name = "N")]
-    seed: Option<u64>,
-    /// Threads to use; 0 for all processors. The result does not depend on it
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    threads: usize,
+    #[command(flatten)]
+    pub(super) grid: GridArgs,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -102,29 +85,14 @@ enum AlignName {
     AsPlaced,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum UnitName {
-    Mm,
-    M,
-    Inch,
-}
-
 impl Args {
     pub(super) fn units(&self) -> Option<Units> {
-        self.units.map(|units| match units {
-            UnitName::Mm => Units::Millimetre,
-            UnitName::M => Units::Metre,
-            UnitName::Inch => Units::Inch,
-        })
+        self.units.map(UnitName::units)
     }
 
     /// Millimetres in a unit of the nominal's file, where that is said.
     pub(super) fn nominal_unit_mm(&self) -> Option<f64> {
-        self.nominal_units.map(|units| match units {
-            UnitName::Mm => 1.0,
-            UnitName::M => 1000.0,
-            UnitName::Inch => 25.4,
-        })
+        self.nominal_units.map(|name| name.units().in_mm())
     }
 
     /// How the scan is compared.
@@ -149,30 +117,6 @@ impl Args {
             false_alarm: self.false_alarm,
             ..CompareSettings::default()
         };
-        settings
-            .validate()
-            .map_err(|error| Failure::Usage(error.to_string()))?;
-        Ok(settings)
-    }
-
-    /// How the scan is regridded: as it would be for `convert`, but for what the user says.
-    pub(super) fn regrid(&self, mut settings: RegridSettings) -> Result<RegridSettings, Failure> {
-        if let Some(pitch_mm) = self.pitch_mm {
-            settings.pitch_mm = pitch_mm;
-        }
-        if let Some(seed) = self.seed {
-            settings.seed = seed;
-        }
-        for (place, given) in [
-            (&mut settings.roi.x_mm, self.roi_x_mm),
-            (&mut settings.roi.y_mm, self.roi_y_mm),
-            (&mut settings.roi.z_mm, self.roi_z_mm),
-        ] {
-            if let Some(limits) = given {
-                *place = limits.mm();
-            }
-        }
-        settings.threads = self.threads;
         settings
             .validate()
             .map_err(|error| Failure::Usage(error.to_string()))?;

@@ -5,16 +5,14 @@ use std::path::{Path, PathBuf};
 use compare::{CompareError, Nominal};
 use deliverables::{ComparisonReport, write_atomically};
 use jiff::Timestamp;
-use pipeline::Extent;
 use range_image::Column;
-use regrid::{RegridError, Roi};
+use regrid::Roi;
 use serde::Serialize;
 
 use super::{Args, nominal, summary};
 use crate::command::shown::{self, Shown};
-use crate::command::{pages, places};
+use crate::command::{grid, pages, places};
 use crate::failure::Failure;
-use crate::input;
 use crate::output;
 
 /// What `--json` prints.
@@ -48,30 +46,9 @@ fn compare_files(args: &Args, shown: &Shown) -> Result<Compared, Failure> {
     pages::check(&args.page)?;
     // The nominal first: it is the quicker one to be refused.
     let nominal = nominal::read(&args.nominal, args.nominal_unit_mm())?;
-    let input = input::read(&args.scan, args.units())?;
-    let scan_file = args.scan.display();
-    if let Some(why) = pipeline::no_surface(&input.columns, input.column_pitch_mm) {
-        return Err(Failure::Failed(format!("{scan_file}: {why}")));
-    }
-    let regrid = args.regrid(input.settings().regrid)?;
-    if let Some(extent) = Extent::within(&input.columns, &regrid.roi)
-        && regrid.pitch_mm < extent.finest_pitch_mm()
-    {
-        return Err(Failure::Failed(format!(
-            "{scan_file}: a grid of {} mm is too fine for its size and number of samples; leave \
-             out single points far away with --roi-x-mm and --roi-y-mm, else choose --pitch-mm {}",
-            regrid.pitch_mm,
-            extent.finest_pitch_mm()
-        )));
-    }
-    shown.begin("regrid");
-    let image =
-        regrid::regrid(input.columns.iter().cloned(), &regrid, shown).map_err(
-            |error| match error {
-                RegridError::Cancelled(_) => Failure::Interrupted,
-                other => Failure::at(&scan_file, &other),
-            },
-        )?;
+    let input = grid::scan(&args.scan, args.units())?;
+    let regrid = args.grid.apply(input.settings().regrid)?;
+    let image = grid::image(&input, &regrid, &args.scan, shown)?;
     shown.begin("compare");
     let columns = cropped(&input.columns, &regrid.roi);
     let compared = regrid::with_threads(regrid.threads, || {

@@ -12,6 +12,7 @@ use scan_files::Units;
 
 use crate::command::part::PartArgs;
 use crate::command::regularize::RegularizeArgs;
+use crate::command::units::UnitName;
 use crate::failure::Failure;
 
 /// Turn a scan file into a CAD file or triangles, without a service
@@ -145,13 +146,6 @@ enum EntityType {
     Analytic,
     #[value(name = "186")]
     Boundary,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum UnitName {
-    Mm,
-    M,
-    Inch,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -330,11 +324,7 @@ impl Args {
     }
 
     pub(super) fn units(&self) -> Option<Units> {
-        self.units.map(|units| match units {
-            UnitName::Mm => Units::Millimetre,
-            UnitName::M => Units::Metre,
-            UnitName::Inch => Units::Inch,
-        })
+        self.units.map(UnitName::units)
     }
 
     /// The settings of a scan with what the user says differently.

@@ -7,6 +7,8 @@ use jiff::Timestamp;
 use scan_files::Units;
 use skin::{Method, Settings};
 
+use crate::command::grid::GridArgs;
+use crate::command::units::UnitName;
 use crate::failure::Failure;
 
 /// Skin stacked cross-sections with a B-spline surface, without a service
@@ -41,9 +43,6 @@ pub(crate) struct Args {
     /// Cut a scan every so many millimetres; default: at each row of its grid
     #[arg(long, value_name = "MM")]
     pub(super) every_mm: Option<f64>,
-    /// Distance of the grid's nodes of a scan, millimetres; default: after its density
-    #[arg(long, value_name = "MM")]
-    pub(super) pitch_mm: Option<f64>,
     /// Unit of the coordinates in a text or scan file; default: millimetres, or what the file says
     #[arg(long, value_name = "UNIT", value_enum)]
     units: Option<UnitName>,
@@ -56,9 +55,8 @@ pub(crate) struct Args {
     /// Time to be written into the file; default: SOURCE_DATE_EPOCH, or when the input was changed
     #[arg(long, value_name = "TIME")]
     timestamp: Option<Timestamp>,
-    /// Threads to use; 0 for all processors. The result does not depend on it
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(super) threads: usize,
+    #[command(flatten)]
+    pub(super) grid: GridArgs,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -67,27 +65,15 @@ enum MethodName {
     Jo,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum UnitName {
-    Mm,
-    M,
-    Inch,
-}
-
 impl Args {
     pub(super) fn units(&self) -> Option<Units> {
-        self.units.map(|units| match units {
-            UnitName::Mm => Units::Millimetre,
-            UnitName::M => Units::Metre,
-            UnitName::Inch => Units::Inch,
-        })
+        self.units.map(UnitName::units)
     }
 
     pub(super) fn settings(&self) -> Result<Settings, Failure> {
         for (flag, length_mm) in [
             ("tolerance", Some(self.tolerance_mm)),
             ("every", self.every_mm),
-            ("pitch", self.pitch_mm),
         ] {
             if let Some(length_mm) = length_mm.filter(|own| !(own.is_finite() && *own > 0.0)) {
                 return Err(Failure::Usage(format!(

@@ -8,9 +8,9 @@ use scan_files::{RawSection, Unpacked};
 use skin::Section;
 
 use super::Args;
+use crate::command::grid;
 use crate::command::shown::Shown;
 use crate::failure::Failure;
-use crate::input;
 
 /// Sections, and what is to be said of where they come from.
 pub(super) struct Sections {
@@ -138,25 +138,9 @@ fn blocks(args: &Args) -> Result<Sections, Failure> {
 }
 
 fn cut(args: &Args, shown: &Shown) -> Result<Sections, Failure> {
-    let input = input::read(&args.input, args.units())?;
-    let name = args.input.display();
-    if let Some(why) = pipeline::no_surface(&input.columns, input.column_pitch_mm) {
-        return Err(Failure::Failed(format!("{name}: {why}")));
-    }
-    let mut settings = input.settings().regrid;
-    if let Some(pitch_mm) = args.pitch_mm {
-        settings.pitch_mm = pitch_mm;
-    }
-    settings.threads = args.threads;
-    settings
-        .validate()
-        .map_err(|error| Failure::Usage(error.to_string()))?;
-    shown.begin("regrid");
-    let image = regrid::regrid(input.columns.iter().cloned(), &settings, shown);
-    let image = image.map_err(|error| match error {
-        regrid::RegridError::Cancelled(_) => Failure::Interrupted,
-        other => Failure::at(&name, &other),
-    })?;
+    let input = grid::scan(&args.input, args.units())?;
+    let settings = args.grid.apply(input.settings().regrid)?;
+    let image = grid::image(&input, &settings, &args.input, shown)?;
     let every_mm = args.every_mm.unwrap_or(settings.pitch_mm);
     let every = (every_mm / settings.pitch_mm).round().max(1.0) as usize;
     let cut = skin::cut(&image, every);

@@ -101,7 +101,7 @@ fn skin_file(args: &Args, shown: &Shown) -> Result<Skinned, Failure> {
     let timestamp = args.timestamp()?;
     let read = read::read(args, shown)?;
     shown.begin("skin");
-    let found = regrid::with_threads(args.threads, || {
+    let found = regrid::with_threads(args.grid.threads, || {
         skin::skin(&read.sections, &settings, shown)
     })
     .map_err(|error| Failure::at("cannot skin", &error))?;

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use jiff::Timestamp;
-use regrid::RegridSettings;
 use scan_files::Units;
 use surfacing::{JumpThresholds, Placement, Settings, SurfaceError};
 
 use crate::command::convert::{input_stem, same_file};
-use crate::command::part::{Limits, limits};
+use crate::command::grid::GridArgs;
+use crate::command::units::UnitName;
 use crate::failure::Failure;
 
 /// Make one B-spline surface of a scan, without a service
@@ -19,7 +19,8 @@ use crate::failure::Failure;
 /// (uniform), at the vertices of the reference sections' polylines (polyline), or where derivatives
 /// of these sections break (derivative); the latter two do not promise the tolerance, and it is said
 /// when they exceed it. Where z jumps along a line of the grid, the surface comes in pieces; where
-/// the slope does, pieces meet on that line.
+/// the slope does, pieces meet on that line; so it is with optimal knots. Samples that lie on a uniform
+/// grid already are taken as they are, unless --pitch-mm or a --roi is given.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The scan file
@@ -50,29 +51,11 @@ pub(crate) struct Args {
     /// directory, too
     #[arg(long, value_name = "DIR")]
     pub(super) pictures: Option<PathBuf>,
-    /// Distance of the grid's nodes, millimetres; default: after the scan's density. Samples that
-    /// lie on a uniform grid already are taken as they are unless this, or a --roi, is given
-    #[arg(long, value_name = "MM")]
-    pub(super) pitch_mm: Option<f64>,
     /// Unit of the coordinates in the file; default: millimetres, or what the file says
     #[arg(long, value_name = "UNIT", value_enum)]
     units: Option<UnitName>,
-    /// Ignore samples with x outside of these limits, millimetres; one may be left out, as
-    /// in `-50,`
-    #[arg(long, value_name = "MIN,MAX", value_parser = limits, allow_hyphen_values = true)]
-    roi_x_mm: Option<Limits>,
-    /// The same for y (up)
-    #[arg(long, value_name = "MIN,MAX", value_parser = limits, allow_hyphen_values = true)]
-    roi_y_mm: Option<Limits>,
-    /// The same for z (towards the camera)
-    #[arg(long, value_name = "MIN,MAX", value_parser = limits, allow_hyphen_values = true)]
-    roi_z_mm: Option<Limits>,
-    /// Seed of every random draw
-    #[arg(long, value_name = "N")]
-    seed: Option<u64>,
-    /// Threads to use; 0 for all processors. The result does not depend on it
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    threads: usize,
+    #[command(flatten)]
+    pub(super) grid: GridArgs,
     /// Name of the surface in the file; default: that kept with the scan, or the scan's name
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
@@ -91,13 +74,6 @@ enum KnotsName {
     Polyline,
     Derivative,
     Optimal,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum UnitName {
-    Mm,
-    M,
-    Inch,
 }
 
 impl Args {
@@ -141,11 +117,7 @@ impl Args {
     }
 
     pub(super) fn units(&self) -> Option<Units> {
-        self.units.map(|units| match units {
-            UnitName::Mm => Units::Millimetre,
-            UnitName::M => Units::Metre,
-            UnitName::Inch => Units::Inch,
-        })
+        self.units.map(UnitName::units)
     }
 
     /// How the surface is made.
@@ -176,36 +148,6 @@ impl Args {
             Failure::Usage(format!("{option}: {error}"))
         })?;
         Ok(settings)
-    }
-
-    /// How the scan is regridded: as it would be for `convert`, but for what the user says.
-    pub(super) fn regrid(&self, mut settings: RegridSettings) -> Result<RegridSettings, Failure> {
-        if let Some(pitch_mm) = self.pitch_mm {
-            settings.pitch_mm = pitch_mm;
-        }
-        if let Some(seed) = self.seed {
-            settings.seed = seed;
-        }
-        for (place, given) in [
-            (&mut settings.roi.x_mm, self.roi_x_mm),
-            (&mut settings.roi.y_mm, self.roi_y_mm),
-            (&mut settings.roi.z_mm, self.roi_z_mm),
-        ] {
-            if let Some(limits) = given {
-                *place = limits.mm();
-            }
-        }
-        settings.threads = self.threads;
-        settings
-            .validate()
-            .map_err(|error| Failure::Usage(error.to_string()))?;
-        Ok(settings)
-    }
-
-    /// Whether samples are to be brought onto another grid even if they lie on one already.
-    pub(super) fn asks_for_a_grid(&self) -> bool {
-        let limits = [self.roi_x_mm, self.roi_y_mm, self.roi_z_mm];
-        self.pitch_mm.is_some() || limits.iter().any(Option::is_some)
     }
 
     /// The scan's file, for titles.

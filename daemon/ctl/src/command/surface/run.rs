@@ -4,17 +4,14 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use deliverables::{ManifestFile, write_atomically};
-use pipeline::Extent;
-use regrid::{RegridError, RegridSettings};
 use serde::Serialize;
 use surfacing::{HeightGrid, Made, Placement, Settings, SurfaceError};
 
 use super::write::{NamedSurface, SurfacesError, surfaces};
 use super::{Args, pictures, summary};
 use crate::command::shown::{self, Shown};
-use crate::command::{places, timestamp};
+use crate::command::{grid, places, timestamp};
 use crate::failure::Failure;
-use crate::input::{self, Input};
 use crate::output;
 
 /// What `--json` prints.
@@ -108,23 +105,22 @@ fn surface_of_file(args: &Args, shown: &Shown) -> Result<Surfaced, Failure> {
     args.pictures
         .as_deref()
         .map_or(Ok(()), places::check_directory)?;
-    let input = input::read(&args.scan, args.units())?;
-    let file = args.scan.display();
-    if let Some(why) = pipeline::no_surface(&input.columns, input.column_pitch_mm) {
-        return Err(Failure::Failed(format!("{file}: {why}")));
-    }
-    let regrid = args.regrid(input.settings().regrid)?;
+    let input = grid::scan(&args.scan, args.units())?;
+    let regrid = args.grid.apply(input.settings().regrid)?;
     let timestamp = timestamp::of(args.timestamp, input.timestamp, &args.scan)?;
     let name = args.name(input.name.as_deref());
     let author = args.author.clone().or(input.scan.operator.clone());
-    let measured = match args.asks_for_a_grid() {
+    let measured = match args.grid.asks_for_a_grid() {
         true => None,
         false => HeightGrid::from_columns(&input.columns),
     };
     let is_measured = measured.is_some();
     let grid = match measured {
         Some(grid) => grid,
-        None => regridded(args, &input, &regrid, shown)?,
+        None => {
+            let image = grid::image(&input, &regrid, &args.scan, shown)?;
+            HeightGrid::from_image(&image).map_err(|error| refused(args, error))?
+        }
     };
     let refused = |error| refused(args, error);
     let make = |settings: &Settings| {
@@ -173,7 +169,7 @@ fn surface_of_file(args: &Args, shown: &Shown) -> Result<Surfaced, Failure> {
     let mut warnings: Vec<String> = input
         .notes
         .iter()
-        .map(|note| format!("{file}: {note}"))
+        .map(|note| format!("{}: {note}", args.scan.display()))
         .collect();
     warnings.extend(remarks(&made, &settings));
     Ok(Surfaced {
@@ -197,35 +193,6 @@ fn surface_of_file(args: &Args, shown: &Shown) -> Result<Surfaced, Failure> {
         pictures,
         warnings,
     })
-}
-
-/// The scan on a grid, as `convert` would have it.
-fn regridded(
-    args: &Args,
-    input: &Input,
-    regrid: &RegridSettings,
-    shown: &Shown,
-) -> Result<HeightGrid, Failure> {
-    let file = args.scan.display();
-    if let Some(extent) = Extent::within(&input.columns, &regrid.roi)
-        && regrid.pitch_mm < extent.finest_pitch_mm()
-    {
-        return Err(Failure::Failed(format!(
-            "{file}: a grid of {} mm is too fine for its size and number of samples; leave out \
-             single points far away with --roi-x-mm and --roi-y-mm, else choose --pitch-mm {}",
-            regrid.pitch_mm,
-            extent.finest_pitch_mm()
-        )));
-    }
-    shown.begin("regrid");
-    let image =
-        regrid::regrid(input.columns.iter().cloned(), regrid, shown).map_err(
-            |error| match error {
-                RegridError::Cancelled(_) => Failure::Interrupted,
-                other => Failure::at(&file, &other),
-            },
-        )?;
-    HeightGrid::from_image(&image).map_err(|error| refused(args, error))
 }
 
 fn refused(args: &Args, error: SurfaceError) -> Failure {

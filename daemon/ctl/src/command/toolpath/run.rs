@@ -1,19 +1,17 @@
 //! The planning itself.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
 
 use deliverables::write_atomically;
-use range_image::{Lattice, Monitor, RangeImage};
+use range_image::{Lattice, RangeImage};
 use serde::Serialize;
 use toolpath::{Header, HeightField, Machine, Plan, Surface, ToolpathError, Travel};
 
 use super::{Args, machine, model, summary};
+use crate::command::shown::{self, Shown};
 use crate::command::{convert, places};
 use crate::failure::Failure;
 use crate::output;
-use crate::progress::Progress;
 
 /// Nodes along the longer side of the simulation, and the finest that it is.
 const NODES: f64 = 1000.0;
@@ -62,65 +60,14 @@ pub(super) struct Simulation {
     pub(super) leftover_95_mm: f64,
 }
 
-/// Shows on standard error how far it is; ends it on Ctrl-C.
-struct Shown {
-    stop: AtomicBool,
-    bar: Mutex<Option<Progress>>,
-}
-
-impl Monitor for Shown {
-    fn is_cancelled(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
-    }
-
-    fn progress(&self, fraction: f64) {
-        if let Ok(mut bar) = self.bar.lock()
-            && let Some(bar) = bar.as_mut()
-        {
-            bar.at(fraction, "");
-        }
-    }
-}
-
-impl Shown {
-    fn begin(&self, title: &str) {
-        self.end("done");
-        if let Ok(mut bar) = self.bar.lock() {
-            *bar = Some(Progress::share(title));
-        }
-    }
-
-    fn end(&self, message: &str) {
-        if let Ok(mut bar) = self.bar.lock()
-            && let Some(bar) = bar.take()
-        {
-            bar.finish(message);
-        }
-    }
-}
-
 /// Plans; Ctrl-C ends it without leaving half a file.
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
-    let shown = Arc::new(Shown {
-        stop: AtomicBool::new(false),
-        bar: Mutex::new(None),
-    });
-    let worker = Arc::clone(&shown);
-    let mut work = tokio::task::spawn_blocking(move || {
-        let planned = regrid::with_threads(args.threads, || mill(&args, &worker))
+    let plan = move |shown: &Shown| {
+        regrid::with_threads(args.threads, || mill(&args, shown))
             .map_err(|error| Failure::at("cannot plan", &error))
-            .and_then(|planned| planned);
-        worker.end(if planned.is_ok() { "done" } else { "failed" });
-        planned
-    });
-    let joined = tokio::select! {
-        joined = &mut work => joined,
-        _ = tokio::signal::ctrl_c() => {
-            shown.stop.store(true, Ordering::Relaxed);
-            work.await
-        }
+            .and_then(|planned| planned)
     };
-    let planned = joined.map_err(|error| Failure::at("the planning broke off", &error))??;
+    let planned = shown::work("the planning", plan).await?;
     for warning in &planned.warnings {
         eprintln!("relief: note: {warning}");
     }
