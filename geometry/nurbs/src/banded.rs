@@ -128,6 +128,24 @@ impl BandedCholesky {
             }
         }
     }
+
+    /// Solves the system for each coordinate of points.
+    ///
+    /// # Panics
+    /// When there are not as many points as the matrix has rows.
+    #[must_use]
+    pub fn solve_points<const D: usize>(&self, sums: &[[f64; D]]) -> Vec<[f64; D]> {
+        let mut points = sums.to_vec();
+        for d in 0..D {
+            let mut column: Vec<f64> = sums.iter().map(|sum| sum[d]).collect();
+            self.solve(&mut column);
+            points
+                .iter_mut()
+                .zip(column)
+                .for_each(|(point, value)| point[d] = value);
+        }
+        points
+    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use nurbs::{BSplineCurve, BandedMatrix};
 
 use crate::basis::{Basis, DEGREE};
-use crate::space::{distance, dot, minus};
+use crate::space::{distance, dot, greatest, is_nearer, minus};
 use crate::stack::Course;
 
 /// Share of the second differences of control points in what is minimised: it only decides where no
@@ -53,9 +53,12 @@ pub(crate) fn ring(
         let points = least_squares(basis, &course.points, &at, &weights)?;
         let curve = basis.curve(&points)?;
         let off_mm = feet(&curve, basis.is_closed, &course.points, &mut at);
-        let most_mm = off_mm.iter().copied().fold(0.0, f64::max);
-        reweigh(&mut weights, &off_mm, most_mm);
-        if best.as_ref().is_none_or(|best| most_mm < best.most_mm) {
+        let most_mm = greatest(off_mm.iter().copied());
+        reweigh(core::slice::from_mut(&mut weights), &[&off_mm], most_mm);
+        if best
+            .as_ref()
+            .is_none_or(|best| is_nearer(most_mm, best.most_mm))
+        {
             best = Some(Ring {
                 points,
                 at: at.clone(),
@@ -70,18 +73,23 @@ pub(crate) fn ring(
     best
 }
 
-/// Lawson's weights of the next round, with a mean of 1.
-pub(crate) fn reweigh(weights: &mut [f64], off_mm: &[f64], most_mm: f64) {
-    if most_mm <= 0.0 {
+/// Lawson's weights of the next round, of each section's data points, with a mean of 1 over all.
+pub(crate) fn reweigh(weights: &mut [Vec<f64>], off_mm: &[&[f64]], most_mm: f64) {
+    if most_mm.is_nan() || most_mm <= 0.0 {
         return;
     }
-    for (weight, off_mm) in weights.iter_mut().zip(off_mm) {
-        *weight *= (off_mm / most_mm).max(LEAST_WEIGHT);
+    let (mut sum, mut count) = (0.0, 0);
+    for (weights, off_mm) in weights.iter_mut().zip(off_mm) {
+        for (weight, off_mm) in weights.iter_mut().zip(*off_mm) {
+            *weight *= (off_mm / most_mm).max(LEAST_WEIGHT);
+            sum += *weight;
+        }
+        count += weights.len();
     }
-    let mean = weights.iter().sum::<f64>() / weights.len() as f64;
-    weights
-        .iter_mut()
-        .for_each(|weight| *weight = (*weight / mean).max(LEAST_WEIGHT));
+    let mean = sum / count as f64;
+    for weight in weights.iter_mut().flatten() {
+        *weight = (*weight / mean).max(LEAST_WEIGHT);
+    }
 }
 
 /// Leads parameters to the feet of their data points; gives the distances.
@@ -175,15 +183,8 @@ pub(crate) fn least_squares(
         add(k, k, stiffness * STIFFNESS);
     }
     let factor = matrix.cholesky().ok()?;
-    let mut points = vec![[0.0; 3]; functions];
-    for d in 0..3 {
-        let mut column: Vec<f64> = sums.iter().map(|sum| sum[d]).collect();
-        factor.solve(&mut column);
-        for (function, point) in points.iter_mut().enumerate() {
-            point[d] = column[folded(basis, function)];
-        }
-    }
-    Some(points)
+    let solved = factor.solve_points(&sums);
+    Some((0..functions).map(|k| solved[folded(basis, k)]).collect())
 }
 
 #[cfg(test)]

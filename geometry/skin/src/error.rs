@@ -4,6 +4,9 @@ use range_image::Cancelled;
 
 use crate::settings::SettingsError;
 
+/// Greatest coordinate: ten kilometres.
+pub(crate) const MOST_MM: f64 = 1e7;
+
 /// Why sections cannot be skinned. Sections are named as they came.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SkinError {
@@ -22,7 +25,9 @@ pub enum SkinError {
         points: usize,
     },
     /// A coordinate that is none.
-    #[error("point {index} of {section} has a coordinate that is not finite")]
+    #[error(
+        "point {index} of {section} has a coordinate that is not finite, or beyond {MOST_MM} mm"
+    )]
     NotFinite {
         /// Its name.
         section: String,
@@ -97,6 +102,26 @@ pub enum SkinError {
         reached_mm: f64,
         /// What was asked for, millimetres.
         tolerance_mm: f64,
+    },
+    /// No curve follows from a section's points.
+    #[error(
+        "{section}: its points do not determine a curve; look for points that nearly lie on each \
+         other, or sections that do"
+    )]
+    Undetermined {
+        /// Its name.
+        section: String,
+    },
+    /// The published method would need too many numbers.
+    #[error(
+        "the published method gives each of {sections} sections the knots of all, {knots}, and that \
+         is more than it can remove again; skin fewer sections, or without --method jo"
+    )]
+    TooMany {
+        /// Knots of all.
+        knots: usize,
+        /// Sections.
+        sections: usize,
     },
     /// Given up because the caller asked for it.
     #[error(transparent)]

@@ -24,6 +24,9 @@ use remove::{Bounded, thinned};
 /// Knots nearer than this are one.
 const SAME_KNOT: f64 = 1e-12;
 
+/// Control points of all curves over the knots of all: more would take gigabytes, and days.
+const MOST_NUMBERS: usize = 2_000_000;
+
 pub(crate) fn skin(
     mut stack: Stack,
     settings: &Settings,
@@ -40,10 +43,9 @@ pub(crate) fn skin(
     let mut bounded = Vec::with_capacity(stack.courses.len());
     for (k, course) in stack.courses.iter().enumerate() {
         monitor.check()?;
-        let curve = approximated(course, tolerance_mm).ok_or_else(|| SkinError::OutOfReach {
+        let curve = approximated(course, tolerance_mm, monitor)?;
+        let curve = curve.ok_or_else(|| SkinError::Undetermined {
             section: course.name.clone(),
-            reached_mm: f64::NAN,
-            tolerance_mm,
         })?;
         bounded.push(bounds(course, curve));
         monitor.progress(0.4 * (k + 1) as f64 / stack.courses.len() as f64);
@@ -56,14 +58,16 @@ pub(crate) fn skin(
     let repeated = usize::from(stack.is_closed);
     let once = |own: &Bounded| own.off_mm[..own.off_mm.len() - repeated].to_vec();
     let before_mm = bounded.iter().flat_map(once).collect();
-    merge(&mut bounded);
+    merge(&mut bounded)?;
     let merged = bounded[0].curve.knots().knots().len();
     monitor.progress(0.5);
     thinned(&mut bounded, tolerance_mm, monitor)?;
     monitor.progress(0.8);
     let mut feet: Vec<Vec<f64>> = bounded.iter().map(|own| own.at.clone()).collect();
     let surface = skinned(&bounded, &stack.heights, settings.degree_across);
-    let surface = surface.ok_or(SkinError::TooFewSections(stack.courses.len()))?;
+    let surface = surface.ok_or_else(|| SkinError::Undetermined {
+        section: stack.courses[0].name.clone(),
+    })?;
     for (course, feet) in stack.courses.iter_mut().zip(&mut feet) {
         course.points.truncate(course.points.len() - repeated);
         feet.truncate(feet.len() - repeated);
@@ -92,24 +96,49 @@ fn bounds(course: &Course, curve: BSplineCurve<3>) -> Bounded {
     Bounded { curve, at, off_mm }
 }
 
-/// Brings all curves to the knots that any of them has.
-fn merge(all: &mut [Bounded]) {
-    let mut merged: Vec<f64> = Vec::new();
-    for own in all.iter() {
-        let knots = own.curve.knots();
-        let inner = &knots.knots()[knots.degree() + 1..knots.control_count()];
-        merged.extend(inner);
-    }
+/// Brings all curves to the knots that any of them has. Knots that are one but for rounding become
+/// one, so that they can be removed again.
+fn merge(all: &mut [Bounded]) -> Result<(), SkinError> {
+    let inner = |knots: &KnotVector| -> Vec<f64> {
+        knots.knots()[knots.degree() + 1..knots.control_count()].to_vec()
+    };
+    let mut merged: Vec<f64> = all
+        .iter()
+        .flat_map(|own| inner(own.curve.knots()))
+        .collect();
     merged.sort_by(f64::total_cmp);
     merged.dedup_by(|a, b| (*a - *b).abs() <= SAME_KNOT);
+    let numbers = merged.len().saturating_mul(all.len());
+    if numbers > MOST_NUMBERS {
+        return Err(SkinError::TooMany {
+            knots: merged.len(),
+            sections: all.len(),
+        });
+    }
     for own in all {
-        let has = own.curve.knots().knots();
-        let lacks = |knot: &f64| !has.iter().any(|own| (own - knot).abs() <= SAME_KNOT);
-        let missing: Vec<f64> = merged.iter().copied().filter(lacks).collect();
-        if let Ok(finer) = own.curve.with_knots(&missing) {
+        let knots = own.curve.knots();
+        let (degree, (first, last)) = (knots.degree(), knots.domain());
+        let one = |knot: f64| {
+            let after = merged.partition_point(|m| *m < knot - SAME_KNOT);
+            merged.get(after).copied().unwrap_or(knot)
+        };
+        let snapped: Vec<f64> = inner(knots).into_iter().map(one).collect();
+        let missing: Vec<f64> = merged
+            .iter()
+            .copied()
+            .filter(|knot| !snapped.contains(knot))
+            .collect();
+        let ends = |end: f64| core::iter::repeat_n(end, degree + 1);
+        let all_knots = ends(first).chain(snapped).chain(ends(last)).collect();
+        let finer = KnotVector::new(degree, all_knots)
+            .ok()
+            .and_then(|knots| BSplineCurve::new(knots, own.curve.points().to_vec()).ok())
+            .and_then(|curve| curve.with_knots(&missing).ok());
+        if let Some(finer) = finer {
             own.curve = finer;
         }
     }
+    Ok(())
 }
 
 /// The surface through the curves, which have common knots.

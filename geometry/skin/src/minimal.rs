@@ -1,15 +1,16 @@
 //! The fewest control points that hold a tolerance: how many breaks around, where, and how many rows
 //! across.
 
-use range_image::Monitor;
+use range_image::{Cancelled, Monitor};
 use rayon::prelude::*;
 
 use crate::around::{Ring, ring};
 use crate::basis::{Basis, LEAST_SPANS};
 use crate::error::SkinError;
 use crate::settings::Settings;
+use crate::space::{greatest, is_nearer};
 use crate::spread::{Net, thinned};
-use crate::stack::Stack;
+use crate::stack::{Course, Stack};
 
 /// Rounds of one fit.
 const ROUNDS: usize = 8;
@@ -39,6 +40,10 @@ const LEAST_ROWS: usize = 4;
 /// Breaks are taken out one by one as long as that takes no more than so many data points to be
 /// fitted.
 const MOST_WORK: usize = 3_000_000;
+
+/// Fewer rows are not looked for where one least squares takes more multiplications than this,
+/// some seconds.
+const MOST_OF_SOLVE: usize = 4_000_000_000;
 
 /// Breaks around, and the curves of all sections over them.
 #[derive(Debug, Clone)]
@@ -137,7 +142,7 @@ pub(crate) fn net(
         degree,
     );
     let Some(mut best) = whole else {
-        return Err(out_of_reach(stack, &trial, tolerance_mm));
+        return Err(undetermined(stack));
     };
     let least = LEAST_ROWS.max(degree + 1);
     let mut failures = 0;
@@ -152,7 +157,15 @@ pub(crate) fn net(
             break;
         }
         monitor.check()?;
-        match with_rows(stack, &trial, &density, (rows, degree), &best, tolerance_mm) {
+        let asked = (rows, degree);
+        match with_rows(
+            stack,
+            (&trial, &density),
+            asked,
+            &best,
+            tolerance_mm,
+            monitor,
+        )? {
             Some(net) => (best, failures) = (net, 0),
             None => failures += 1,
         }
@@ -179,9 +192,9 @@ fn fewest_around(
     let mut failed = LEAST_SPANS - 1;
     let found = loop {
         monitor.check()?;
-        let (trial, next) = settled(stack, &density, spans, tolerance_mm);
+        let (trial, next) = settled(stack, &density, spans, tolerance_mm, monitor)?;
         let Some(trial) = trial else {
-            return Err(SkinError::TooFewSections(0));
+            return Err(undetermined(stack));
         };
         density = next;
         if trial.most_mm <= tolerance_mm {
@@ -197,12 +210,23 @@ fn fewest_around(
     while best.basis.spans() - failed > 1 {
         monitor.check()?;
         let middle = failed.midpoint(best.basis.spans());
-        match settled(stack, &density, middle, tolerance_mm) {
+        match settled(stack, &density, middle, tolerance_mm, monitor)? {
             (Some(trial), next) if trial.most_mm <= tolerance_mm => (best, density) = (trial, next),
             _ => failed = middle,
         }
     }
     Ok((best, density))
+}
+
+/// The section with the fewest points tells the least.
+fn undetermined(stack: &Stack) -> SkinError {
+    let fewest = stack
+        .courses
+        .iter()
+        .min_by_key(|course| course.points.len());
+    SkinError::Undetermined {
+        section: fewest.map(|course| course.name.clone()).unwrap_or_default(),
+    }
 }
 
 fn out_of_reach(stack: &Stack, trial: &Trial, tolerance_mm: f64) -> SkinError {
@@ -224,17 +248,18 @@ fn settled(
     density: &Density,
     spans: usize,
     tolerance_mm: f64,
-) -> (Option<Trial>, Density) {
+    monitor: &dyn Monitor,
+) -> Result<(Option<Trial>, Density), Cancelled> {
     let mut density = density.clone();
     let mut best: Option<(Trial, Density)> = None;
     for _ in 0..SETTLINGS {
-        let Some(trial) = over(stack, density.breaks(spans), tolerance_mm) else {
+        let Some(trial) = over(stack, density.breaks(spans), tolerance_mm, monitor)? else {
             break;
         };
         let next = Density::after(&trial.basis, &trial.rings);
         let is_better = best
             .as_ref()
-            .is_none_or(|(best, _)| trial.most_mm < best.most_mm);
+            .is_none_or(|(best, _)| is_nearer(trial.most_mm, best.most_mm));
         let is_done = trial.most_mm <= tolerance_mm;
         if is_better {
             best = Some((trial, density));
@@ -244,27 +269,37 @@ fn settled(
         }
         density = next;
     }
-    match best {
+    Ok(match best {
         Some((trial, density)) => (Some(trial), density),
         None => (None, Density::even()),
-    }
+    })
 }
 
 /// All sections over these breaks.
-fn over(stack: &Stack, breaks: Vec<f64>, tolerance_mm: f64) -> Option<Trial> {
+fn over(
+    stack: &Stack,
+    breaks: Vec<f64>,
+    tolerance_mm: f64,
+    monitor: &dyn Monitor,
+) -> Result<Option<Trial>, Cancelled> {
     let basis = Basis {
         breaks,
         is_closed: stack.is_closed,
     };
-    let of = |course| ring(course, &basis, &course.at, (ROUNDS, tolerance_mm));
-    let rings: Option<Vec<Ring>> = stack.courses.par_iter().map(of).collect();
-    let rings = rings?;
-    let most_mm = rings.iter().map(|ring| ring.most_mm).fold(0.0, f64::max);
-    Some(Trial {
+    let of = |course: &Course| {
+        monitor.check()?;
+        Ok(ring(course, &basis, &course.at, (ROUNDS, tolerance_mm)))
+    };
+    let rings: Result<Vec<Option<Ring>>, Cancelled> = stack.courses.par_iter().map(of).collect();
+    let Some(rings) = rings?.into_iter().collect::<Option<Vec<Ring>>>() else {
+        return Ok(None);
+    };
+    let most_mm = greatest(rings.iter().map(|ring| ring.most_mm));
+    Ok(Some(Trial {
         basis,
         rings,
         most_mm,
-    })
+    }))
 }
 
 /// Takes breaks out one by one, each time the one without which the deviations grow least, as long
@@ -281,9 +316,11 @@ fn thin(
         let without = |k: usize| {
             let mut breaks = trial.basis.breaks.clone();
             breaks.remove(k);
-            over(stack, breaks, tolerance_mm)
+            over(stack, breaks, tolerance_mm, monitor)
         };
-        let all = (1..trial.basis.spans()).filter_map(without);
+        let all: Result<Vec<Option<Trial>>, Cancelled> =
+            (1..trial.basis.spans()).map(without).collect();
+        let all = all?.into_iter().flatten();
         let Some(best) = all.min_by(|a, b| a.most_mm.total_cmp(&b.most_mm)) else {
             break;
         };
@@ -292,7 +329,8 @@ fn thin(
             best
         } else {
             let density = Density::after(&best.basis, &best.rings);
-            match settled(stack, &density, best.basis.spans(), tolerance_mm).0 {
+            let spans = best.basis.spans();
+            match settled(stack, &density, spans, tolerance_mm, monitor)?.0 {
                 Some(moved) if moved.most_mm <= tolerance_mm => moved,
                 _ => break,
             }
@@ -306,13 +344,15 @@ fn thin(
 /// tolerance.
 fn with_rows(
     stack: &Stack,
-    trial: &Trial,
-    density: &Density,
+    (trial, density): (&Trial, &Density),
     (rows, degree): (usize, usize),
     best: &Net,
     tolerance_mm: f64,
-) -> Option<Net> {
-    let across = thinned(&stack.heights, degree, rows)?;
+    monitor: &dyn Monitor,
+) -> Result<Option<Net>, Cancelled> {
+    let Some(across) = thinned(&stack.heights, degree, rows) else {
+        return Ok(None);
+    };
     let wrapped = trial.basis.written() - trial.basis.spans();
     let most = (best.written() - 1) / rows;
     let starts: Vec<Vec<f64>> = stack.courses.iter().map(|own| own.at.clone()).collect();
@@ -321,17 +361,23 @@ fn with_rows(
             breaks,
             is_closed: stack.is_closed,
         };
-        Net::least_squares(stack, &basis, &across, &starts, (ROUNDS, tolerance_mm))
+        let asked = (ROUNDS, tolerance_mm);
+        Net::least_squares(stack, &basis, &across, &starts, asked, monitor)
     };
     // Breaks are moved to where the deviations are, as they are without fewer rows.
-    let fit = |breaks: Vec<f64>| {
+    let fit = |breaks: Vec<f64>| -> Result<Option<Net>, Cancelled> {
         let spans = breaks.len() - 1;
         let mut best: Option<Net> = None;
         let mut breaks = breaks;
         for _ in 0..SETTLINGS {
-            let net = over(breaks)?;
+            let Some(net) = over(breaks)? else {
+                return Ok(None);
+            };
             breaks = Density::after(&net.basis, &net.rings).breaks(spans);
-            if best.as_ref().is_none_or(|best| net.most_mm < best.most_mm) {
+            if best
+                .as_ref()
+                .is_none_or(|best| is_nearer(net.most_mm, best.most_mm))
+            {
                 best = Some(net);
             }
             if best
@@ -341,23 +387,31 @@ fn with_rows(
                 break;
             }
         }
-        best
+        Ok(best)
     };
     let holds = |net: &Net| net.most_mm <= tolerance_mm;
     let least = trial.basis.spans();
-    let most = most.checked_sub(wrapped).filter(|most| *most >= least)?;
+    let is_affordable = |most: &usize| {
+        let functions = most + if stack.is_closed { 0 } else { wrapped };
+        *most >= least && Net::work(functions, rows, degree) <= MOST_OF_SOLVE
+    };
+    let Some(most) = most.checked_sub(wrapped).filter(is_affordable) else {
+        return Ok(None);
+    };
     // With as many as may be first: where those do not do, none will.
-    let mut found = fit(density.breaks(most)).filter(holds)?;
+    let Some(mut found) = fit(density.breaks(most))?.filter(holds) else {
+        return Ok(None);
+    };
     let mut failed = least - 1;
     while found.basis.spans() - failed > 1 {
         let middle = failed.midpoint(found.basis.spans());
         let own = (middle == least).then(|| trial.basis.breaks.clone());
-        match fit(own.unwrap_or_else(|| density.breaks(middle))).filter(holds) {
+        match fit(own.unwrap_or_else(|| density.breaks(middle)))?.filter(holds) {
             Some(net) => found = net,
             None => failed = middle,
         }
     }
-    Some(found)
+    Ok(Some(found))
 }
 
 #[cfg(test)]

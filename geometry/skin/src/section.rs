@@ -1,6 +1,6 @@
 //! Cross-sections as they come.
 
-use crate::error::SkinError;
+use crate::error::{MOST_MM, SkinError};
 use crate::space::{distance, farthest_apart};
 
 /// A cross-section: points in their order along it, millimetres.
@@ -45,7 +45,7 @@ impl Section {
 
     /// The points without those that repeat the one before.
     pub(crate) fn distinct(&self) -> Result<Vec<[f64; 3]>, SkinError> {
-        let is_bad = |place: &[f64; 3]| place.iter().any(|c| !c.is_finite());
+        let is_bad = |place: &[f64; 3]| place.iter().any(|c| c.is_nan() || c.abs() > MOST_MM);
         if let Some(index) = self.points.iter().position(is_bad) {
             return Err(SkinError::NotFinite {
                 section: self.name.clone(),

@@ -81,3 +81,19 @@ pub(crate) fn along(places: &[[f64; 3]], lengths: &[f64], at: f64) -> [f64; 3] {
     let (a, b) = (places[k], places[(k + 1) % places.len()]);
     plus(a, times(minus(b, a), share))
 }
+
+/// The greatest of values; not a number if one of them is none.
+pub(crate) fn greatest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(0.0, |most, value| {
+        if most.is_nan() || value <= most {
+            most
+        } else {
+            value
+        }
+    })
+}
+
+/// Whether a deviation is less than another one; any is less than what is not a number.
+pub(crate) fn is_nearer(own: f64, other: f64) -> bool {
+    own < other || other.is_nan()
+}

@@ -1,10 +1,11 @@
 //! Fewer rows of control points than sections: least squares over all of them at once.
 
 use nurbs::{BandedMatrix, KnotVector};
+use range_image::{Cancelled, Monitor};
 
 use crate::around::{Ring, STIFFNESS, feet, is_done, reweigh};
 use crate::basis::Basis;
-use crate::space::{plus, times};
+use crate::space::{greatest, is_nearer, plus, times};
 use crate::stack::Stack;
 
 /// A net of control points: those of a row are around, rows are across.
@@ -43,7 +44,7 @@ impl Net {
                 points[row * functions + function] = point;
             }
         }
-        let most_mm = rings.iter().map(|ring| ring.most_mm).fold(0.0, f64::max);
+        let most_mm = greatest(rings.iter().map(|ring| ring.most_mm));
         Some(Self {
             basis,
             across,
@@ -61,18 +62,24 @@ impl Net {
         across: &KnotVector,
         starts: &[Vec<f64>],
         (rounds, tolerance_mm): (usize, f64),
-    ) -> Option<Self> {
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Self>, Cancelled> {
         let mut at = starts.to_vec();
         let mut weights: Vec<Vec<f64>> = at.iter().map(|of| vec![1.0; of.len()]).collect();
         let mut best: Option<Self> = None;
         for round in 0..rounds {
-            let points = solved(stack, basis, across, &at, &weights)?;
+            monitor.check()?;
+            let Some(points) = solved(stack, basis, across, &at, &weights) else {
+                return Ok(None);
+            };
             let mut rings = Vec::with_capacity(at.len());
             for ((course, height), at) in stack.courses.iter().zip(&stack.heights).zip(&mut at) {
                 let points = row_at(basis, across, &points, *height);
-                let curve = basis.curve(&points)?;
+                let Some(curve) = basis.curve(&points) else {
+                    return Ok(None);
+                };
                 let off_mm = feet(&curve, basis.is_closed, &course.points, at);
-                let most_mm = off_mm.iter().copied().fold(0.0, f64::max);
+                let most_mm = greatest(off_mm.iter().copied());
                 rings.push(Ring {
                     points,
                     at: at.clone(),
@@ -80,11 +87,13 @@ impl Net {
                     most_mm,
                 });
             }
-            let most_mm = rings.iter().map(|ring| ring.most_mm).fold(0.0, f64::max);
-            for (weights, ring) in weights.iter_mut().zip(&rings) {
-                reweigh(weights, &ring.off_mm, most_mm);
-            }
-            if best.as_ref().is_none_or(|best| most_mm < best.most_mm) {
+            let most_mm = greatest(rings.iter().map(|ring| ring.most_mm));
+            let off_mm: Vec<&[f64]> = rings.iter().map(|ring| &*ring.off_mm).collect();
+            reweigh(&mut weights, &off_mm, most_mm);
+            if best
+                .as_ref()
+                .is_none_or(|best| is_nearer(most_mm, best.most_mm))
+            {
                 best = Some(Self {
                     basis: basis.clone(),
                     across: across.clone(),
@@ -97,7 +106,14 @@ impl Net {
                 break;
             }
         }
-        best
+        Ok(best)
+    }
+
+    /// Multiplications of one least squares with so many functions around and rows.
+    pub(crate) fn work(functions: usize, rows: usize, degree: usize) -> usize {
+        let band = (degree + 1).saturating_mul(functions);
+        let size = rows.saturating_mul(functions);
+        size.saturating_mul(band).saturating_mul(band)
     }
 }
 
@@ -161,16 +177,7 @@ pub(crate) fn column_of(
         }
     }
     let factor = matrix.cholesky().ok()?;
-    let mut points = vec![[0.0; 3]; rows];
-    for d in 0..3 {
-        let mut column: Vec<f64> = sums.iter().map(|sum| sum[d]).collect();
-        factor.solve(&mut column);
-        points
-            .iter_mut()
-            .zip(column)
-            .for_each(|(point, c)| point[d] = c);
-    }
-    Some(points)
+    Some(factor.solve_points(&sums))
 }
 
 /// The net with the least sum of weighted squares.
@@ -235,16 +242,7 @@ fn solved(
         matrix.add(k, k, stiffness * STIFFNESS);
     }
     let factor = matrix.cholesky().ok()?;
-    let mut points = vec![[0.0; 3]; size];
-    for d in 0..3 {
-        let mut column: Vec<f64> = sums.iter().map(|sum| sum[d]).collect();
-        factor.solve(&mut column);
-        points
-            .iter_mut()
-            .zip(column)
-            .for_each(|(point, c)| point[d] = c);
-    }
-    Some(points)
+    Some(factor.solve_points(&sums))
 }
 
 /// Adds the square of a second difference.

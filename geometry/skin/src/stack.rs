@@ -13,6 +13,9 @@ const SAMPLES: usize = 128;
 /// Sections nearer to each other than this part of the usual distance lie at one height.
 const ONE_HEIGHT: f64 = 0.01;
 
+/// Sections whose parameters differ by less lie on each other.
+const SAME_HEIGHT: f64 = 1e-9;
+
 /// What is across another section by less than this part of their distance is noise.
 const ACROSS: f64 = 0.25;
 
@@ -93,8 +96,18 @@ impl Stack {
         }
         let courses = started(&loose, is_closed, settings.method);
         passed(&courses, &loose, is_closed, axis)?;
+        let heights = heights(&courses, is_closed);
+        if let Some(k) = heights
+            .windows(2)
+            .position(|pair| pair[1] - pair[0] < SAME_HEIGHT)
+        {
+            return Err(SkinError::Branching {
+                first: courses[k].name.clone(),
+                second: courses[k + 1].name.clone(),
+            });
+        }
         Ok(Self {
-            heights: heights(&courses, is_closed),
+            heights,
             courses,
             is_closed,
             warnings,
@@ -429,6 +442,7 @@ fn heights(courses: &[Course], is_closed: bool) -> Vec<f64> {
         })
         .collect();
     let mut heights = vec![0.0; courses.len()];
+    let mut told = 0.0;
     for place in 0..SAMPLES {
         let roots = samples
             .windows(2)
@@ -439,11 +453,18 @@ fn heights(courses: &[Course], is_closed: bool) -> Vec<f64> {
                 Some(*sum)
             })
             .collect();
-        let whole = sums[sums.len() - 1].max(f64::MIN_POSITIVE);
-        for (height, sum) in heights.iter_mut().skip(1).zip(&sums) {
-            *height += sum / whole / SAMPLES as f64;
+        // Where all of them have one place, as a fan has, nothing is told.
+        let whole = sums[sums.len() - 1];
+        if whole > 0.0 {
+            told += 1.0;
+            for (height, sum) in heights.iter_mut().skip(1).zip(&sums) {
+                *height += sum / whole;
+            }
         }
     }
+    heights
+        .iter_mut()
+        .for_each(|height| *height /= f64::max(told, 1.0));
     if let Some(last) = heights.last_mut() {
         *last = 1.0;
     }

@@ -110,7 +110,9 @@ pub(crate) fn skin(
 ) -> Result<Skin, SkinError> {
     let net = minimal::net(&stack, settings, monitor)?;
     let Some(surface) = of_net(&net) else {
-        return Err(SkinError::TooFewSections(stack.courses.len()));
+        return Err(SkinError::Undetermined {
+            section: stack.courses[0].name.clone(),
+        });
     };
     let feet: Vec<Vec<f64>> = net.rings.iter().map(|ring| ring.at.clone()).collect();
     let counts = Counts {
@@ -144,7 +146,8 @@ pub(crate) fn finished(
     }
     let mut warnings = stack.warnings;
     if stack.is_closed {
-        warnings.extend(crossing(&surface, &stack.heights));
+        let names: Vec<&str> = stack.courses.iter().map(|course| &*course.name).collect();
+        warnings.extend(crossing(&surface, &stack.heights, &names));
     }
     monitor.progress(1.0);
     Ok(Skin {
@@ -189,15 +192,15 @@ fn clamped(basis: &Basis) -> Option<KnotVector> {
 }
 
 /// The first of the curves around, at the sections and half way between them, that crosses itself.
-fn crossing(surface: &BSplineSurface, heights: &[f64]) -> Option<Warning> {
+fn crossing(surface: &BSplineSurface, heights: &[f64], names: &[&str]) -> Option<Warning> {
     let between = heights.windows(2).map(|pair| pair[0].midpoint(pair[1]));
     let on = heights
         .iter()
         .enumerate()
-        .map(|(k, height)| (format!("on section {}", k + 1), *height));
+        .map(|(k, height)| (format!("on {}", names[k]), *height));
     let between = between
         .enumerate()
-        .map(|(k, height)| (format!("between sections {} and {}", k + 1, k + 2), height));
+        .map(|(k, height)| (format!("between {} and {}", names[k], names[k + 1]), height));
     on.chain(between).find_map(|(where_, height)| {
         let at = |k: usize| surface.evaluate(k as f64 / AROUND as f64, height);
         let ring: Vec<[f64; 3]> = (0..AROUND).map(at).collect();

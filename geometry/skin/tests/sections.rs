@@ -41,9 +41,7 @@ fn skinned(sections: &[Section], settings: &Settings) -> Result<Skin, SkinError>
 
 /// The surface's largest distance from the data, looked for all over it.
 fn farthest_mm(found: &Skin, sections: &[Section]) -> f64 {
-    let points = sections
-        .iter()
-        .flat_map(|section| section.points.iter().step_by(7));
+    let points = sections.iter().flat_map(|section| &section.points);
     let off = points.map(|place| found.surface.closest(*place).distance);
     off.fold(0.0, f64::max)
 }
@@ -64,7 +62,8 @@ fn every_data_point_is_within_the_tolerance_by_either_method() {
                 "{method:?} {}",
                 found.most_mm()
             );
-            assert!(farthest_mm(&found, &sections) <= found.most_mm() + 1e-9);
+            let farthest_mm = farthest_mm(&found, &sections);
+            assert!(farthest_mm <= tolerance_mm && farthest_mm > 0.2 * found.most_mm());
         }
     }
 }
@@ -262,4 +261,74 @@ fn wavy_sections_above_each_other_do_not_cross() {
         }
     }
     assert!(skinned(&sections, &Settings::new(1.0)).is_ok());
+}
+
+#[test]
+fn sections_that_lie_on_each_other_or_too_far_off_are_refused() {
+    let line = |z: f64, k: usize| {
+        let points = (0..12).map(|j| [f64::from(j), 0.2 * f64::from(j * j), z]);
+        Section::by_its_ends(format!("section {k}"), points.collect())
+    };
+    let twice = [line(0.0, 1), line(5.0, 2), line(5.0, 3), line(9.0, 4)];
+    let error = skinned(&twice, &Settings::new(1.0)).unwrap_err();
+    let SkinError::Branching { first, second } = &error else {
+        panic!("{error:?}")
+    };
+    assert_eq!(
+        (first.as_str(), second.as_str()),
+        ("section 2", "section 3")
+    );
+    let mut far = vase(3);
+    far[1].points.iter_mut().for_each(|place| place[2] = 1e308);
+    let error = skinned(&far, &Settings::new(1.0)).unwrap_err().to_string();
+    assert!(
+        error.contains("section 2") && error.contains("10000000 mm"),
+        "{error}"
+    );
+}
+
+/// A cone: its sections are one section in other sizes, and so are their knots but for rounding.
+#[test]
+fn knots_that_differ_by_rounding_are_removed_by_the_published_way() {
+    let of = |k: usize| {
+        closed(
+            k + 1,
+            ring(100.0 / 3.0 * (1.0 + 0.1 * k as f64), 20.0 * k as f64, 90, 0),
+        )
+    };
+    let sections: Vec<Section> = (0..6).map(of).collect();
+    let settings = Settings {
+        method: Method::Jo,
+        ..Settings::new(1.0)
+    };
+    let counts = skinned(&sections, &settings).unwrap().counts;
+    // Larger sections need more knots than smaller ones; those of all are far from all of theirs.
+    let most = counts.of_sections.iter().max().unwrap();
+    assert!(counts.around <= *most, "{counts:?}");
+}
+
+struct Impatient(std::sync::atomic::AtomicUsize);
+
+impl range_image::Monitor for Impatient {
+    fn is_cancelled(&self) -> bool {
+        // Once it is asked so often, it has lost interest.
+        self.0.fetch_add(1, std::sync::atomic::Ordering::Relaxed) >= 40
+    }
+
+    fn progress(&self, _fraction: f64) {}
+}
+
+#[test]
+fn a_search_ends_soon_after_it_is_cancelled() {
+    for method in [Method::Relief, Method::Jo] {
+        let settings = Settings {
+            method,
+            ..Settings::new(0.01)
+        };
+        let monitor = Impatient(0.into());
+        let error = skin(&vase(12), &settings, &monitor).unwrap_err();
+        assert!(matches!(error, SkinError::Cancelled(_)), "{error:?}");
+        let asked = monitor.0.load(std::sync::atomic::Ordering::Relaxed);
+        assert!(asked < 60, "{asked}");
+    }
 }

@@ -1,7 +1,7 @@
 //! A section's curve by the paper's Fig. 4.
 
 use nurbs::{BSplineCurve, BandedMatrix, KnotVector};
-use range_image::Unmonitored;
+use range_image::{Cancelled, Monitor};
 
 use super::remove::{Bounded, thinned};
 use crate::basis::DEGREE;
@@ -10,26 +10,33 @@ use crate::stack::Course;
 /// The curve of a section: interpolated, its knots removed as far as the tolerance allows; with the
 /// number of control points that is left fitted by least squares, and again with one more until every
 /// data point is within the tolerance. `None` where that never is.
-pub(super) fn approximated(course: &Course, tolerance_mm: f64) -> Option<BSplineCurve<3>> {
-    let interpolating = interpolated(course)?;
+pub(super) fn approximated(
+    course: &Course,
+    tolerance_mm: f64,
+    monitor: &dyn Monitor,
+) -> Result<Option<BSplineCurve<3>>, Cancelled> {
+    let Some(interpolating) = interpolated(course) else {
+        return Ok(None);
+    };
     let count = course.points.len();
     let mut own = [Bounded {
         curve: interpolating.clone(),
         at: course.at.clone(),
         off_mm: vec![0.0; count],
     }];
-    thinned(&mut own, tolerance_mm, &Unmonitored).ok()?;
+    thinned(&mut own, tolerance_mm, monitor)?;
     for controls in own[0].curve.points().len()..count {
+        monitor.check()?;
         let Some(curve) = least_squares(course, controls) else {
             continue;
         };
         let places = course.points.iter().zip(&course.at);
         let mut off = places.map(|(place, t)| curve.closest_from(*place, *t).distance);
         if off.all(|off_mm| off_mm <= tolerance_mm) {
-            return Some(curve);
+            return Ok(Some(curve));
         }
     }
-    Some(interpolating)
+    Ok(Some(interpolating))
 }
 
 /// The curve through all data points; knots by averaging (Piegl & Tiller 1997, equation 9.8).
@@ -95,22 +102,16 @@ fn fitted(course: &Course, knots: KnotVector) -> Option<BSplineCurve<3>> {
         }
     }
     let factor = matrix.cholesky().ok()?;
-    let mut points = vec![*first; controls];
-    points[controls - 1] = *last;
-    for d in 0..3 {
-        let mut column: Vec<f64> = sums.iter().map(|sum| sum[d]).collect();
-        factor.solve(&mut column);
-        points
-            .iter_mut()
-            .skip(1)
-            .zip(column)
-            .for_each(|(point, c)| point[d] = c);
-    }
+    let mut points = vec![*first];
+    points.extend(factor.solve_points(&sums));
+    points.push(*last);
     BSplineCurve::new(knots, points).ok()
 }
 
 #[cfg(test)]
 mod tests {
+    use range_image::Unmonitored;
+
     use super::*;
     use crate::space::distance;
     use crate::testing::ellipse;
@@ -136,7 +137,9 @@ mod tests {
         let course = open();
         let mut before = usize::MAX;
         for tolerance_mm in [0.01, 0.1, 1.0] {
-            let curve = approximated(&course, tolerance_mm).unwrap();
+            let curve = approximated(&course, tolerance_mm, &Unmonitored)
+                .unwrap()
+                .unwrap();
             let count = curve.points().len();
             assert!(count < before);
             before = count;
