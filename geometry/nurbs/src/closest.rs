@@ -263,6 +263,57 @@ mod tests {
         }
     }
 
+    /// A wavy surface whose sides are neither straight nor at right angles.
+    fn slanted() -> BSplineSurface {
+        let knots = KnotVector::uniform(3, 3, 0.0, 1.0).unwrap();
+        let count = knots.control_count();
+        let points = (0..count * count).map(|k| {
+            let (i, j) = ((k / count) as f64, (k % count) as f64);
+            [i + 0.8 * j, j, libm::sin(1.3 * i) * libm::cos(0.9 * j)]
+        });
+        BSplineSurface::new(knots.clone(), knots.clone(), points.collect()).unwrap()
+    }
+
+    #[test]
+    fn all_around_a_surface_nothing_is_nearer_than_what_is_found() {
+        let surface = slanted();
+        let share = |k: usize| k as f64 / 60.0;
+        let dense: Vec<[f64; 3]> = (0..61 * 61)
+            .map(|k| surface.evaluate(share(k / 61), share(k % 61)))
+            .collect();
+        let mut state: u64 = 7;
+        let mut draw = |low: f64, high: f64| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            low + (high - low) * (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        for _ in 0..300 {
+            let place = [draw(-3.0, 13.0), draw(-3.0, 9.0), draw(-3.0, 3.0)];
+            let off = dense
+                .iter()
+                .map(|on| dot(minus(*on, place), minus(*on, place)));
+            let nearest = off.fold(f64::INFINITY, f64::min).sqrt();
+            let found = surface.closest(place);
+            assert!(
+                found.distance <= nearest + 1e-9,
+                "{place:?}: {found:?} {nearest}"
+            );
+            // Along what is free the distance has no slope.
+            let r = minus(surface.evaluate(found.at[0], found.at[1]), place);
+            for (d, (a, b)) in [(1, 0), (0, 1)].into_iter().enumerate() {
+                let along = surface.partial(found.at[0], found.at[1], a, b);
+                let slope = dot(r, along) / dot(along, along).sqrt();
+                let leads_out =
+                    (found.at[d] <= 0.0 && slope > 0.0) || (found.at[d] >= 1.0 && slope < 0.0);
+                assert!(
+                    leads_out || slope.abs() < 1e-5,
+                    "{place:?}: {found:?} {slope}"
+                );
+            }
+        }
+    }
+
     #[test]
     fn beyond_the_border_the_nearest_point_is_on_it() {
         let found = saddle().closest([1.5, 0.0, 0.0]);

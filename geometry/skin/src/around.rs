@@ -214,6 +214,34 @@ mod tests {
     }
 
     #[test]
+    fn weights_grow_with_deviations_over_all_sections_alike() {
+        let mut weights = [vec![1.0; 3], vec![1.0; 3]];
+        reweigh(&mut weights, &[&[0.5, 1.0, 0.5], &[4.0, 2.0, 4.0]], 4.0);
+        let mean: f64 = weights.iter().flatten().sum::<f64>() / 6.0;
+        assert!((mean - 1.0).abs() < 1e-12, "{weights:?}");
+        // As their deviations are, within a section and from one to the other.
+        assert!((weights[0][1] / weights[0][0] - 2.0).abs() < 1e-12);
+        assert!((weights[1][0] / weights[0][1] - 4.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn feet_are_where_the_curve_is_nearest() {
+        let course = ellipse(60.0, 30.0, 0.0, 40);
+        let basis = even(7);
+        let points = least_squares(&basis, &course.points, &course.at, &[1.0; 40]).unwrap();
+        let curve = basis.curve(&points).unwrap();
+        let mut at = course.at.clone();
+        let off_mm = feet(&curve, true, &course.points, &mut at);
+        for ((place, t), off_mm) in course.points.iter().zip(&at).zip(&off_mm) {
+            let on = curve.evaluate(*t);
+            assert!((distance(on, *place) - off_mm).abs() < 1e-12);
+            let along = curve.derivative(*t, 1);
+            let slant = dot(minus(on, *place), along) / crate::space::norm(along);
+            assert!(slant.abs() < 1e-4, "{t}: {slant}");
+        }
+    }
+
+    #[test]
     fn rounds_lower_the_greatest_deviation() {
         let course = ellipse(60.0, 30.0, 0.0, 80);
         let basis = even(6);
@@ -223,7 +251,11 @@ mod tests {
                 .most_mm
         };
         let (plain, led) = (most(1), most(20));
-        assert!(led < 0.75 * plain, "{plain} {led}");
+        let feet_alone = most(2);
+        assert!(
+            led < 0.9 * feet_alone && led < 0.75 * plain,
+            "{plain} {led}"
+        );
         // What is said of the curve is true of it.
         let ring = ring(&course, &basis, &course.at, (20, 0.0)).unwrap();
         let curve = basis.curve(&ring.points).unwrap();

@@ -168,4 +168,25 @@ mod tests {
         assert_eq!(found.sections[1].name, "the row at y = 1.50 mm");
         assert_eq!(found.sections[1].points[0], [6.0, 1.5, 1.0]);
     }
+
+    #[test]
+    fn gaps_of_three_nodes_are_bridged_and_what_hardly_overlaps_does_not_go_on() {
+        let lattice = Lattice { pitch_mm: 0.5 };
+        let mut image = RangeImage::masked(lattice, 0, 0, 40, 3);
+        for column in 0..24 {
+            // Three nodes are missing in the first row, four in the second.
+            let is_there = |row: usize| !(10..13 + row).contains(&column);
+            for row in [0, 1] {
+                image.set_z_mm(column, row, is_there(row).then_some(1.0));
+            }
+        }
+        // The third row begins where the second ends.
+        for column in 20..38 {
+            image.set_z_mm(column, 2, Some(1.0));
+        }
+        let found = cut(&image, 1);
+        let lengths: Vec<usize> = found.sections.iter().map(|own| own.points.len()).collect();
+        assert_eq!(lengths, [21, 10]);
+        assert_eq!(found.left_out, 10 + 18);
+    }
 }

@@ -60,3 +60,68 @@ pub(crate) fn deviations(
         .collect();
     Ok(all?.concat())
 }
+
+#[cfg(test)]
+mod tests {
+    use range_image::Unmonitored;
+
+    use super::*;
+    use crate::settings::Settings;
+    use crate::surface::{Counts, finished};
+    use crate::testing::waisted;
+
+    fn found() -> (Stack, BSplineSurface) {
+        let settings = Settings::new(0.5);
+        let sections = waisted(5, 80);
+        let surface = crate::skin(&sections, &settings, &Unmonitored)
+            .unwrap()
+            .surface;
+        (Stack::of(&sections, &settings).unwrap(), surface)
+    }
+
+    #[test]
+    fn beside_the_seam_the_other_side_of_it_is_looked_at() {
+        let (stack, surface) = found();
+        // As if all points beside the seam had been found just before it.
+        let other = |t: &f64| if *t < 0.015 { 1.0 } else { *t };
+        let feet: Vec<Vec<f64>> = stack
+            .courses
+            .iter()
+            .map(|course| course.at.iter().map(other).collect())
+            .collect();
+        let found = deviations(&surface, &stack, &feet, &Unmonitored).unwrap();
+        assert!(found.iter().all(|own| own.off_mm <= 0.5));
+        let moved = feet.iter().flatten().filter(|t| **t == 1.0).count();
+        assert!(moved >= 5, "{moved}");
+    }
+
+    #[test]
+    fn no_surface_is_handed_out_that_is_off_by_more_than_the_tolerance() {
+        let (stack, surface) = found();
+        let feet: Vec<Vec<f64>> = stack
+            .courses
+            .iter()
+            .map(|course| course.at.clone())
+            .collect();
+        let asked = |tolerance_mm: f64| {
+            let counts = Counts {
+                of_sections: Vec::new(),
+                merged: None,
+                around: 0,
+                points_around: 0,
+                rows: 0,
+            };
+            let points = (&feet[..], Vec::new());
+            finished(
+                stack.clone(),
+                surface.clone(),
+                points,
+                counts,
+                (tolerance_mm, &Unmonitored),
+            )
+        };
+        assert!(asked(0.5).is_ok());
+        let error = asked(1e-3).unwrap_err();
+        assert!(matches!(error, SkinError::OutOfReach { reached_mm, .. } if reached_mm > 1e-3));
+    }
+}

@@ -255,3 +255,47 @@ fn stiffen(matrix: &mut BandedMatrix, of: [usize; 3], stiffness: f64) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use range_image::Unmonitored;
+
+    use super::*;
+    use crate::settings::Settings;
+    use crate::testing::waisted;
+
+    #[test]
+    fn rounds_lower_the_greatest_deviation_of_fewer_rows() {
+        let stack = Stack::of(&waisted(9, 90), &Settings::new(1.0)).unwrap();
+        let basis = Basis {
+            breaks: (0..=7).map(|k| f64::from(k) / 7.0).collect(),
+            is_closed: true,
+        };
+        let across = thinned(&stack.heights, 3, 6).unwrap();
+        let starts: Vec<Vec<f64>> = stack.courses.iter().map(|own| own.at.clone()).collect();
+        let most = |rounds: usize| {
+            let asked = (rounds, 0.0);
+            let net = Net::least_squares(&stack, &basis, &across, &starts, asked, &Unmonitored);
+            net.unwrap().unwrap().most_mm
+        };
+        let (plain, led) = (most(1), most(12));
+        assert!(led < 0.8 * plain, "{plain} {led}");
+    }
+
+    #[test]
+    fn columns_go_through_their_values_where_there_is_a_row_for_each() {
+        let heights = [0.0, 0.2, 0.3, 0.7, 1.0];
+        let values: Vec<[f64; 3]> = (0..5)
+            .map(|k| [f64::from(k * k), 1.0, f64::from(k)])
+            .collect();
+        for degree in 1..=4 {
+            let across = averaged(&heights, degree).unwrap();
+            let points = column_of(&across, &heights, &values).unwrap();
+            let curve = nurbs::BSplineCurve::new(across, points).unwrap();
+            for (height, value) in heights.iter().zip(&values) {
+                let on = curve.evaluate(*height);
+                assert!(crate::space::distance(on, *value) < 1e-9, "{degree}");
+            }
+        }
+    }
+}

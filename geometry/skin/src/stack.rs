@@ -247,10 +247,6 @@ fn turn(
         }
         let own = &mut loose[k];
         own.points.reverse();
-        if is_closed {
-            // Its first point stays the first.
-            own.points.rotate_right(1);
-        }
         turned.push(own.name.clone());
     }
     Ok(turned)
@@ -469,4 +465,30 @@ fn heights(courses: &[Course], is_closed: bool) -> Vec<f64> {
         *last = 1.0;
     }
     heights
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Open sections that fan out from a line of common points, and are evenly apart beyond it.
+    #[test]
+    fn where_sections_have_common_points_nothing_is_told_of_their_heights() {
+        let course = |k: usize| {
+            let place = |j: usize| {
+                let out = if j < 8 { 0.0 } else { 3.0 * k as f64 };
+                [j as f64, out, 0.0]
+            };
+            Course {
+                name: String::new(),
+                points: (0..16).map(place).collect(),
+                at: (0..16).map(|j| j as f64 / 15.0).collect(),
+            }
+        };
+        let courses: Vec<Course> = (0..5).map(course).collect();
+        let heights = heights(&courses, false);
+        for (k, height) in heights.iter().enumerate() {
+            assert!((height - 0.25 * k as f64).abs() < 0.02, "{heights:?}");
+        }
+    }
 }
