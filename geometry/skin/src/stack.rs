@@ -46,6 +46,14 @@ pub(crate) struct Course {
     pub(crate) at: Vec<f64>,
 }
 
+impl Course {
+    /// Places at even parts of its length from its start on, which may be before its first point.
+    fn samples(&self, is_closed: bool) -> Vec<[f64; 3]> {
+        let before = if is_closed { 1.0 - self.at[0] } else { 0.0 };
+        samples(&self.points, is_closed, before)
+    }
+}
+
 /// Sections in order, that run the same way and begin beside each other.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Stack {
@@ -404,11 +412,7 @@ fn passed(
         // Place by place from the common start, so that sections may be wavy as long as both are.
         let [a, b] = [0, 1].map(|side| {
             let course = &pair[side];
-            samples(
-                &course.points,
-                is_closed,
-                1.0 - course.at[0] * f64::from(is_closed),
-            )
+            course.samples(is_closed)
         });
         let both = a.iter().zip(&b);
         let above: Vec<f64> = both.map(|(a, b)| dot(minus(*b, *a), up)).collect();
@@ -429,13 +433,7 @@ fn passed(
 fn heights(courses: &[Course], is_closed: bool) -> Vec<f64> {
     let samples: Vec<_> = courses
         .iter()
-        .map(|course| {
-            samples(
-                &course.points,
-                is_closed,
-                1.0 - course.at[0] * f64::from(is_closed),
-            )
-        })
+        .map(|course| course.samples(is_closed))
         .collect();
     let mut heights = vec![0.0; courses.len()];
     let mut told = 0.0;
@@ -489,6 +487,30 @@ mod tests {
         let heights = heights(&courses, false);
         for (k, height) in heights.iter().enumerate() {
             assert!((height - 0.25 * k as f64).abs() < 0.02, "{heights:?}");
+        }
+    }
+
+    /// Open sections farther and farther from each other, but for their last points.
+    #[test]
+    fn heights_are_those_all_along_and_not_at_an_end() {
+        let course = |k: usize| {
+            let out = 0.5 * (k * k) as f64;
+            let place = |j: usize| [j as f64, if j == 15 { k as f64 } else { out }, 0.0];
+            Course {
+                name: String::new(),
+                points: (0..16).map(place).collect(),
+                at: (0..16).map(|j| j as f64 / 15.0).collect(),
+            }
+        };
+        let courses: Vec<Course> = (0..4).map(course).collect();
+        // Roots of 0.5, 1.5 and 2.5, but for what the ends add.
+        let roots = [0.0, 0.5, 1.5, 2.5].map(f64::sqrt);
+        let whole: f64 = roots.iter().sum();
+        let mut expected = 0.0;
+        for (height, root) in heights(&courses, false).iter().zip(roots) {
+            expected += root / whole;
+            // By the last points alone it would be 0.33 and 0.67.
+            assert!((height - expected).abs() < 0.04, "{height} {expected}");
         }
     }
 }
