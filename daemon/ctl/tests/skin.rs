@@ -204,6 +204,37 @@ fn bad_sections_are_refused_in_one_line_and_nothing_is_written() {
 }
 
 #[test]
+fn blocks_are_told_from_scans_by_their_points() {
+    let folder = tempfile::tempdir().unwrap();
+    // A header, then a blank line, then one cloud: a scan.
+    let cloud = format!("x y z\n\n{}", text(&roof()));
+    let output = skin(folder.path(), &cloud, &["--json", "--every-mm", "6"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(told["closed"], false);
+    // Blank lines between points: blocks.
+    let blocks = barrel(4, |_, _| ());
+    let lines = blocks.lines().map(|line| {
+        if line.starts_with("section") {
+            ""
+        } else {
+            line
+        }
+    });
+    let blocks: Vec<&str> = lines.collect();
+    let output = skin(folder.path(), &blocks.join("\n"), &["--json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(
+        (
+            told["closed"].clone(),
+            told["sections"].as_array().unwrap().len()
+        ),
+        (true.into(), 4)
+    );
+}
+
+#[test]
 fn sections_that_were_turned_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let file = barrel(5, |k, points| {

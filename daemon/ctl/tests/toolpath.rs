@@ -228,4 +228,22 @@ fn a_surface_of_a_scan_is_milled_as_it_was_written() {
         "{simulation}"
     );
     assert!(at.join("hill.nc").exists());
+    // An IGES file is known by its content.
+    fs::rename(at.join("hill.igs"), at.join("hill.dat")).unwrap();
+    let renamed: Vec<&str> = options
+        .iter()
+        .map(|o| if *o == "hill.igs" { "hill.dat" } else { o })
+        .collect();
+    let output = relief(at, &[&renamed[..], &more].concat());
+    assert!(output.status.success(), "{}", told(&output).1);
+    // What is read is not written, and what sees nothing is refused.
+    for (extra, word) in [
+        (["-o", "hill.dat"], "is read"),
+        (["--pitch-mm", "2"], "--pitch-mm 1.5"),
+    ] {
+        let output = relief(at, &[&renamed[..], &extra].concat());
+        let (_, error) = told(&output);
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        assert!(error.contains(word), "{error}");
+    }
 }

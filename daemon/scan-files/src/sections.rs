@@ -7,7 +7,7 @@
 use std::io::BufRead;
 
 use crate::error::ScanFileError;
-use crate::text::{Layout, Lines};
+use crate::text::{Layouts, Lines};
 use crate::units::Units;
 
 /// Most points of a file.
@@ -39,7 +39,7 @@ pub fn read_sections(
     let mut lines = Lines::new(reader, file);
     let mut sections = Vec::new();
     let mut own = RawSection::default();
-    let mut layout: Option<Layout> = None;
+    let mut layouts = Layouts::default();
     let mut count = 0;
     while let Some(line) = lines.next()? {
         let (number, content) = (line.number, line.text.trim());
@@ -53,17 +53,8 @@ pub fn read_sections(
             }
             continue;
         }
-        let layout = match &mut layout {
-            Some(layout) => layout,
-            slot @ None => {
-                let header = Layout::from_header(content);
-                let is_header = header.is_some();
-                let layout = slot.insert(header.unwrap_or_default());
-                if is_header {
-                    continue;
-                }
-                layout
-            }
+        let Some(layout) = layouts.of(content) else {
+            continue;
         };
         let point = layout
             .point(content)

@@ -1,5 +1,6 @@
 //! The surface as the finishing cutter sees it, in directions along and across the passes.
 
+use crate::cusp::level_step_mm;
 use crate::cutter::Cutter;
 use crate::surface::Surface;
 
@@ -50,6 +51,14 @@ impl<'a> Field<'a> {
     pub(crate) fn place(&self, s: f64, t: f64) -> [f64; 2] {
         let [x, y] = self.along;
         [s * x - t * y, s * y + t * x]
+    }
+
+    /// How many places there would be on passes that leave cusps of this height on level ground,
+    /// so far from each other along them; slopes have more.
+    pub(crate) fn places(&self, cusp_mm: f64, step_mm: f64) -> usize {
+        let count = |[from, to]: [f64; 2], step: f64| ((to - from) / step).ceil() as usize + 1;
+        let across = level_step_mm(&self.cutter, cusp_mm).max(1e-3);
+        count(self.t, across).saturating_mul(count(self.s, step_mm))
     }
 
     /// Height of the tip where the cutter mills the surface: it touches a face, or stands above the

@@ -145,6 +145,14 @@ pub enum MachineError {
     /// Two tools of one number.
     #[error("tools: number {0} is there twice")]
     Twice(u32),
+    /// Two tools of one cutter: which is meant would be a guess.
+    #[error("tools: numbers {} and {} both are {cutter}; leave one of them out", numbers[0], numbers[1])]
+    SameCutter {
+        /// Their numbers.
+        numbers: [u32; 2],
+        /// What both are.
+        cutter: Cutter,
+    },
     /// A tool that is asked for is not there.
     #[error("the machine has no tool {wanted}, only {there}: add it to its [[tools]]")]
     NoTool {
@@ -154,6 +162,9 @@ pub enum MachineError {
         there: String,
     },
 }
+
+/// Least step of roughing.
+const LEAST_STEP_MM: f64 = 0.01;
 
 impl Machine {
     /// Whether all of it makes sense.
@@ -208,6 +219,15 @@ impl Machine {
             {
                 return Err(MachineError::Twice(tool.number));
             }
+            let same = self.tools[..k]
+                .iter()
+                .find(|other| other.cutter == tool.cutter);
+            if let Some(same) = same {
+                return Err(MachineError::SameCutter {
+                    numbers: [same.number, tool.number],
+                    cutter: tool.cutter,
+                });
+            }
             self.validate_tool(tool)?;
         }
         Ok(())
@@ -225,8 +245,17 @@ impl Machine {
         )?;
         positive("flutes", f64::from(tool.flutes))?;
         positive("plunge_mm_per_min", tool.plunge_mm_per_min)?;
-        positive("step_down_mm", tool.step_down_mm)?;
-        positive("step_over_mm", tool.step_over_mm)?;
+        for (name, step_mm) in [
+            ("step_down_mm", tool.step_down_mm),
+            ("step_over_mm", tool.step_over_mm),
+        ] {
+            check(
+                &key(name),
+                step_mm,
+                step_mm >= LEAST_STEP_MM,
+                "0.01 at least",
+            )?;
+        }
         let most = 2.0 * tool.cutter.radius_mm();
         check(
             &key("step_over_mm"),

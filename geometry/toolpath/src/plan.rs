@@ -36,6 +36,11 @@ pub struct Plan {
     pub notes: Vec<String>,
 }
 
+/// More lines of roughing, and more places of finishing passes on level ground, are not planned:
+/// they would be gigabytes of moves.
+const MOST_LINES: usize = 1_000_000;
+const MOST_PLACES: usize = 50_000_000;
+
 /// Plans the milling of a surface on a machine.
 ///
 /// # Errors
@@ -107,6 +112,15 @@ fn roughing(
     rough: &Rough<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Operation, ToolpathError> {
+    let lines = rough.lines();
+    if lines > MOST_LINES {
+        return Err(ToolpathError::TooMany {
+            what: "lines of roughing",
+            wanted: lines,
+            most: MOST_LINES,
+            mend: "give the tool a larger step_down_mm or step_over_mm",
+        });
+    }
     let levels = rough.levels(monitor)?;
     let feeds_mm_per_min = machine.feeds_mm_per_min(machine.tool(&cutter)?);
     let mut moves = Vec::new();
@@ -151,6 +165,15 @@ fn finishing(
         tolerance_mm,
         arcs: settings.arcs,
     };
+    let places = field.places(cusp_mm, drawing.fineness.step_mm);
+    if places > MOST_PLACES {
+        return Err(ToolpathError::TooMany {
+            what: "places of finishing passes",
+            wanted: places,
+            most: MOST_PLACES,
+            mend: "choose a larger scallop",
+        });
+    }
     let ways = Part::new(monitor, 0.0, 0.6);
     let Some((lines, steep_share)) = (match settings.pattern {
         Pattern::Parallel => {

@@ -54,6 +54,15 @@ impl Rough<'_> {
         }
     }
 
+    /// How many lines there are to be looked at, on all levels.
+    pub(crate) fn lines(&self) -> usize {
+        let [low, high] = self.surface.bounds_mm();
+        let across = high[1] - low[1] + 2.0 * self.grown.radius_mm();
+        let depth = (self.top_mm - low[2]).max(self.step_down_mm);
+        let count = |length: f64, step: f64| (length / step).ceil() as usize + 1;
+        count(across, self.step_over_mm).saturating_mul(count(depth, self.step_down_mm))
+    }
+
     /// All levels, the highest first.
     pub(crate) fn levels(&self, monitor: &dyn Monitor) -> Result<Vec<Level>, Cancelled> {
         let [low, high] = self.surface.bounds_mm();

@@ -284,3 +284,36 @@ fn a_cutter_that_would_turn_too_fast_is_refused() {
     let rpm = machine.spindle_rpm(&machine.tools[0]);
     assert!(rpm <= 4000.0, "{rpm}");
 }
+
+#[test]
+fn what_would_take_gigabytes_or_be_a_guess_is_refused() {
+    let wide = surface(&graph([600.0, 400.0], 20.0, |x, _| 0.1 * x));
+    let mut machine = machine(&wide, &["ball:6", "flat:10"]);
+    for travel in [&mut machine.travel.x_mm, &mut machine.travel.y_mm] {
+        *travel = [-2000.0, 2000.0];
+    }
+    let refused = |machine: &Machine, settings: &Settings| {
+        plan(&wide, machine, settings, &Unmonitored)
+            .unwrap_err()
+            .to_string()
+    };
+    let fine = Settings {
+        scallop_mm: 1e-4,
+        ..Settings::finishing("ball:6".parse().unwrap())
+    };
+    let error = refused(&machine, &fine);
+    assert!(error.contains("choose a larger scallop"), "{error}");
+    let rough = Settings {
+        rough: Some("flat:10".parse().unwrap()),
+        ..Settings::finishing("ball:6".parse().unwrap())
+    };
+    let mut many = machine.clone();
+    (many.tools[1].step_down_mm, many.tools[1].step_over_mm) = (0.01, 0.01);
+    assert!(refused(&many, &rough).contains("step_down_mm or step_over_mm"));
+    many.tools[1].step_down_mm = 1e-6;
+    assert!(refused(&many, &rough).contains("0.01 at least"));
+    let mut twice = machine.clone();
+    twice.tools[1].cutter = twice.tools[0].cutter;
+    let error = refused(&twice, &fine);
+    assert!(error.contains("numbers 1 and 2 both are ball:6"), "{error}");
+}

@@ -29,6 +29,30 @@ struct Named {
     intensity: Option<usize>,
 }
 
+/// Which values of a line are which, once its first line has told.
+#[derive(Debug, Default)]
+pub(crate) struct Layouts(Option<Layout>);
+
+impl Layouts {
+    /// The layout of a line of values; `None` for the header that may be the first line.
+    pub(crate) fn of(&mut self, content: &str) -> Option<&Layout> {
+        if self.0.is_none() {
+            let header = Layout::from_header(content);
+            let is_header = header.is_some();
+            self.0 = Some(header.unwrap_or_default());
+            if is_header {
+                return None;
+            }
+        }
+        self.0.as_ref()
+    }
+
+    /// Whether a header names an intensity.
+    pub(crate) fn names_intensity(&self) -> bool {
+        self.0.as_ref().is_some_and(Layout::names_intensity)
+    }
+}
+
 impl Layout {
     /// The layout a header line gives, or `None` if the line holds numbers. A header that
     /// does not name x, y and z says nothing: the first three values are taken.

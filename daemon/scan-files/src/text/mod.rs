@@ -9,14 +9,14 @@ use crate::error::{Place, ScanFileError};
 use crate::gather::Gather;
 use crate::units::Units;
 
-pub(crate) use fields::Layout;
+pub(crate) use fields::Layouts;
 use fields::Problem;
 pub(crate) use lines::Lines;
 
 pub(crate) fn parse(reader: impl BufRead, gather: &mut Gather<'_>) -> Result<(), ScanFileError> {
     let units = gather.options.units.unwrap_or(Units::Millimetre);
     let mut lines = Lines::new(reader, gather.file);
-    let mut layout: Option<Layout> = None;
+    let mut layouts = Layouts::default();
     let mut surplus = 0_usize;
     while let Some(line) = lines.next()? {
         let number = line.number;
@@ -24,17 +24,8 @@ pub(crate) fn parse(reader: impl BufRead, gather: &mut Gather<'_>) -> Result<(),
         if content.is_empty() {
             continue;
         }
-        let layout = match &mut layout {
-            Some(layout) => layout,
-            slot @ None => {
-                let header = Layout::from_header(content);
-                let is_header = header.is_some();
-                let layout = slot.insert(header.unwrap_or_default());
-                if is_header {
-                    continue;
-                }
-                layout
-            }
+        let Some(layout) = layouts.of(content) else {
+            continue;
         };
         match layout.point(content) {
             Ok(point) => {
@@ -54,7 +45,7 @@ pub(crate) fn parse(reader: impl BufRead, gather: &mut Gather<'_>) -> Result<(),
     if surplus > 0 {
         gather.note(format!(
             "up to {surplus} further value(s) on a line were ignored; only x, y, z{} were read",
-            if layout.is_some_and(|l| l.names_intensity()) {
+            if layouts.names_intensity() {
                 " and the intensity"
             } else {
                 ""

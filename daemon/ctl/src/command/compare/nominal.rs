@@ -28,7 +28,7 @@ const MOST_BYTES: u64 = 1 << 30;
 /// whose lengths are of `unit_mm`, millimetres where that is not said.
 pub(super) fn read(path: &Path, unit_mm: Option<f64>) -> Result<Nominal, Failure> {
     let name = path.display();
-    let (vertices, facets) = triangles(path, unit_mm, "a nominal")?;
+    let (vertices, facets) = triangles(path, unit_mm, ("a nominal", "STEP and STL"))?;
     Nominal::new(&vertices, &facets).map_err(|error| match error {
         NominalError::Empty => Failure::Failed(format!("{name}: holds no facet")),
         other => Failure::Failed(format!("{name}: {other}")),
@@ -36,7 +36,11 @@ pub(super) fn read(path: &Path, unit_mm: Option<f64>) -> Result<Nominal, Failure
 }
 
 /// Vertices, millimetres, and triangles of such a file; `role` is what it is read as, in messages.
-pub(crate) fn triangles(path: &Path, unit_mm: Option<f64>, role: &str) -> Result<Indexed, Failure> {
+pub(crate) fn triangles(
+    path: &Path,
+    unit_mm: Option<f64>,
+    (role, formats): (&str, &str),
+) -> Result<Indexed, Failure> {
     let name = path.display().to_string();
     let failed = |why: &str| Failure::Failed(format!("{name}: {why}"));
     if path.is_dir() {
@@ -71,7 +75,7 @@ pub(crate) fn triangles(path: &Path, unit_mm: Option<f64>, role: &str) -> Result
     }
     if let Some(format) = other_format(&head) {
         return Err(failed(&format!(
-            "is {format}, which is not read as {role}; only STEP and STL are: export the model as \
+            "is {format}, which is not read as {role}; only {formats} are: export the model as \
              STEP, or as STL with a chord error well below the tolerance"
         )));
     }
@@ -220,9 +224,20 @@ fn facets(source: &mut (impl Read + Seek), unit_mm: f64) -> Result<Indexed, Stri
 }
 
 /// What a file is that is no STL.
+/// Whether a file is an IGES file, by its first line.
+pub(crate) fn is_iges(path: &Path) -> bool {
+    let mut head = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(80).read_to_end(&mut head));
+    read.is_ok() && begins_iges(&head)
+}
+
+fn begins_iges(head: &[u8]) -> bool {
+    head.get(72) == Some(&b'S') && head.get(73..80).is_some_and(is_number)
+}
+
 fn other_format(head: &[u8]) -> Option<&'static str> {
     let text = head.trim_ascii_start();
-    let is_iges = head.get(72) == Some(&b'S') && head.get(73..80).is_some_and(is_number);
+    let is_iges = begins_iges(head);
     let known: [(&[u8], &str); 6] = [
         (b"ply", "a PLY file"),
         (b"PK\x03\x04", "a ZIP archive or 3MF file"),

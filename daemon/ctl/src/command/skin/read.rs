@@ -18,6 +18,9 @@ pub(super) struct Sections {
     pub(super) notes: Vec<String>,
 }
 
+/// By so many bytes of a text file it is told whether it has sections in blocks.
+const MOST_LOOKED_AT: u64 = 1 << 24;
+
 /// What a file is, by its content.
 enum Kind {
     /// Curves or chains of points in IGES.
@@ -51,7 +54,7 @@ fn opened(path: &Path) -> Result<File, Failure> {
 /// points, or one that begins with `section`, is in blocks; all else is a scan.
 fn kind(path: &Path) -> Result<Kind, Failure> {
     let name = path.display().to_string();
-    let mut source = unpacked(opened(path)?, &name)?;
+    let source = unpacked(opened(path)?, &name)?;
     let head = source.head();
     if head.len() > 72 && head[72] == b'S' {
         return Ok(Kind::Curves);
@@ -59,28 +62,27 @@ fn kind(path: &Path) -> Result<Kind, Failure> {
     if head.starts_with(b"ply") || head.contains(&0) {
         return Ok(Kind::Scan);
     }
-    let mut text = String::new();
-    let Ok(_) = source.read_to_string(&mut text) else {
+    let mut head = Vec::new();
+    if source.take(MOST_LOOKED_AT).read_to_end(&mut head).is_err() {
+        // Whoever reads it tells what is wrong with it.
         return Ok(Kind::Scan);
-    };
-    let mut is_within = false;
-    let mut was_blank = false;
-    for line in text.lines().map(str::trim) {
+    }
+    let (mut is_within, mut was_blank) = (false, false);
+    for line in String::from_utf8_lossy(&head).lines().map(str::trim) {
         if line.is_empty() {
             was_blank = is_within;
-            continue;
-        }
-        if line.starts_with('#') {
-            continue;
-        }
-        if was_blank
-            || line
-                .get(..7)
-                .is_some_and(|word| word.eq_ignore_ascii_case("section"))
+        } else if line
+            .get(..7)
+            .is_some_and(|word| word.eq_ignore_ascii_case("section"))
         {
             return Ok(Kind::Blocks);
+        } else if line.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) {
+            // A point; neither a comment nor a header.
+            if was_blank {
+                return Ok(Kind::Blocks);
+            }
+            is_within = true;
         }
-        is_within = true;
     }
     Ok(Kind::Scan)
 }

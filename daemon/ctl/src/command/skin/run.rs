@@ -155,7 +155,10 @@ fn told(
     warnings: Vec<String>,
 ) -> Skinned {
     let section = |(k, name): (usize, &String)| {
-        let own = found.deviations.iter().filter(|own| own.section == k);
+        let from = found.deviations.partition_point(|own| own.section < k);
+        let own = found.deviations[from..]
+            .iter()
+            .take_while(|own| own.section == k);
         let (mut points, mut squares, mut max_mm) = (0_usize, 0.0, 0.0_f64);
         for own in own {
             points += 1;

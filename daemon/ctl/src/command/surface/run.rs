@@ -130,7 +130,7 @@ fn surface_of_file(args: &Args, shown: &Shown) -> Result<Surfaced, Failure> {
     };
     shown.begin("surface");
     let made = make(&settings)?;
-    let mut placements = Vec::new();
+    let (mut placements, mut refusals) = (Vec::new(), Vec::new());
     if args.compare {
         for placement in Placement::ALL {
             if placement == settings.placement {
@@ -138,10 +138,15 @@ fn surface_of_file(args: &Args, shown: &Shown) -> Result<Surfaced, Failure> {
                 continue;
             }
             shown.begin(placement.as_str());
-            placements.push(Figures::of(&make(&Settings {
+            match make(&Settings {
                 placement,
                 ..settings
-            })?));
+            }) {
+                Ok(made) => placements.push(Figures::of(&made)),
+                Err(Failure::Interrupted) => return Err(Failure::Interrupted),
+                // The surface that was asked for is there; only this row is not.
+                Err(why) => refusals.push(format!("{}: {why}", placement.as_str())),
+            }
         }
     }
     shown.begin("write");
@@ -172,6 +177,7 @@ fn surface_of_file(args: &Args, shown: &Shown) -> Result<Surfaced, Failure> {
         .map(|note| format!("{}: {note}", args.scan.display()))
         .collect();
     warnings.extend(remarks(&made, &settings));
+    warnings.extend(refusals);
     Ok(Surfaced {
         output,
         file: written,

@@ -19,9 +19,9 @@ const JOIN_MM: f64 = 1e-9;
 /// Reads a STEP or STL file, or an IGES file as `relief convert`, `relief surface` or `relief skin`
 /// write it.
 pub(super) fn read(path: &Path) -> Result<Indexed, Failure> {
-    let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-    if !path.is_file() || (ending != "igs" && ending != "iges") {
-        return nominal::triangles(path, None, "a model to be milled");
+    if !nominal::is_iges(path) {
+        let role = ("a model to be milled", "STEP, IGES and STL");
+        return nominal::triangles(path, None, role);
     }
     let name = path.display();
     let file =

@@ -102,9 +102,28 @@ fn mill(args: &Args, shown: &Shown) -> Result<Planned, Failure> {
     let plan = toolpath::plan(&surface, &machine, &settings, shown).map_err(refused)?;
     shown.begin("simulate");
     let pitch_mm = args.pitch_mm.unwrap_or_else(|| pitch_mm(&surface));
+    let finest = [Some(settings.finish), settings.rough]
+        .into_iter()
+        .flatten();
+    let radius_mm = finest
+        .map(|cutter| cutter.radius_mm())
+        .fold(f64::INFINITY, f64::min);
+    if pitch_mm > radius_mm / 2.0 {
+        return Err(Failure::Usage(format!(
+            "a simulation every {pitch_mm} mm would not see cutters of radius {radius_mm} mm; \
+             choose --pitch-mm {} or less",
+            radius_mm / 2.0
+        )));
+    }
     let field = simulated(&surface, &machine, &plan, pitch_mm, shown).map_err(refused)?;
     let deviations = field.deviations_mm(&surface);
     let simulation = measured(&field, &deviations);
+    if simulation.nodes == 0 {
+        return Err(Failure::Failed(format!(
+            "{}: no place of the model could be simulated; choose a finer --pitch-mm",
+            args.model.display()
+        )));
+    }
     if simulation.gouge_mm > MOST_GOUGE_MM {
         return Err(Failure::Failed(format!(
             "{}: the simulation cuts {:.4} mm too deep; nothing is written. Please report it with the \
