@@ -22,8 +22,8 @@ use crate::problem::Problem;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// Greatest distance in z between surface and data points, millimetres. The surface keeps
-    /// to it with uniform and optimal knots; the polyline's vertices are found with it;
-    /// derivative knots do not look at it.
+    /// to it with optimal knots, and with uniform ones as far as doubled spans of two nodes and
+    /// more can; the polyline's vertices are found with it; derivative knots do not look at it.
     pub tolerance_mm: f64,
     /// How knots are placed.
     pub placement: Placement,
