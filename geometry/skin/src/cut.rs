@@ -93,6 +93,7 @@ pub fn cut(image: &RangeImage, every_rows: usize) -> Cut {
             name: format!("the row at y = {:.2} mm", image.y_mm(row)),
             points: (run.from..run.to).filter_map(place).collect(),
             is_closed: false,
+            is_directed: true,
         }
     };
     let sections: Vec<Section> = taken.iter().map(section).collect();

@@ -12,6 +12,8 @@ pub struct Section {
     pub points: Vec<[f64; 3]>,
     /// Whether the last point is followed by the first.
     pub is_closed: bool,
+    /// Whether its sense is known to be that of the others, as of rows of a grid: it is not turned.
+    pub is_directed: bool,
 }
 
 /// Points nearer than this part of the section's size are one.
@@ -40,6 +42,7 @@ impl Section {
             name,
             points,
             is_closed,
+            is_directed: false,
         }
     }
 
@@ -118,6 +121,7 @@ mod tests {
             name: "b".into(),
             points: ring(2, 1.0),
             is_closed: true,
+            is_directed: false,
         };
         let error = two.distinct().unwrap_err();
         assert_eq!(

@@ -69,6 +69,7 @@ struct Loose {
     name: String,
     points: Vec<[f64; 3]>,
     center: [f64; 3],
+    is_directed: bool,
 }
 
 impl Stack {
@@ -83,6 +84,7 @@ impl Stack {
                 name: section.name.clone(),
                 center: middle(&points),
                 points,
+                is_directed: section.is_directed,
             });
         }
         let is_closed = all_alike(sections)?;
@@ -230,7 +232,9 @@ fn turn(
     let mut turned = Vec::new();
     for k in 1..loose.len() {
         let (before, own) = (&loose[k - 1], &loose[k]);
-        let is_same = if is_closed {
+        let is_same = if before.is_directed && own.is_directed {
+            Some(true)
+        } else if is_closed {
             same_around(before, own)
         } else {
             same_along(before, own)

@@ -23,6 +23,7 @@ pub(crate) fn section(name: &str, points: Vec<[f64; 3]>) -> Section {
         name: name.into(),
         points,
         is_closed: true,
+        is_directed: false,
     }
 }
 

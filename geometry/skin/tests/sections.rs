@@ -22,6 +22,7 @@ fn closed(k: usize, points: Vec<[f64; 3]>) -> Section {
         name: format!("section {k}"),
         points,
         is_closed: true,
+        is_directed: false,
     }
 }
 
@@ -331,4 +332,26 @@ fn a_search_ends_soon_after_it_is_cancelled() {
         let asked = monitor.0.load(std::sync::atomic::Ordering::Relaxed);
         assert!(asked < 60, "{asked}");
     }
+}
+
+/// Arcs nearly all around, each farther around than the one before: their ends tell nothing.
+#[test]
+fn sections_whose_sense_is_known_are_not_turned() {
+    let arc = |k: usize, is_directed: bool| {
+        let mut points = ring(50.0, 10.0 * k as f64, 90, 30 * k);
+        points.truncate(88);
+        Section {
+            name: format!("section {}", k + 1),
+            points,
+            is_closed: false,
+            is_directed,
+        }
+    };
+    let stack =
+        |is_directed: bool| -> Vec<Section> { (0..3).map(|k| arc(k, is_directed)).collect() };
+    let refused = skinned(&stack(false), &Settings::new(1.0));
+    let is_turned = |found: &Skin| !found.warnings.is_empty();
+    assert!(refused.as_ref().map_or(true, is_turned), "{refused:?}");
+    let taken = skinned(&stack(true), &Settings::new(1.0)).unwrap();
+    assert_eq!(taken.warnings, []);
 }

@@ -129,6 +129,7 @@ fn blocks(args: &Args) -> Result<Sections, Failure> {
                 name: own,
                 points: raw.points,
                 is_closed,
+                is_directed: false,
             },
             None => Section::by_its_ends(own, raw.points),
         }
