@@ -48,41 +48,14 @@ impl Run {
     }
 }
 
-/// Cuts a range image into its rows, every so many of them: of each row the run of nodes without a
-/// gap or a step that goes on what was taken of the row below, beginning with the longest of all.
-/// The body ends where no run of a row goes on.
+/// Cuts a range image into its rows, every so many of them: of each row a run of nodes without a gap
+/// or a step, so that each goes on that of the row below and they have as many nodes as can be.
 #[must_use]
 pub fn cut(image: &RangeImage, every_rows: usize) -> Cut {
     let every = every_rows.max(1);
     let rows: Vec<usize> = (0..image.rows()).step_by(every).collect();
     let runs: Vec<Vec<Run>> = rows.iter().map(|row| runs(image, *row)).collect();
-    let longest = |runs: &Vec<Run>| runs.iter().map(|run| run.length()).max().unwrap_or(0);
-    let start = (0..rows.len())
-        .max_by_key(|k| longest(&runs[*k]))
-        .unwrap_or(0);
-    let first = runs
-        .get(start)
-        .and_then(|runs| runs.iter().max_by_key(|run| run.length()));
-    let mut taken: Vec<(usize, Run)> = first.map(|run| (start, *run)).into_iter().collect();
-    let goes_on = |before: Run, k: usize| {
-        let best = runs[k]
-            .iter()
-            .copied()
-            .max_by_key(|run| run.overlap(before))?;
-        best.goes_on(before).then_some((k, best))
-    };
-    for k in start + 1..rows.len() {
-        let Some(next) = taken.last().and_then(|(_, before)| goes_on(*before, k)) else {
-            break;
-        };
-        taken.push(next);
-    }
-    for k in (0..start).rev() {
-        let Some(next) = taken.first().and_then(|(_, before)| goes_on(*before, k)) else {
-            break;
-        };
-        taken.insert(0, next);
-    }
+    let taken = chain(&runs);
     let section = |(k, run): &(usize, Run)| {
         let row = rows[*k];
         let place = |column: usize| {
@@ -109,6 +82,37 @@ pub fn cut(image: &RangeImage, every_rows: usize) -> Cut {
         nodes,
         left_out: all - nodes,
     }
+}
+
+/// The runs of neighbouring rows that go on each other and have the most nodes together: for each run
+/// the best that ends with it follows from those of the row below.
+fn chain(runs: &[Vec<Run>]) -> Vec<(usize, Run)> {
+    let mut best: Vec<Vec<(usize, Option<usize>)>> = Vec::with_capacity(runs.len());
+    for (k, of_row) in runs.iter().enumerate() {
+        let ending = |run: &Run| {
+            let below = k.checked_sub(1).map(|k| runs[k].iter().zip(&best[k]));
+            let below = below.into_iter().flatten().enumerate();
+            let before = below.filter(|(_, (other, _))| run.goes_on(**other));
+            let before = before.max_by_key(|(_, (_, (nodes, _)))| *nodes);
+            match before {
+                Some((which, (_, (nodes, _)))) => (nodes + run.length(), Some(which)),
+                None => (run.length(), None),
+            }
+        };
+        best.push(of_row.iter().map(ending).collect());
+    }
+    let ends = best.iter().enumerate();
+    let ends = ends.flat_map(|(k, of_row)| (0..of_row.len()).map(move |which| (k, which)));
+    let mut at = ends.max_by_key(|(k, which)| best[*k][*which].0);
+    let mut taken = Vec::new();
+    while let Some((k, which)) = at {
+        taken.push((k, runs[k][which]));
+        at = best[k][which]
+            .1
+            .and_then(|before| Some((k.checked_sub(1)?, before)));
+    }
+    taken.reverse();
+    taken
 }
 
 /// The runs of a row that are long enough for a section.
@@ -149,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_go_on_from_the_longest_as_far_as_they_hang_together() {
+    fn rows_go_on_as_far_as_they_hang_together() {
         let lattice = Lattice { pitch_mm: 0.5 };
         let mut image = RangeImage::masked(lattice, 0, 0, 40, 12);
         for row in 0..12 {
@@ -162,10 +166,10 @@ mod tests {
         }
         let found = cut(&image, 3);
         let lengths: Vec<usize> = found.sections.iter().map(|own| own.points.len()).collect();
-        // Rows 0, 3 and 6, of which the part that overlaps the more; row 9 is empty, so that the body
+        // Rows 0, 3 and 6, of which the longer part; row 9 is empty, so that the body
         // ends there.
-        assert_eq!(lengths, [25, 18, 10]);
-        assert_eq!((found.nodes, found.left_out), (53, 15));
+        assert_eq!(lengths, [25, 18, 15]);
+        assert_eq!((found.nodes, found.left_out), (58, 10));
         assert_eq!(found.sections[1].name, "the row at y = 1.50 mm");
         assert_eq!(found.sections[1].points[0], [6.0, 1.5, 1.0]);
     }
@@ -189,5 +193,23 @@ mod tests {
         let lengths: Vec<usize> = found.sections.iter().map(|own| own.points.len()).collect();
         assert_eq!(lengths, [21, 10]);
         assert_eq!(found.left_out, 10 + 18);
+    }
+
+    #[test]
+    fn the_body_is_where_most_nodes_hang_together() {
+        let lattice = Lattice { pitch_mm: 0.5 };
+        let mut image = RangeImage::masked(lattice, 0, 0, 60, 8);
+        for row in 0..8 {
+            // One wide row to the left, and eight narrow ones to the right.
+            let wide = if row == 4 { 0..30 } else { 0..0 };
+            for column in wide.chain(40..50) {
+                image.set_z_mm(column, row, Some(1.0));
+            }
+        }
+        let found = cut(&image, 1);
+        assert_eq!(
+            (found.sections.len(), found.nodes, found.left_out),
+            (8, 80, 30)
+        );
     }
 }
