@@ -10,11 +10,13 @@ use crate::failure::Failure;
 
 /// Mill a model: NC code for a machine, without a service
 ///
-/// Reads a STEP file, an IGES file as `convert` writes it, or an STL file in millimetres, z towards
-/// the spindle, and leads the cutter over its faces: exact contact, nothing is cut too deep, and the cusps between passes are as high as
-/// asked for. Roughing before, if a cutter for it is named. Travel, stock, fixtures, tools, feeds and
-/// the control's dialect come from the machine's file, in the model's coordinates but for the travel.
-/// The result is checked by a simulated removal of the stock.
+/// Reads a STEP file, an IGES file as `convert`, `surface` or `skin` write it, or an STL file in
+/// millimetres, z towards the spindle, and leads the cutter over its faces by exact contact, so that
+/// the cusps between passes are as high as asked for. Roughing before, if a cutter for it is named.
+/// Travel, stock, fixtures, tools, feeds and the control's dialect come from the machine's file, in
+/// the model's coordinates but for travel and work offset. The result is checked by a simulated removal
+/// of the stock: what moves into material with rapid, or cuts more than 0.01 mm too deep, is not
+/// written.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The model: a STEP, IGES or STL file
@@ -35,7 +37,7 @@ pub(crate) struct Args {
     /// Height of the cusps between finishing passes, millimetres
     #[arg(long, value_name = "MM", default_value_t = 0.01)]
     scallop_mm: f64,
-    /// How far above contact the cutter may be led to make moves longer, millimetres; never below
+    /// How far above contact the cutter may be led to make moves longer, millimetres
     #[arg(long, value_name = "MM", default_value_t = 0.005)]
     tolerance_mm: f64,
     /// Finishing passes: straight ones, or such that all cusps are of one height (ball cutters)
