@@ -1,4 +1,4 @@
-//! The experiments of Shim & Lee 1995 and of Koo & Lee, and the pages about them.
+//! The experiments of Shim & Lee 1995, of Koo & Lee and of Jo, Kwon & Han, and the pages about them.
 
 use std::ffi::OsString;
 
@@ -9,9 +9,20 @@ use crate::{judge, shell, study};
 
 const PROGRAM: &str = "study-reproduction";
 const PAGE: &str = "docs/reproduction.md";
-/// Koo & Lee, by a program of its own, which draws its pictures itself.
-const SURFACES: [&str; 2] = ["relief-surfaces", "study-surfaces"];
-const SURFACES_PAGE: &str = "docs/reproduction-koo-lee.md";
+/// Package, program and page of those whose programs draw their pictures themselves: Koo & Lee; Jo,
+/// Kwon & Han.
+const DRAWN: [[&str; 3]; 2] = [
+    [
+        "relief-surfaces",
+        "study-surfaces",
+        "docs/reproduction-koo-lee.md",
+    ],
+    [
+        "relief-sections",
+        "study-sections",
+        "docs/reproduction-jo-kwon-han.md",
+    ],
+];
 const PICTURES: &str = "docs/pictures/reproduction";
 
 #[derive(Debug, Args)]
@@ -29,18 +40,20 @@ pub(crate) struct Options {
 
 pub(crate) fn run(options: &Options) -> Result<()> {
     let words = |words: &[&str]| -> Vec<OsString> { words.iter().map(Into::into).collect() };
-    let surfaces = |option: &str| {
-        let words = words(&[option, SURFACES_PAGE]);
-        study::program_of(SURFACES[0], SURFACES[1], &words)
+    let drawn = |option: &str| {
+        let mut all = DRAWN.into_iter();
+        all.try_for_each(|[package, program, page]| {
+            study::program_of(package, program, &words(&[option, page]))
+        })
     };
     if options.check {
-        surfaces("--check-paper")?;
+        drawn("--check-paper")?;
         return study::program(PROGRAM, &words(&["--check", PAGE]));
     }
     if let Some(part) = &options.print {
         return study::program(PROGRAM, &words(&["--print", part]));
     }
-    surfaces("--write-paper")?;
+    drawn("--write-paper")?;
     if options.no_pictures {
         return study::program(PROGRAM, &words(&["--write", PAGE]));
     }

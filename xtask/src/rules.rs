@@ -85,7 +85,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("relief-tests", &EVERYTHING),
     ("relief-studies", &STUDIES),
+    ("relief-sections", &["nurbs", "range-image", "skin"]),
     (
+        "relief-sections",
         "relief-surfaces",
         &["nurbs", "range-image", "regrid", "scan-files", "surfacing"],
     ),

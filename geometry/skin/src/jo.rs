@@ -18,7 +18,7 @@ use crate::settings::Settings;
 use crate::spread::{averaged, column_of};
 use crate::stack::{Course, Stack};
 use crate::surface::{Counts, Skin, finished};
-use approximate::approximated;
+use approximate::{approximated, interpolated};
 use remove::{Bounded, thinned};
 
 /// Knots nearer than this are one.
@@ -27,19 +27,57 @@ const SAME_KNOT: f64 = 1e-12;
 /// Control points of all curves over the knots of all: more would take gigabytes, and days.
 const MOST_NUMBERS: usize = 2_000_000;
 
+/// A section's curves by the paper, open at its seam.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SectionCurves {
+    /// Its data points from its start on, millimetres; the first of a closed section is the last again.
+    pub points: Vec<[f64; 3]>,
+    /// Through all of them (Fig. 1).
+    pub interpolating: BSplineCurve<3>,
+    /// With as many control points as the tolerance takes (Fig. 2).
+    pub approximating: BSplineCurve<3>,
+}
+
+/// The curves of all sections, in the order of their stack: sections 2.1 and 2.2 of the paper, before
+/// it makes a surface of them.
+pub(crate) fn curves(
+    mut stack: Stack,
+    tolerance_mm: f64,
+    monitor: &dyn Monitor,
+) -> Result<Vec<SectionCurves>, SkinError> {
+    opened(&mut stack);
+    let of = |course: &Course| {
+        monitor.check()?;
+        let undetermined = || SkinError::Undetermined {
+            section: course.name.clone(),
+        };
+        let approximating = approximated(course, tolerance_mm, monitor)?;
+        Ok(SectionCurves {
+            points: course.points.clone(),
+            interpolating: interpolated(course).ok_or_else(undetermined)?,
+            approximating: approximating.ok_or_else(undetermined)?,
+        })
+    };
+    stack.courses.iter().map(of).collect()
+}
+
+/// The paper's curves end where they begin.
+fn opened(stack: &mut Stack) {
+    if stack.is_closed {
+        for course in &mut stack.courses {
+            course.points.extend(course.points.first().copied());
+            course.at.push(1.0);
+        }
+    }
+}
+
 pub(crate) fn skin(
     mut stack: Stack,
     settings: &Settings,
     monitor: &dyn Monitor,
 ) -> Result<Skin, SkinError> {
     let tolerance_mm = settings.tolerance_mm;
-    if stack.is_closed {
-        // The paper's curves end where they begin.
-        for course in &mut stack.courses {
-            course.points.extend(course.points.first().copied());
-            course.at.push(1.0);
-        }
-    }
+    opened(&mut stack);
     let mut bounded = Vec::with_capacity(stack.courses.len());
     for (k, course) in stack.courses.iter().enumerate() {
         monitor.check()?;

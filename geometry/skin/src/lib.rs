@@ -29,6 +29,7 @@ use range_image::Monitor;
 
 pub use cut::{Cut, cut};
 pub use error::SkinError;
+pub use jo::SectionCurves;
 pub use measure::Deviation;
 pub use section::Section;
 pub use settings::{Method, Settings, SettingsError};
@@ -50,4 +51,26 @@ pub fn skin(
         Method::Jo => jo::skin(stack, settings, monitor),
         Method::Relief => surface::skin(stack, settings, monitor),
     }
+}
+
+/// The curves that [`Method::Jo`] has of each section before it makes a surface of them, in the
+/// order of their stack.
+///
+/// # Errors
+/// [`SkinError`], which names the section that is at fault.
+pub fn section_curves(
+    sections: &[Section],
+    tolerance_mm: f64,
+    monitor: &dyn Monitor,
+) -> Result<Vec<SectionCurves>, SkinError> {
+    let settings = Settings {
+        method: Method::Jo,
+        ..Settings::new(tolerance_mm)
+    };
+    settings.check()?;
+    jo::curves(
+        stack::Stack::of(sections, &settings)?,
+        tolerance_mm,
+        monitor,
+    )
 }

@@ -32,7 +32,7 @@ const FEW_ROWS: usize = 24;
 const FEWER_ROWS: f64 = 0.85;
 
 /// So many numbers of rows in turn that do not do are enough: fewer do not either.
-const FAILURES: usize = 4;
+const FAILURES: usize = 8;
 
 /// Fewest rows.
 const LEAST_ROWS: usize = 4;

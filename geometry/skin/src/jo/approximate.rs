@@ -40,7 +40,7 @@ pub(super) fn approximated(
 }
 
 /// The curve through all data points; knots by averaging (Piegl & Tiller 1997, equation 9.8).
-fn interpolated(course: &Course) -> Option<BSplineCurve<3>> {
+pub(super) fn interpolated(course: &Course) -> Option<BSplineCurve<3>> {
     let at = &course.at;
     let inner =
         (1..at.len() - DEGREE).map(|j| at[j..j + DEGREE].iter().sum::<f64>() / DEGREE as f64);
