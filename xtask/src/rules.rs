@@ -103,7 +103,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-const DELIVERABLES: [&str; 13] = [
+const DELIVERABLES: [&str; 16] = [
     "cad-exchange",
     "compare",
     "mesh-files",
@@ -115,8 +115,11 @@ const DELIVERABLES: [&str; 13] = [
     "regrid",
     "segment",
     "shapes",
+    "skin",
     "storage",
+    "surfacing",
     "tessellate",
+    "toolpath",
 ];
 
 const DAEMON: [&str; 15] = [

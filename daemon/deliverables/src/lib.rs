@@ -12,6 +12,7 @@ mod deviations;
 mod export;
 mod file;
 mod filed;
+mod further;
 mod manifest;
 mod meshes;
 pub mod picture;
@@ -29,6 +30,12 @@ pub use export::{
 };
 pub use file::{hexadecimal, sha256_of, write_atomically};
 pub use filed::{PageFormat, PageFormats, comparison_page, scan_page};
+pub use further::{
+    CharacterLineFigures, FairingFigures, HeightSurface, MachineFile, MachineFileError, MillError,
+    Milled, OperationFigures, SectionFigures, SimulationFigures, SkinCounts, SkinDeviation,
+    SkinFigures, SurfaceFigures, SurfaceWords, SurfacesError, cut_remark, mill, rows_of,
+    surface_pictures, surface_remarks, write_height_surfaces,
+};
 pub use manifest::{MANIFEST_NAME, Manifest, ManifestFile};
 pub use meshes::{
     MeasuredPoints, MeshFormat, MeshOptions, PointFormat, TrianglesError, mesh_report, triangles,
