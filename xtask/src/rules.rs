@@ -122,7 +122,7 @@ const DELIVERABLES: [&str; 16] = [
     "toolpath",
 ];
 
-const DAEMON: [&str; 15] = [
+const DAEMON: [&str; 18] = [
     "cad-exchange",
     "deliverables",
     "nurbs",
@@ -137,7 +137,10 @@ const DAEMON: [&str; 15] = [
     "scanner-protocol",
     "segment",
     "shapes",
+    "skin",
     "storage",
+    "surfacing",
+    "toolpath",
 ];
 
 const COMMAND_LINE: [&str; 21] = [
