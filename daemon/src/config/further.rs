@@ -5,7 +5,7 @@ use std::fmt;
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
-use deliverables::{Further, MachineFile, MillOf, SkinOptions, ToolpathOptions};
+use deliverables::{Further, MachineFile, MachineFileError, MillOf, SkinOptions, ToolpathOptions};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -411,8 +411,16 @@ impl DeliverablesConfig {
         };
         if let Some(MachineChoice::File(path)) = &toolpath.machine {
             let path = config.parent().unwrap_or(Path::new("")).join(path);
-            let read = MachineFile::read(&path)
-                .map_err(|error| (TOOLPATH, format!("machine: {error}")))?;
+            let read = MachineFile::read(&path).map_err(|error| {
+                let told = match error {
+                    MachineFileError::Read { .. } => format!(
+                        "machine: {error}; name a file from the folder of the configuration, or in \
+                         full"
+                    ),
+                    _ => format!("machine: {error}"),
+                };
+                (TOOLPATH, told)
+            })?;
             toolpath.machine = Some(MachineChoice::Read(Box::new(read)));
         }
         Ok(())
