@@ -77,7 +77,7 @@ fn is_listed(result: &Published, name: &str) -> Result<()> {
     Ok(())
 }
 
-/// Greatest distance along z of a surface from the range image, at places well within.
+/// Least and greatest coordinates of a surface's control points.
 fn extent(surface: &iges::PlainSurface) -> [[f64; 2]; 3] {
     let mut extent = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
     for point in surface.surface.points() {
