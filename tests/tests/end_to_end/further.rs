@@ -157,7 +157,27 @@ async fn a_scan_ends_in_surfaces_and_an_nc_program() -> Result<()> {
         let is_off = name.contains("skin") || name.contains("nc");
         assert_eq!(fewer.files.contains_key(name), !is_off, "{name}");
     }
+    the_surface_of_a_roof_is_milled(&rig, &ended.scan.id).await?;
     rig.end().await
+}
+
+/// A part of the scan without steps, whose surface is milled in place of the model.
+async fn the_surface_of_a_roof_is_milled(rig: &Rig, scan: &str) -> Result<()> {
+    let roof = [
+        ("deliverables.skin", json!("off")),
+        ("deliverables.toolpath.of", json!("surface")),
+        ("regrid.roi_x_mm", json!([-20.0, 20.0])),
+        ("regrid.roi_y_mm", json!([-10.0, 5.0])),
+    ];
+    let roof = rig.rerun_to_result(scan, &roof).await?;
+    assert_eq!(roof.left_out, Vec::<String>::new());
+    let result = rig.result(&roof.result).await?;
+    let report = result.json("report.json")?;
+    assert_eq!(report["toolpath"]["of"], "surface");
+    let [x, y, _] = moves(&String::from_utf8(result.file("house.nc")?.to_vec())?)?;
+    ensure!(x[0] >= -30.0 && x[1] <= 30.0, "x {x:?}");
+    ensure!(y[0] >= -20.0 && y[1] <= 15.0, "y {y:?}");
+    Ok(())
 }
 
 fn surfaces_are_what_the_report_says(result: &Published, report: &Value) -> Result<()> {

@@ -301,7 +301,14 @@ fn to_be_milled(
             &whole
         }
     };
-    let mesh = triangles(model, inputs.cad.meshes.tolerance_mm, watch)?;
+    let tolerance_mm = inputs.cad.meshes.tolerance_mm;
+    let mesh = triangles(model, tolerance_mm, watch).map_err(|error| match Stop::from(error) {
+        Stop::Refused(why) => Stop::Refused(format!(
+            "what is milled are triangles within deliverables.mesh_tolerance_mm = {tolerance_mm}: \
+             {why}"
+        )),
+        cancelled => cancelled,
+    })?;
     let indices: Vec<[usize; 3]> = mesh
         .faces
         .iter()
