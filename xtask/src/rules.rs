@@ -105,7 +105,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-const DELIVERABLES: [&str; 13] = [
+const DELIVERABLES: [&str; 16] = [
     "cad-exchange",
     "compare",
     "mesh-files",
@@ -117,11 +117,14 @@ const DELIVERABLES: [&str; 13] = [
     "regrid",
     "segment",
     "shapes",
+    "skin",
     "storage",
+    "surfacing",
     "tessellate",
+    "toolpath",
 ];
 
-const DAEMON: [&str; 15] = [
+const DAEMON: [&str; 18] = [
     "cad-exchange",
     "deliverables",
     "nurbs",
@@ -136,7 +139,10 @@ const DAEMON: [&str; 15] = [
     "scanner-protocol",
     "segment",
     "shapes",
+    "skin",
     "storage",
+    "surfacing",
+    "toolpath",
 ];
 
 const COMMAND_LINE: [&str; 21] = [

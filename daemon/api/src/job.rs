@@ -89,6 +89,9 @@ pub struct Job {
     /// The published folder on the service's machine, once done.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub directory: Option<String>,
+    /// Deliverables that were asked for and could not be made, and why; the others are there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
     /// Settings that differ from the configuration.
     #[serde(default, skip_serializing_if = "SettingOverrides::is_empty")]
     pub settings: SettingOverrides,

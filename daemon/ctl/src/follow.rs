@@ -125,6 +125,9 @@ pub(crate) async fn job(client: &Client, mut events: Events, id: JobId) -> Resul
         let seconds: f64 = job.timings.iter().map(|timing| timing.seconds).sum();
         bar.at(1.0, "");
         bar.finish(&format!("published in {seconds:.2} s"));
+        for told in &job.left_out {
+            eprintln!("relief: note: {told}");
+        }
         return Ok(job);
     }
     bar.abandon(job.state.as_str());

@@ -18,7 +18,7 @@ use std::process::{Command, Output};
 
 use common::schema::{check, published, validator};
 use common::{relief, roof, text};
-use reliefd::config::WebhookConfig;
+use reliefd::config::{DeliverablesConfig, WebhookConfig};
 use reliefd::{Config, Daemon};
 use serde_json::{Value, json};
 use sim_scanner::config::SimConfig;
@@ -201,6 +201,25 @@ async fn ask(at: &Path, socket: &Path, arguments: &[&str]) -> Value {
     document(&output.await.unwrap().unwrap())
 }
 
+/// Deliverables beside the model, so that reports tell of them.
+fn further(at: &Path) -> DeliverablesConfig {
+    // Room for the house; its own stock is that of a small part.
+    let machine = include_str!("../../../config/machine.toml")
+        .replace("[-40.0, 40.0]", "[-100.0, 150.0]")
+        .replace("[-10.0, 22.0]", "[-80.0, 80.0]")
+        .replace("[0.0, 300.0]", "[-500.0, 500.0]")
+        .replace("[0.0, 200.0]", "[-500.0, 500.0]")
+        .replace("[-100.0, 0.0]", "[-500.0, 500.0]")
+        .replace("safe_z_mm = 30.0", "safe_z_mm = 90.0");
+    fs::write(at.join("machine.toml"), machine).unwrap();
+    let text = "[deliverables.surface]\ntolerance_mm = 0.5\nfair_mm = 0.05\n\
+         [deliverables.skin]\ntolerance_mm = 0.5\nevery_mm = 5.0\n\
+         [deliverables.toolpath]\nmachine = \"machine.toml\"\ntool = \"ball:6\"\n\
+         scallop_mm = 0.5\npitch_mm = 1.0\n";
+    fs::write(at.join("relief.toml"), text).unwrap();
+    Config::load(&at.join("relief.toml")).unwrap().deliverables
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn what_the_clients_of_the_service_tell() {
     let directory = tempfile::tempdir().unwrap();
@@ -219,6 +238,7 @@ async fn what_the_clients_of_the_service_tell() {
     config.service.state_dir = at.join("state");
     config.service.spool_dir = at.join("spool");
     config.scanner.port = scanner.port().to_owned();
+    config.deliverables = further(at);
     let daemon = Daemon::start(config).await.unwrap();
     let socket = daemon.socket().to_owned();
     let told = |arguments: &'static [&'static str]| {
@@ -248,7 +268,12 @@ async fn what_the_clients_of_the_service_tell() {
     assert_eq!(entries.last().unwrap()["laser"], "off");
     told(&["fetch", "latest", "-o", "out"]).await;
     check("manifest.schema.json", &file(at.join("out/manifest.json")));
-    check("report.schema.json", &file(at.join("out/report.json")));
+    let report = file(at.join("out/report.json"));
+    check("report.schema.json", &report);
+    for key in ["surface", "skin", "toolpath"] {
+        assert!(report[key].is_object(), "{key}: {}", report["warnings"]);
+        assert!(report["settings"][key].is_object(), "{key}");
+    }
     // A job that fails, so that its error is there, and that is taken up again.
     let few = &["rerun", "latest", "--set", "regrid.roi_x_mm=[900,901]"];
     let failing = told(few).await;

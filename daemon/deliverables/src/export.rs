@@ -7,6 +7,7 @@ use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use reconstruct::Model;
 
+use crate::further::Further;
 use crate::meshes::MeshOptions;
 
 pub use cad_exchange::iges::Entities;
@@ -23,6 +24,8 @@ pub struct CadOptions {
     pub step_units: LengthUnit,
     /// Files of triangles and points beside the CAD files.
     pub meshes: MeshOptions,
+    /// Surfaces and an NC program beside them.
+    pub further: Further,
     /// Who made the model; may be empty.
     pub author: String,
     /// The author's organisation; may be empty.

@@ -1,5 +1,5 @@
-//! What a processed scan leaves behind: CAD files, triangles and points where they are asked for,
-//! pictures, report, manifest.
+//! What a processed scan leaves behind: CAD files, triangles, points, surfaces and an NC program where
+//! they are asked for, pictures, report, manifest.
 //!
 //! [`write`](fn@write) fills a directory that nobody looks at yet and syncs it; the caller
 //! puts it in place by one rename. [`write_atomically`] is for a single file.
@@ -10,8 +10,10 @@
 pub mod comparison;
 mod deviations;
 mod export;
+mod extras;
 mod file;
 mod filed;
+mod further;
 mod manifest;
 mod meshes;
 pub mod picture;
@@ -29,6 +31,14 @@ pub use export::{
 };
 pub use file::{hexadecimal, sha256_of, write_atomically};
 pub use filed::{PageFormat, PageFormats, comparison_page, scan_page};
+pub use further::{
+    CharacterLineFigures, FairingFigures, Further, HeightSurface, MachineFile, MachineFileError,
+    MillError, MillOf, Milled, OperationFigures, SectionFigures, SimulationFigures, SkinCounts,
+    SkinDeviation, SkinFigures, SkinOptions, SkinReport, SkinSettingsReport, SurfaceFigures,
+    SurfaceReport, SurfaceSettingsReport, SurfaceWords, SurfacesError, ToolpathOptions,
+    ToolpathReport, ToolpathSettingsReport, cut_remark, mill, rows_of, surface_pictures,
+    surface_remarks, write_height_surfaces,
+};
 pub use manifest::{MANIFEST_NAME, Manifest, ManifestFile};
 pub use meshes::{
     MeasuredPoints, MeshFormat, MeshOptions, PointFormat, TrianglesError, mesh_report, triangles,

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 use std::io::{self, Write};
-use std::path::Path;
 
 use cad_exchange::step::DEFAULT_PALETTE;
 use jiff::Timestamp;
@@ -10,16 +9,15 @@ use mesh_files::{MeshDetails, Point, Points, ScanDetails, write_mesh, write_poin
 use pipeline::{Columns, ReadAgainError};
 use range_image::Monitor;
 use reconstruct::Model;
-use storage::{Disk, remove_file_if_there};
 use tessellate::{Accuracy, Mesh, SettingsError, TessellateError, TessellateSettings, tessellate};
 
 pub use mesh_files::{MeshFormat, PointFormat};
 
 use crate::export::{WriteError, file_stem};
-use crate::file::{sha256_of, write_synced};
-use crate::manifest::ManifestFile;
+use crate::extras::Extras;
+use crate::file::sha256_of;
 use crate::report::{MeshReport, ScanReport};
-use crate::write::{DeliverError, Inputs, is_full};
+use crate::write::{DeliverError, Inputs};
 
 /// Name and version of this program in files.
 const GENERATOR: &str = concat!("Relief ", env!("CARGO_PKG_VERSION"));
@@ -218,66 +216,23 @@ fn guid(digits: &str) -> String {
     )
 }
 
-/// What was written, and what is to be said about it.
-#[derive(Debug, Default)]
-pub(crate) struct Written {
-    pub(crate) files: Vec<ManifestFile>,
-    pub(crate) mesh: Option<MeshReport>,
-    pub(crate) warnings: Vec<String>,
-}
-
 /// Writes what is asked for. What there is no room for is left out, and so are triangles of a model
 /// that none can be made of: all that they hold is in the IGES file, and the points in the journal.
-pub(crate) fn write_extras(
-    disk: &dyn Disk,
-    directory: &Path,
+pub(crate) fn write_meshes(
+    extras: &mut Extras<'_>,
     inputs: &Inputs<'_>,
-    is_short_of_room: bool,
-    monitor: &dyn Monitor,
-) -> Result<Written, DeliverError> {
-    let mut written = Written::default();
+) -> Result<Option<MeshReport>, DeliverError> {
     let wanted = &inputs.cad.meshes;
     let stem = file_stem(inputs.name);
-    let left_out = |name: &str| {
-        format!(
-            "{name} was left out, since the disk is nearly full: make room and run the scan again \
-             to have it"
-        )
-    };
-    let put = |written: &mut Written,
-               name: String,
-               content: &dyn Fn(&mut dyn Write) -> Result<(), WriteError>|
-     -> Result<(), DeliverError> {
-        monitor.check()?;
-        if is_short_of_room {
-            written.warnings.push(left_out(&name));
-            return Ok(());
-        }
-        let put = write_synced::<DeliverError>(disk, directory, &name, |sink| Ok(content(sink)?));
-        match put {
-            Ok(file) => written.files.push(file),
-            Err(error) if error.is_for_want_of_room() => {
-                remove_file_if_there(disk, &directory.join(&name))?;
-                written.warnings.push(left_out(&name));
-            }
-            Err(DeliverError::Export(WriteError::Mesh(error))) if error.io().is_none() => {
-                remove_file_if_there(disk, &directory.join(&name))?;
-                written
-                    .warnings
-                    .push(format!("{name} was left out: {error}"));
-            }
-            Err(error) => return Err(error),
-        }
-        Ok(())
-    };
+    let mut report = None;
     if !wanted.meshes.is_empty() {
         let model = &inputs.outcome.reconstruction.model;
-        match triangles(model, wanted.tolerance_mm, monitor) {
+        match triangles(model, wanted.tolerance_mm, extras.monitor) {
             Ok(mesh) => {
-                written.mesh = Some(mesh_report(&mesh));
+                report = Some(mesh_report(&mesh));
                 for &format in &wanted.meshes {
                     let name = format!("{stem}.{}", format.ending());
-                    put(&mut written, name, &|sink| {
+                    extras.put(&name, &|sink| {
                         write_triangles(&mesh, format, inputs.name, sink)
                     })?;
                 }
@@ -285,32 +240,21 @@ pub(crate) fn write_extras(
             Err(TrianglesError::Tessellate(TessellateError::Cancelled(cancelled))) => {
                 return Err(cancelled.into());
             }
-            Err(error) => written
-                .warnings
+            Err(error) => extras
+                .left_out
                 .push(format!("the files of triangles were left out: {error}")),
         }
     }
     if let Some(points) = inputs.points {
         for &format in &wanted.points {
             let name = format!("{stem}-points.{}", format.ending());
-            put(&mut written, name, &|sink| {
+            extras.put(&name, &|sink| {
                 let named = (inputs.name, inputs.timestamp);
                 write_measured(points, format, named, &inputs.scan, sink)
             })?;
         }
     }
-    Ok(written)
-}
-
-impl DeliverError {
-    /// Nothing is wrong but that the disk is full.
-    pub(crate) fn is_for_want_of_room(&self) -> bool {
-        match self {
-            Self::Io(error) => is_full(error),
-            Self::Export(error) => error.io().is_some_and(is_full),
-            _ => false,
-        }
-    }
+    Ok(report)
 }
 
 #[cfg(test)]

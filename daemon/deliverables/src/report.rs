@@ -7,6 +7,11 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::further::{
+    SkinReport, SkinSettingsReport, SurfaceReport, SurfaceSettingsReport, ToolpathReport,
+    ToolpathSettingsReport,
+};
+
 /// Everything that is known about one processed scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Report {
@@ -39,6 +44,15 @@ pub struct Report {
     /// The triangles of the model; absent where no file of them is asked for.
     #[serde(default)]
     pub mesh: Option<MeshReport>,
+    /// The B-spline surface over the range image; absent where none is asked for, or none was made.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surface: Option<SurfaceReport>,
+    /// The surface skinned over sections of the range image; absent likewise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skin: Option<SkinReport>,
+    /// The NC program; absent likewise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub toolpath: Option<ToolpathReport>,
     /// How far the nodes lie off the faces; absent in reports of earlier versions.
     #[serde(default)]
     pub deviations: Option<DeviationsReport>,
@@ -159,6 +173,15 @@ pub struct SettingsReport {
     /// Formats of the files of measured points: `ply`, `e57`.
     #[serde(default)]
     pub points: Vec<String>,
+    /// How the B-spline surface was asked for; absent where it was not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surface: Option<SurfaceSettingsReport>,
+    /// How the skinned surface was; absent likewise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skin: Option<SkinSettingsReport>,
+    /// How the NC program was; absent likewise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub toolpath: Option<ToolpathSettingsReport>,
 }
 
 /// The uniform range image.

@@ -39,6 +39,9 @@ impl Report {
             crumbs: crumbs(inputs.outcome),
             model: model(&reconstruction.model),
             mesh: None,
+            surface: None,
+            skin: None,
+            toolpath: None,
             deviations: Some(Deviations::of(inputs.image, inputs.outcome).report()),
             snr_db: finite(reconstruction.metrics.snr_db),
             lost_nodes: reconstruction.metrics.lost_nodes,
@@ -84,6 +87,9 @@ pub(crate) fn settings(settings: &Settings, cad: &CadOptions) -> SettingsReport 
         meshes: names(cad.meshes.meshes.iter().map(|format| format.ending())),
         mesh_tolerance_mm: cad.meshes.tolerance_mm,
         points: names(cad.meshes.points.iter().map(|format| format.ending())),
+        surface: cad.further.surface_settings(),
+        skin: cad.further.skin_settings(),
+        toolpath: cad.further.toolpath_settings(),
     }
 }
 

@@ -13,10 +13,12 @@ use storage::{Disk, LocalDisk, remove_file_if_there};
 use reconstruct::RegionFit;
 
 use crate::export::{CadOptions, WriteError, file_stem, write_iges, write_step};
+use crate::extras::Extras;
 use crate::file::write_synced;
 use crate::filed::{PageFormat, PageFormats, scan_page};
+use crate::further::write_further;
 use crate::manifest::{MANIFEST_NAME, Manifest, ManifestFile};
-use crate::meshes::{MeasuredPoints, write_extras};
+use crate::meshes::{MeasuredPoints, write_meshes};
 use crate::picture;
 use crate::report::{Report, ScanReport};
 use crate::stopwatch::Stopwatch;
@@ -74,6 +76,8 @@ pub struct Delivered {
     pub manifest: Manifest,
     /// Every file, the manifest last.
     pub files: Vec<ManifestFile>,
+    /// What was asked for and is not there, and why; in the report's warnings, too.
+    pub left_out: Vec<String>,
 }
 
 /// Names of the page are this with the ending of its form.
@@ -108,7 +112,8 @@ const NO_PAGE: &str = "the page was left out, since the disk is nearly full: mak
 const NO_PICTURES: &str = "the pictures were left out, since the disk is nearly full: make room \
      and run the scan again to have them";
 
-/// Writes `<name>.igs`, `<name>.step` and files of triangles and points if they are asked for, the
+/// Writes `<name>.igs`, `<name>.step`, files of triangles and points, of surfaces
+/// (`<name>.surface.igs`, `<name>.skin.igs`) and an NC program (`<name>.nc`) if they are asked for, the
 /// pictures, `report.json`, the page and `manifest.json` into an existing directory of this disk
 /// that nobody else looks at, and syncs them and it. The caller then puts the directory in its
 /// place by one rename.
@@ -151,8 +156,18 @@ pub fn write(
         Pictures::LeftOut => None,
     };
     let is_short_of_room = pictures == Pictures::LeftOut;
-    let extras = write_extras(disk, directory, inputs, is_short_of_room, watch)?;
+    let mut extras = Extras {
+        disk,
+        directory,
+        is_short_of_room,
+        monitor: watch,
+        files: Vec::new(),
+        remarks: Vec::new(),
+        left_out: Vec::new(),
+    };
+    let mesh = write_meshes(&mut extras, inputs)?;
     watch.progress(1.0);
+    let further = write_further(&mut extras, inputs, watch)?;
 
     watch.check()?;
     watch.stage(Stage::Pictures);
@@ -161,13 +176,18 @@ pub fn write(
         Pictures::LeftOut => None,
     };
     let mut report = Report::new(inputs, watch.read());
+    let mut left_out = Vec::new();
     match step {
         Some(step) => files.extend(step),
-        None => report.warnings.push(NO_STEP.to_owned()),
+        None => left_out.push(NO_STEP.to_owned()),
     }
     files.extend(extras.files);
-    report.mesh = extras.mesh;
-    report.warnings.extend(extras.warnings);
+    report.mesh = mesh;
+    report.surface = further.surface;
+    report.skin = further.skin;
+    report.toolpath = further.toolpath;
+    left_out.extend(extras.left_out);
+    report.warnings.extend(extras.remarks);
     let drawings = drawn.map(|(drawings, written)| {
         files.extend(written);
         drawings
@@ -177,8 +197,9 @@ pub fn write(
         for name in PICTURE_NAMES {
             remove_file_if_there(disk, &directory.join(name))?;
         }
-        report.warnings.push(NO_PICTURES.to_owned());
+        left_out.push(NO_PICTURES.to_owned());
     }
+    report.warnings.extend(left_out.iter().cloned());
     watch.progress(1.0);
 
     // The page tells the report's checksum, so this is written first; once more, where there turns
@@ -197,6 +218,7 @@ pub fn write(
         None => {
             files.pop();
             report.warnings.push(NO_PAGE.to_owned());
+            left_out.push(NO_PAGE.to_owned());
             files.push(write_json(disk, directory, REPORT_NAME, &report)?);
         }
     }
@@ -215,6 +237,7 @@ pub fn write(
         report,
         manifest,
         files,
+        left_out,
     })
 }
 

@@ -55,7 +55,7 @@ pub enum ConfigError {
 }
 
 impl Config {
-    /// Reads a configuration file.
+    /// Reads a configuration file, and the machine's file if it names one.
     ///
     /// # Errors
     /// Any [`ConfigError`].
@@ -79,7 +79,14 @@ impl Config {
     fn parse_file(text: &str, path: &Path) -> Result<Self, ConfigError> {
         // Two names may lead to one port; one that is not there is what it is called.
         let port = |port: &Path| fs::canonicalize(port).unwrap_or_else(|_| port.to_owned());
-        Self::parse_with(text, path, &port)
+        let mut config = Self::parse_with(text, path, &port)?;
+        let deliverables = &mut config.deliverables;
+        deliverables
+            .read_machine(path)
+            // Whether it has the cutters.
+            .and_then(|()| deliverables.further().map(drop))
+            .map_err(|(section, message)| inconsistent(path, section, message))?;
+        Ok(config)
     }
 
     /// Reads a configuration from text; `path` is for the messages.
@@ -114,11 +121,7 @@ impl Config {
         config
             .processing()
             .check()
-            .map_err(|(section, message)| ConfigError::Inconsistent {
-                path: path.to_owned(),
-                section,
-                message: bounded(message),
-            })?;
+            .map_err(|(section, message)| inconsistent(path, section, message))?;
         Ok(config)
     }
 }
@@ -148,6 +151,14 @@ fn wrong(text: &str, path: &Path, start: usize, message: String) -> ConfigError 
         path: path.to_owned(),
         line,
         column,
+        message: bounded(message),
+    }
+}
+
+fn inconsistent(path: &Path, section: &'static str, message: String) -> ConfigError {
+    ConfigError::Inconsistent {
+        path: path.to_owned(),
+        section,
         message: bounded(message),
     }
 }

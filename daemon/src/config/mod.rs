@@ -4,8 +4,10 @@
 //! way out; nothing is silently ignored.
 
 mod formats;
+mod further;
 mod http;
 mod load;
+mod overrides;
 mod processing;
 mod regularities;
 mod reload;
@@ -23,11 +25,16 @@ use std::time::Duration;
 use relief_api::{PlanRequest, THE_SCANNER};
 use serde::{Deserialize, Serialize};
 
+pub use further::{
+    KnotsChoice, MachineChoice, OfChoice, PatternChoice, SkinConfig, SkinMethod, SurfaceConfig,
+    ToolpathConfig,
+};
 pub use http::HttpConfig;
 pub use load::ConfigError;
+pub use overrides::OverrideError;
 pub use processing::{
-    DeliverablesConfig, Estimator, Method, OverrideError, PageChoice, Processing,
-    ReconstructConfig, RegridConfig, SegmentConfig, StepChoice, StepUnits,
+    DeliverablesConfig, Estimator, Method, PageChoice, Processing, ReconstructConfig, RegridConfig,
+    SegmentConfig, StepChoice, StepUnits,
 };
 pub use regularities::{Regularize, RegularizeUnits};
 pub use reload::Reloaded;

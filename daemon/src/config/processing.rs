@@ -4,11 +4,10 @@ use std::collections::BTreeSet;
 
 use deliverables::{MeshFormat, MeshOptions, PointFormat};
 use pipeline::Settings;
-use relief_api::SettingOverrides;
 use scan_files::recommended_pitch_mm;
 use serde::{Deserialize, Serialize};
 
-use super::load::with_nearest_name;
+use super::further::{self, SkinConfig, SurfaceConfig, ToolpathConfig};
 use super::regularities::{Regularize, RegularizeUnits};
 use super::{formats, value};
 
@@ -231,6 +230,24 @@ pub struct DeliverablesConfig {
     /// In which forms the page that can be filed is left; none if empty.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub page: Option<Vec<PageChoice>>,
+    /// One B-spline surface over the range image; none if left out.
+    #[serde(
+        deserialize_with = "further::or_off",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub surface: Option<SurfaceConfig>,
+    /// A surface skinned over sections of the range image; none if left out.
+    #[serde(
+        deserialize_with = "further::or_off",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub skin: Option<SkinConfig>,
+    /// An NC program; none if left out.
+    #[serde(
+        deserialize_with = "further::or_off",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub toolpath: Option<ToolpathConfig>,
     /// Author in the CAD file's header; the scan's operator if left out.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub author: String,
@@ -299,56 +316,6 @@ fn entities<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<
     }
 }
 
-/// Overrides that cannot be.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("setting `{key}`: {message}")]
-pub struct OverrideError {
-    /// The key as it was given.
-    pub key: String,
-    /// What is wrong and what to do.
-    pub message: String,
-}
-
-impl Processing {
-    /// These settings with some replaced, keyed `section.key` as in the file.
-    ///
-    /// # Errors
-    /// An unknown key, or a value that cannot be, is refused by its name.
-    pub fn with_overrides(&self, overrides: &SettingOverrides) -> Result<Self, OverrideError> {
-        let mut settings = self.clone();
-        for (key, value) in overrides {
-            let wrong = |message: String| OverrideError {
-                key: key.clone(),
-                message,
-            };
-            let Some((section, name)) = key.split_once('.') else {
-                return Err(wrong(
-                    "keys are written `section.key`, such as `regrid.pitch_mm`".into(),
-                ));
-            };
-            // By way of a tree, so that serde checks overrides exactly as it does the file.
-            let mut tree = serde_json::to_value(&settings).map_err(|e| wrong(e.to_string()))?;
-            let sections = tree.as_object_mut();
-            let Some(table) = sections.and_then(|s| s.get_mut(section)?.as_object_mut()) else {
-                return Err(wrong(format!(
-                    "there is no section [{section}] that a scan can override; there are \
-                     regrid, segment, reconstruct and deliverables"
-                )));
-            };
-            table.insert(name.to_owned(), value.clone());
-            settings = serde_json::from_value(tree)
-                .map_err(|error| wrong(with_nearest_name(&error.to_string())))?;
-        }
-        settings
-            .check()
-            .map_err(|(section, message)| OverrideError {
-                key: section.to_owned(),
-                message,
-            })?;
-        Ok(settings)
-    }
-}
-
 impl Processing {
     /// The settings of every stage, for a scan of this density. Spacings in millimetres,
     /// 0 where unknown.
@@ -407,6 +374,7 @@ impl Processing {
     pub(super) fn check(&self) -> Result<(), (&'static str, String)> {
         let meshes = self.deliverables.mesh_options().check();
         meshes.map_err(|error| ("deliverables", format!("mesh_{error}")))?;
+        self.deliverables.further()?;
         // The pitch is checked where it is read; any other serves here.
         self.pipeline_settings(FALLBACK_PITCH_MM, FALLBACK_PITCH_MM)
             .validate()

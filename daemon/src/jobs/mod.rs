@@ -123,6 +123,7 @@ impl Service {
         job.hint = None;
         job.ended_at = None;
         job.timings.clear();
+        job.left_out.clear();
         self.keep_job(&job)?;
         self.queue.add(id);
         Ok(job)
@@ -203,6 +204,7 @@ fn new_job(scan: &Scan, result: String, name: String) -> Job {
         stage: None,
         timings: Vec::new(),
         directory: None,
+        left_out: Vec::new(),
         settings: relief_api::SettingOverrides::new(),
     }
 }

@@ -81,7 +81,10 @@ impl From<ReadError> for Stop {
 /// Makes the job's result and publishes it.
 pub(super) fn process(service: &Service, job: &Job, progress: &Progress<'_>) -> JobOutcome {
     match attempt(service, job, progress) {
-        Ok(directory) => JobOutcome::Published(directory),
+        Ok((directory, left_out)) => JobOutcome::Published {
+            directory,
+            left_out,
+        },
         Err(Stop::Asked) => JobOutcome::Stopped,
         Err(Stop::Failed { error, hint }) => JobOutcome::Failed { error, hint },
     }
@@ -91,9 +94,9 @@ fn attempt(
     service: &Service,
     job: &Job,
     progress: &Progress<'_>,
-) -> Result<std::path::PathBuf, Stop> {
+) -> Result<(PathBuf, Vec<String>), Stop> {
     if let Some(directory) = service.spool.published(&job.result)? {
-        return Ok(directory);
+        return Ok((directory, job.left_out.clone()));
     }
     // First, so that an unwritable spool is told at once and not after minutes.
     let incoming = service.spool.begin(&job.result)?;
@@ -139,7 +142,7 @@ fn attempt(
         .started_at
         .parse()
         .map_err(|error| Stop::failed(format!("the scan's time is damaged: {error}"), None))?;
-    let cad = cad_options(&processing, &scan);
+    let cad = cad_options(&processing, &scan)?;
     let inputs = Inputs {
         name: &job.name,
         timestamp,
@@ -158,11 +161,11 @@ fn attempt(
     } else {
         Pictures::Drawn
     };
-    deliverables::write(&*service.disk, &incoming, &inputs, pictures, &watch)?;
+    let delivered = deliverables::write(&*service.disk, &incoming, &inputs, pictures, &watch)?;
     // The last moment at which a cancelled job leaves nothing behind.
     progress.check()?;
     progress.begin("publish");
-    Ok(service.spool.publish(&job.result)?)
+    Ok((service.spool.publish(&job.result)?, delivered.left_out))
 }
 
 /// The columns of a journal, read anew each time.
@@ -368,9 +371,12 @@ fn missed(
     Stop::failed(format!("scan {}: {error}", scan.id), Some(&hint))
 }
 
-fn cad_options(processing: &Processing, scan: &Scan) -> CadOptions {
+fn cad_options(processing: &Processing, scan: &Scan) -> Result<CadOptions, Stop> {
     let wanted = &processing.deliverables;
-    CadOptions {
+    let further = wanted.further();
+    let further =
+        further.map_err(|(section, why)| Stop::failed(format!("{section}: {why}"), None))?;
+    Ok(CadOptions {
         entities: match wanted.entities {
             Some(128) => Entities::Rational128,
             Some(186) => Entities::Boundary,
@@ -388,13 +394,14 @@ fn cad_options(processing: &Processing, scan: &Scan) -> CadOptions {
             StepUnits::Inch => LengthUnit::Inch,
         },
         meshes: wanted.mesh_options(),
+        further,
         author: if wanted.author.is_empty() {
             scan.operator.clone()
         } else {
             wanted.author.clone()
         },
         organisation: wanted.organisation.clone(),
-    }
+    })
 }
 
 fn page_formats(processing: &Processing) -> PageFormats {

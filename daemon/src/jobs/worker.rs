@@ -19,7 +19,12 @@ use crate::service::Service;
 #[derive(Debug)]
 pub(crate) enum JobOutcome {
     /// The result is in the spool.
-    Published(PathBuf),
+    Published {
+        /// Its folder.
+        directory: PathBuf,
+        /// What is not in it that was asked for, and why.
+        left_out: Vec<String>,
+    },
     /// It was asked to stop.
     Stopped,
     /// It cannot be done, or not now.
@@ -102,7 +107,7 @@ fn attempt(
             });
         (outcome, progress.finish())
     };
-    if !matches!(outcome, JobOutcome::Published(_)) {
+    if !matches!(outcome, JobOutcome::Published { .. }) {
         service.spool.discard(&job.result);
     }
     let _order = service.queue.changing();
@@ -114,11 +119,18 @@ fn attempt(
     job.ended_at = Some(now());
     let mut published = None;
     match outcome {
-        JobOutcome::Published(directory) => {
+        JobOutcome::Published {
+            directory,
+            left_out,
+        } => {
             job.state = JobState::Done;
             job.error = None;
             job.hint = None;
             job.directory = Some(directory.display().to_string());
+            for told in &left_out {
+                tracing::warn!(job = id, scan = %job.scan, "{told}");
+            }
+            job.left_out = left_out;
             tracing::info!(job = id, directory = %directory.display(), "job done");
             published = Some(published_event(service, &job));
             if job.result == job.scan {

@@ -288,7 +288,7 @@ fn in_force(path: &Path) -> Config {
     let all: String = text
         .lines()
         .map(|line| match line.strip_prefix("# ") {
-            Some(section) if section.starts_with("[[") => section,
+            Some(section) if section.starts_with('[') && section.ends_with(']') => section,
             Some(key) if key.split_once(" = ").is_some_and(|(k, _)| !k.contains(' ')) => key,
             _ => line,
         })
@@ -352,6 +352,11 @@ fn the_examples_are_sound_and_show_the_defaults() {
     );
     webhook.ca_file = Some("/etc/relief/lab-ca.pem".into());
     assert_eq!(all.webhooks, [webhook]);
+    let further = all.deliverables.further().unwrap();
+    assert_eq!(further.surface.unwrap().placement.as_str(), "optimal");
+    assert_eq!(further.skin.unwrap().settings, skin::Settings::new(0.1));
+    let machine = all.deliverables.unread_machine();
+    assert_eq!(machine, Some(Path::new("machine.toml")));
     let defaults = Config::default().processing().pipeline_settings(0.5, 0.5);
     let mut shown = all.processing().pipeline_settings(0.5, 0.5);
     shown.regrid.roi = defaults.regrid.roi;

@@ -13,6 +13,7 @@ mod config;
 mod cut_short;
 mod events;
 mod fake;
+mod further;
 mod hostile;
 mod jobs;
 mod laser;

@@ -16,17 +16,26 @@ pub enum Stage {
     Reconstruct,
     /// The model becomes a CAD file.
     Export,
+    /// One B-spline surface is made of the range image, where that is asked for.
+    Surface,
+    /// A surface is skinned over sections of it, where that is asked for.
+    Skin,
+    /// The milling of the model is planned and simulated, where that is asked for.
+    Toolpath,
     /// The pictures are drawn.
     Pictures,
 }
 
 impl Stage {
     /// Every stage, in order.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 8] = [
         Self::Regrid,
         Self::Segment,
         Self::Reconstruct,
         Self::Export,
+        Self::Surface,
+        Self::Skin,
+        Self::Toolpath,
         Self::Pictures,
     ];
 
@@ -38,6 +47,9 @@ impl Stage {
             Self::Segment => "segment",
             Self::Reconstruct => "reconstruct",
             Self::Export => "export",
+            Self::Surface => "surface",
+            Self::Skin => "skin",
+            Self::Toolpath => "toolpath",
             Self::Pictures => "pictures",
         }
     }

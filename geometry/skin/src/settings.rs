@@ -38,7 +38,11 @@ impl Settings {
         }
     }
 
-    pub(crate) fn check(&self) -> Result<(), SettingsError> {
+    /// Whether all settings are within their limits.
+    ///
+    /// # Errors
+    /// [`SettingsError`]
+    pub fn check(&self) -> Result<(), SettingsError> {
         if !(self.tolerance_mm.is_finite() && self.tolerance_mm > 0.0) {
             return Err(SettingsError::Tolerance(self.tolerance_mm));
         }

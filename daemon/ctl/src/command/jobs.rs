@@ -57,6 +57,9 @@ fn state(job: &Job) -> String {
         (Some(error), Some(hint), _) => format!("{state}: {error}; {hint}"),
         (Some(error), None, _) => format!("{state}: {error}"),
         (None, _, Some(stage)) => format!("{state}: {stage}"),
+        (None, _, None) if !job.left_out.is_empty() => {
+            format!("{state}: {}", job.left_out.join("; "))
+        }
         (None, _, None) => state.to_owned(),
     }
 }

@@ -47,7 +47,7 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
     } else {
         None
     };
-    let mut settings = setting::overrides(args.settings);
+    let mut settings = setting::overrides(args.settings)?;
     args.regularize.add_to(&mut settings);
     args.processed.add_to(&mut settings);
     let request = Rerun {

@@ -121,12 +121,12 @@ struct Told {
 }
 
 impl Args {
-    fn request(self) -> StartScan {
+    fn request(self) -> Result<StartScan, Failure> {
         let plan = self.plan;
-        let mut settings = setting::overrides(self.settings);
+        let mut settings = setting::overrides(self.settings)?;
         self.regularize.add_to(&mut settings);
         self.processed.add_to(&mut settings);
-        StartScan {
+        Ok(StartScan {
             name: self.name,
             part: self.part,
             operator: self.operator,
@@ -145,14 +145,14 @@ impl Args {
                 exposure_us: plan.exposure_us,
             },
             settings,
-        }
+        })
     }
 }
 
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
     let client = args.endpoint.client()?;
     let (wait, preview) = (args.wait, args.preview);
-    let request = args.request();
+    let request = args.request()?;
     if preview {
         return preview::show(&client, &request, json).await;
     }

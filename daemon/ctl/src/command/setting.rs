@@ -1,7 +1,12 @@
 //! `--set key=value`.
 
+use std::path::Path;
+
+use deliverables::MachineFile;
 use relief_api::SettingOverrides;
 use serde_json::Value;
+
+use crate::failure::Failure;
 
 /// A processing setting that differs from the service's configuration.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,12 +37,25 @@ pub(crate) fn parse(text: &str) -> Result<Setting, String> {
     })
 }
 
-/// The settings by key; the last of several for one key holds.
-pub(crate) fn overrides(settings: Vec<Setting>) -> SettingOverrides {
-    settings
+/// The key whose file is read here, with the rights of whoever asks.
+const MACHINE: &str = "deliverables.toolpath.machine";
+
+/// The settings by key; the last of several for one key holds. The service is sent the content of
+/// a machine's file.
+pub(crate) fn overrides(settings: Vec<Setting>) -> Result<SettingOverrides, Failure> {
+    let mut overrides: SettingOverrides = settings
         .into_iter()
         .map(|setting| (setting.key, setting.value))
-        .collect()
+        .collect();
+    if let Some(machine) = overrides.get_mut(MACHINE)
+        && let Value::String(name) = machine
+    {
+        let read = MachineFile::read(Path::new(name));
+        let read = read.map_err(|error| Failure::Failed(error.to_string()))?;
+        *machine =
+            serde_json::to_value(read).map_err(|error| Failure::Failed(error.to_string()))?;
+    }
+    Ok(overrides)
 }
 
 #[cfg(test)]
@@ -68,6 +86,20 @@ mod tests {
     #[test]
     fn the_last_of_several_holds() {
         let settings = vec![parse("a=1").unwrap(), parse("a=2").unwrap()];
-        assert_eq!(overrides(settings).get("a"), Some(&json!(2)));
+        assert_eq!(overrides(settings).unwrap().get("a"), Some(&json!(2)));
+    }
+
+    #[test]
+    fn a_machine_is_sent_as_its_file_has_it() {
+        let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/machine.toml");
+        let named = |file: &str| overrides(vec![parse(&format!("{MACHINE}={file}")).unwrap()]);
+        let sent = named(example).unwrap();
+        assert_eq!(sent[MACHINE]["safe_z_mm"], json!(30.0));
+        assert_eq!(sent[MACHINE]["tools"][0]["cutter"], json!("ball:6"));
+        let missing = named("no/such.toml").unwrap_err();
+        assert!(
+            matches!(&missing, Failure::Failed(why) if why.contains("cannot read no/such.toml")),
+            "{missing:?}"
+        );
     }
 }

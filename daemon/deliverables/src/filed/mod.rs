@@ -1,6 +1,7 @@
 //! The page of a scan or a comparison that an engineer can file.
 
 mod comparison;
+mod further;
 mod parameters;
 mod scan;
 mod settings;

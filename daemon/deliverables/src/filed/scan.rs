@@ -39,6 +39,7 @@ pub fn scan_page(report: &Report, pictures: &[(&str, Vec<u8>)], files: &[Manifes
     if let Some(png) = drawn(INLIERS_PICTURE_NAME) {
         sections.push(inliers(report, png));
     }
+    sections.extend(super::further::sections(report));
     sections.push(super::settings::section(report));
     sections.push(times(report));
     if !files.is_empty() {

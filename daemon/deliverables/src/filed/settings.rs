@@ -79,7 +79,7 @@ fn told(settings: &SettingsReport) -> Vec<(&'static str, String)> {
             format!("{} to {}", shown(low), shown(high))
         }
     };
-    vec![
+    let mut told = vec![
         ("reconstruct.method", settings.method.clone()),
         ("reconstruct.kinds", settings.kinds.clone()),
         (
@@ -110,5 +110,40 @@ fn told(settings: &SettingsReport) -> Vec<(&'static str, String)> {
         ("deliverables.entities", settings.iges_entities.to_string()),
         ("deliverables.step", settings.step.clone()),
         ("deliverables.step_units", settings.step_units.clone()),
+    ];
+    told.extend(further(settings));
+    told
+}
+
+/// What is asked for beside the model, in the words of the configuration.
+fn further(settings: &SettingsReport) -> [(&'static str, String); 3] {
+    let off = || "off".to_owned();
+    let surface = settings.surface.as_ref().map_or_else(off, |own| {
+        let fair = own.fair_mm.map(|mm| format!(", fair_mm {mm}"));
+        let fair = fair.unwrap_or_default();
+        format!(
+            "tolerance_mm {}, knots {}{fair}",
+            own.tolerance_mm, own.knots
+        )
+    });
+    let skin = settings.skin.as_ref().map_or_else(off, |own| {
+        let every = own.every_mm.map(|mm| format!(", every_mm {mm}"));
+        let every = every.unwrap_or_default();
+        let (method, degree) = (&own.method, own.degree);
+        let tolerance = own.tolerance_mm;
+        format!("tolerance_mm {tolerance}, method {method}, degree {degree}{every}")
+    });
+    let toolpath = settings.toolpath.as_ref().map_or_else(off, |own| {
+        let rough = own.rough.as_ref().map(|rough| format!(", rough {rough}"));
+        let rough = rough.unwrap_or_default();
+        format!(
+            "of {}, tool {}{rough}, scallop_mm {}, pattern {}",
+            own.of, own.tool, own.scallop_mm, own.pattern
+        )
+    });
+    [
+        ("deliverables.surface", surface),
+        ("deliverables.skin", skin),
+        ("deliverables.toolpath", toolpath),
     ]
 }

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use deliverables::{
-    CadOptions, Entities, LengthUnit, MeshFormat, MeshOptions, PointFormat, Schema, file_stem,
+    CadOptions, Entities, Further, LengthUnit, MeshFormat, MeshOptions, PointFormat, Schema,
+    file_stem,
 };
 use jiff::Timestamp;
 use pipeline::{Kinds, Method, Settings, SmoothJoins};
@@ -390,6 +391,7 @@ impl Args {
                 _ => LengthUnit::Millimetre,
             },
             meshes: self.mesh_options(format),
+            further: Further::default(),
             author: self
                 .author
                 .as_deref()

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
+use deliverables::{cut_remark, rows_of};
 use scan_files::{RawSection, Unpacked};
 use skin::Section;
 
@@ -145,16 +146,9 @@ fn cut(args: &Args, shown: &Shown) -> Result<Sections, Failure> {
     let settings = args.grid.apply(input.settings().regrid)?;
     let image = grid::image(&input, &settings, &args.input, shown)?;
     let every_mm = args.every_mm.unwrap_or(settings.pitch_mm);
-    let every = (every_mm / settings.pitch_mm).round().max(1.0) as usize;
-    let cut = skin::cut(&image, every);
+    let cut = skin::cut(&image, rows_of(every_mm, settings.pitch_mm));
     let mut notes = input.notes;
-    if cut.left_out > 0 {
-        notes.push(format!(
-            "{} of {} nodes in the rows that were cut are beyond a gap or a step, and in no section",
-            cut.left_out,
-            cut.left_out + cut.nodes
-        ));
-    }
+    notes.extend(cut_remark(&cut));
     Ok(Sections {
         sections: cut.sections,
         notes,

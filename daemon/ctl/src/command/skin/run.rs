@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use cad_exchange::iges::NamedSurface;
-use deliverables::write_atomically;
+use deliverables::{SkinFigures, write_atomically};
 use serde::Serialize;
-use skin::{Method, Skin, SkinError};
+use skin::{Skin, SkinError};
 
 use super::{Args, read, summary};
 use crate::command::shown::{self, Shown};
@@ -17,45 +17,9 @@ use crate::output;
 #[derive(Debug, Serialize)]
 pub(super) struct Skinned {
     pub(super) output: PathBuf,
-    pub(super) method: &'static str,
-    pub(super) tolerance_mm: f64,
-    /// Whether sections are closed.
-    pub(super) closed: bool,
-    pub(super) sections: Vec<OfSection>,
-    pub(super) counts: Counts,
-    pub(super) deviation: Deviation,
+    #[serde(flatten)]
+    pub(super) figures: SkinFigures,
     pub(super) warnings: Vec<String>,
-}
-
-#[derive(Debug, Serialize)]
-pub(super) struct OfSection {
-    pub(super) name: String,
-    /// Parameter across, 0 to 1.
-    pub(super) height: f64,
-    pub(super) points: usize,
-    /// Knots of its own curve, by the published method.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) knots: Option<usize>,
-    pub(super) rms_mm: f64,
-    pub(super) max_mm: f64,
-}
-
-#[derive(Debug, Serialize)]
-pub(super) struct Counts {
-    /// Knots around once those of all sections are merged, by the published method.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) knots_merged: Option<usize>,
-    pub(super) knots_around: usize,
-    pub(super) points_around: usize,
-    pub(super) points_across: usize,
-    pub(super) points: usize,
-}
-
-#[derive(Debug, Serialize)]
-pub(super) struct Deviation {
-    pub(super) rms_mm: f64,
-    pub(super) max_mm: f64,
-    pub(super) within_tolerance_share: f64,
 }
 
 /// The report: what is printed, and every data point.
@@ -123,7 +87,11 @@ fn skin_file(args: &Args, shown: &Shown) -> Result<Skinned, Failure> {
     .map_err(|error| Failure::at(format!("cannot write {}", output.display()), &error))?;
     let mut warnings = read.notes;
     warnings.extend(found.warnings.iter().map(ToString::to_string));
-    let skinned = told(&found, output, &settings, warnings);
+    let skinned = Skinned {
+        output,
+        figures: SkinFigures::of(&found, &settings),
+        warnings,
+    };
     if let Some(path) = &args.report {
         let report = Report {
             skinned: &skinned,
@@ -146,60 +114,4 @@ fn data_points(found: &Skin) -> Vec<DataPoint> {
         before_mm: found.before_mm.get(k).copied(),
     };
     found.deviations.iter().enumerate().map(of).collect()
-}
-
-fn told(
-    found: &Skin,
-    output: PathBuf,
-    settings: &skin::Settings,
-    warnings: Vec<String>,
-) -> Skinned {
-    let section = |(k, name): (usize, &String)| {
-        let from = found.deviations.partition_point(|own| own.section < k);
-        let own = found.deviations[from..]
-            .iter()
-            .take_while(|own| own.section == k);
-        let (mut points, mut squares, mut max_mm) = (0_usize, 0.0, 0.0_f64);
-        for own in own {
-            points += 1;
-            squares += own.off_mm * own.off_mm;
-            max_mm = max_mm.max(own.off_mm);
-        }
-        OfSection {
-            name: name.clone(),
-            height: found.heights[k],
-            points,
-            knots: found.counts.of_sections.get(k).copied(),
-            rms_mm: (squares / points.max(1) as f64).sqrt(),
-            max_mm,
-        }
-    };
-    let within = found
-        .deviations
-        .iter()
-        .filter(|own| own.off_mm <= settings.tolerance_mm);
-    let share = within.count() as f64 / found.deviations.len().max(1) as f64;
-    Skinned {
-        output,
-        method: match settings.method {
-            Method::Relief => "relief",
-            Method::Jo => "jo",
-        },
-        tolerance_mm: settings.tolerance_mm,
-        closed: found.is_closed,
-        sections: found.sections.iter().enumerate().map(section).collect(),
-        counts: Counts {
-            knots_merged: found.counts.merged,
-            knots_around: found.counts.around,
-            points_around: found.counts.points_around,
-            points_across: found.counts.rows,
-            points: found.counts.points(),
-        },
-        deviation: Deviation {
-            rms_mm: found.rms_mm(),
-            max_mm: found.most_mm(),
-            within_tolerance_share: share,
-        },
-        warnings,
-    }
 }

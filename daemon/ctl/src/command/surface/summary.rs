@@ -1,6 +1,8 @@
 //! A surface told to people.
 
-use super::run::{Figures, Surfaced};
+use deliverables::SurfaceFigures;
+
+use super::run::Surfaced;
 use crate::output;
 
 /// Pieces told one by one.
@@ -68,7 +70,7 @@ pub(super) fn told(surfaced: &Surfaced) -> String {
     lines.join("\n")
 }
 
-fn row(figures: &Figures) -> Vec<String> {
+fn row(figures: &SurfaceFigures) -> Vec<String> {
     let mut pieces: Vec<String> = figures
         .pieces
         .iter()
@@ -79,7 +81,7 @@ fn row(figures: &Figures) -> Vec<String> {
         pieces.push(format!("{} more", figures.pieces.len() - MOST_PIECES));
     }
     vec![
-        figures.knots.to_owned(),
+        figures.knots.clone(),
         pieces.join(", "),
         figures.control_points.to_string(),
         format!("{:.4}", figures.max_mm),

@@ -1,7 +1,6 @@
 //! `relief toolpath`.
 
 mod args;
-mod machine;
 mod model;
 mod run;
 mod summary;

@@ -3,17 +3,17 @@
 use std::io::Read;
 use std::path::Path;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use toolpath::{Cuboid, Cutter, Dialect, Feed, Fixture, Machine, Speed, Tool};
 
-use crate::failure::Failure;
-
-#[derive(Debug, Deserialize)]
+/// A machine as its file has it: the keys of `config/machine.toml`. Lengths in millimetres.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct MachineFile {
+pub struct MachineFile {
     dialect: DialectName,
     #[serde(default = "first_program")]
     program: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
     decimals: Option<u8>,
     safe_z_mm: f64,
     work_offset_mm: [f64; 3],
@@ -21,6 +21,7 @@ struct MachineFile {
     work_offset_code: u32,
     rapid_mm_per_min: f64,
     max_feed_mm_per_min: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
     acceleration_mm_per_s2: Option<f64>,
     spindle_rpm: [f64; 2],
     #[serde(default)]
@@ -32,14 +33,14 @@ struct MachineFile {
     tools: Vec<ToolTable>,
 }
 
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum DialectName {
     Fanuc,
     LinuxCnc,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Limits {
     x_mm: [f64; 2],
@@ -47,7 +48,7 @@ struct Limits {
     z_mm: [f64; 2],
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FixtureTable {
     name: String,
@@ -56,18 +57,24 @@ struct FixtureTable {
     z_mm: [f64; 2],
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ToolTable {
     number: u32,
     cutter: String,
     flutes: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
     spindle_rpm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     surface_m_per_min: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     feed_mm_per_min: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     chip_load_mm: Option<f64>,
     plunge_mm_per_min: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
     step_down_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     step_over_mm: Option<f64>,
 }
 
@@ -82,54 +89,93 @@ fn first_offset() -> u32 {
 /// Longest file that is read.
 const MOST_BYTES: u64 = 1 << 20;
 
-/// Reads and checks the machine's file.
-pub(super) fn read(path: &Path) -> Result<Machine, Failure> {
-    let name = path.display().to_string();
-    let file = std::fs::File::open(path)
-        .map_err(|error| Failure::at(format!("cannot read {name}"), &error))?;
-    let mut text = String::new();
-    file.take(MOST_BYTES + 1)
-        .read_to_string(&mut text)
-        .map_err(|error| Failure::at(format!("cannot read {name}"), &error))?;
-    if text.len() as u64 > MOST_BYTES {
-        return Err(Failure::Failed(format!(
-            "{name}: is larger than 1 MiB, and no machine's file"
-        )));
-    }
-    parse(&text).map_err(|why| Failure::Failed(format!("{name}: {why}")))
+/// A machine's file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum MachineFileError {
+    /// It cannot be read.
+    #[error("cannot read {name}: {source}")]
+    Read {
+        /// The file.
+        name: String,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// It is something else.
+    #[error("{name}: is larger than 1 MiB, and no machine's file")]
+    Long {
+        /// The file.
+        name: String,
+    },
+    /// A key or value that cannot be.
+    #[error("{name}: {why}")]
+    Wrong {
+        /// The file.
+        name: String,
+        /// Which, and what to do.
+        why: String,
+    },
 }
 
-fn parse(text: &str) -> Result<Machine, String> {
-    let file: MachineFile = toml::from_str(text).map_err(|error| error.to_string())?;
-    let tools: Result<Vec<Tool>, String> = file.tools.iter().map(tool).collect();
-    let dialect = match file.dialect {
-        DialectName::Fanuc => Dialect::Fanuc,
-        DialectName::LinuxCnc => Dialect::LinuxCnc,
-    };
-    // What controls of either kind take at least.
-    let usual = match dialect {
-        Dialect::Fanuc => 3,
-        Dialect::LinuxCnc => 4,
-    };
-    let machine = Machine {
-        dialect,
-        program: file.program,
-        decimals: file.decimals.unwrap_or(usual),
-        travel: cuboid(&file.travel),
-        work_offset_mm: file.work_offset_mm,
-        work_offset_code: file.work_offset_code,
-        rapid_mm_per_min: file.rapid_mm_per_min,
-        max_feed_mm_per_min: file.max_feed_mm_per_min,
-        acceleration_mm_per_s2: file.acceleration_mm_per_s2,
-        spindle_rpm: file.spindle_rpm,
-        coolant: file.coolant,
-        safe_z_mm: file.safe_z_mm,
-        stock: cuboid(&file.stock),
-        fixtures: file.fixtures.into_iter().map(fixture).collect(),
-        tools: tools?,
-    };
-    machine.validate().map_err(|error| error.to_string())?;
-    Ok(machine)
+impl MachineFile {
+    /// Reads and checks a machine's file.
+    ///
+    /// # Errors
+    /// Any [`MachineFileError`].
+    pub fn read(path: &Path) -> Result<Self, MachineFileError> {
+        let name = path.display().to_string();
+        let mut text = String::new();
+        let read = std::fs::File::open(path)
+            .and_then(|file| file.take(MOST_BYTES + 1).read_to_string(&mut text));
+        if let Err(source) = read {
+            return Err(MachineFileError::Read { name, source });
+        }
+        if text.len() as u64 > MOST_BYTES {
+            return Err(MachineFileError::Long { name });
+        }
+        Self::parse(&text).map_err(|why| MachineFileError::Wrong { name, why })
+    }
+
+    fn parse(text: &str) -> Result<Self, String> {
+        let file: Self = toml::from_str(text).map_err(|error| error.to_string())?;
+        file.machine()?;
+        Ok(file)
+    }
+
+    /// The machine.
+    ///
+    /// # Errors
+    /// The key whose value cannot be, and what it must be.
+    pub fn machine(&self) -> Result<Machine, String> {
+        let tools: Result<Vec<Tool>, String> = self.tools.iter().map(tool).collect();
+        let dialect = match self.dialect {
+            DialectName::Fanuc => Dialect::Fanuc,
+            DialectName::LinuxCnc => Dialect::LinuxCnc,
+        };
+        // What controls of either kind take at least.
+        let usual = match dialect {
+            Dialect::Fanuc => 3,
+            Dialect::LinuxCnc => 4,
+        };
+        let machine = Machine {
+            dialect,
+            program: self.program,
+            decimals: self.decimals.unwrap_or(usual),
+            travel: cuboid(&self.travel),
+            work_offset_mm: self.work_offset_mm,
+            work_offset_code: self.work_offset_code,
+            rapid_mm_per_min: self.rapid_mm_per_min,
+            max_feed_mm_per_min: self.max_feed_mm_per_min,
+            acceleration_mm_per_s2: self.acceleration_mm_per_s2,
+            spindle_rpm: self.spindle_rpm,
+            coolant: self.coolant,
+            safe_z_mm: self.safe_z_mm,
+            stock: cuboid(&self.stock),
+            fixtures: self.fixtures.iter().map(fixture).collect(),
+            tools: tools?,
+        };
+        machine.validate().map_err(|error| error.to_string())?;
+        Ok(machine)
+    }
 }
 
 fn cuboid(limits: &Limits) -> Cuboid {
@@ -140,9 +186,9 @@ fn cuboid(limits: &Limits) -> Cuboid {
     }
 }
 
-fn fixture(table: FixtureTable) -> Fixture {
+fn fixture(table: &FixtureTable) -> Fixture {
     Fixture {
-        name: table.name,
+        name: table.name.clone(),
         place: Cuboid {
             x_mm: table.x_mm,
             y_mm: table.y_mm,
@@ -185,11 +231,12 @@ fn tool(table: &ToolTable) -> Result<Tool, String> {
 mod tests {
     use super::*;
 
-    const EXAMPLE: &str = include_str!("../../../../../config/machine.toml");
+    const EXAMPLE: &str = include_str!("../../../../config/machine.toml");
 
     #[test]
     fn the_example_is_a_machine() {
-        let machine = parse(EXAMPLE).unwrap();
+        let file = MachineFile::parse(EXAMPLE).unwrap();
+        let machine = file.machine().unwrap();
         assert_eq!(machine.dialect, Dialect::LinuxCnc);
         let ball = machine.tool(&"ball:6".parse().unwrap()).unwrap();
         assert_eq!((ball.number, ball.flutes), (1, 2));
@@ -199,13 +246,16 @@ mod tests {
         // 250 m/min around 10 mm.
         assert_eq!(machine.spindle_rpm(flat), 7958.0);
         assert_eq!(flat.step_over_mm, 5.0);
+        // As it is kept with a scan.
+        let kept = serde_json::to_value(&file).unwrap();
+        assert_eq!(serde_json::from_value::<MachineFile>(kept).unwrap(), file);
     }
 
     #[test]
     fn what_is_wrong_is_told_by_its_key() {
         let told = |from: &str, to: &str| {
             assert!(EXAMPLE.contains(from), "{from}");
-            parse(&EXAMPLE.replacen(from, to, 1)).unwrap_err()
+            MachineFile::parse(&EXAMPLE.replacen(from, to, 1)).unwrap_err()
         };
         for (from, to, expected) in [
             ("safe_z_mm", "save_z_mm", "unknown field `save_z_mm`"),

@@ -4,33 +4,43 @@
 use std::io::Write;
 
 use cad_exchange::iges;
-use deliverables::{CadOptions, Schema, WriteError, write_step, write_surfaces};
 use jiff::Timestamp;
 use nurbs::{BSplineSurface, PatchSurface, PiecewiseCubic, PiecewiseError, TensorSpline};
 use reconstruct::{
     Coedge, Edge, EdgeId, EdgeKind, EdgeOrigin, Face, Loop, Model, Surface, Vertex, VertexId,
 };
 
+use crate::export::{CadOptions, Schema, WriteError, write_step, write_surfaces};
+
 /// A surface over x and y, with its name in the file.
-pub(super) struct NamedSurface<'a> {
-    pub(super) name: String,
-    pub(super) surface: &'a BSplineSurface,
+#[derive(Debug, Clone)]
+pub struct HeightSurface<'a> {
+    /// Its name.
+    pub name: String,
+    /// Over x and y in millimetres.
+    pub surface: &'a BSplineSurface,
 }
 
 /// Why surfaces were not written.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum SurfacesError {
+pub enum SurfacesError {
+    /// As IGES or STEP.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// A control point that is no number.
     #[error("a surface has a control point that is not finite: {0}")]
     Piecewise(#[from] PiecewiseError),
+    /// What the destination said.
     #[error(transparent)]
     Io(#[from] std::io::Error),
 }
 
 /// Writes surfaces, as IGES entities 128 or as STEP.
-pub(super) fn surfaces(
-    named: &[NamedSurface<'_>],
+///
+/// # Errors
+/// Any [`SurfacesError`].
+pub fn write_height_surfaces(
+    named: &[HeightSurface<'_>],
     name: &str,
     timestamp: Timestamp,
     author: &str,
@@ -49,10 +59,7 @@ pub(super) fn surfaces(
         write_surfaces(&whole, name, timestamp, author, sink)?;
         return Ok(());
     }
-    let mut model = Model::default();
-    for (index, named) in named.iter().enumerate() {
-        add_face(&mut model, named, index)?;
-    }
+    let model = surface_model(named)?;
     let cad = CadOptions {
         step: Some(Schema::Ap242),
         author: author.to_owned(),
@@ -62,11 +69,20 @@ pub(super) fn surfaces(
     Ok(())
 }
 
+/// Surfaces as rectangular faces, each within edges of its own.
+pub(crate) fn surface_model(named: &[HeightSurface<'_>]) -> Result<Model, PiecewiseError> {
+    let mut model = Model::default();
+    for (index, named) in named.iter().enumerate() {
+        add_face(&mut model, named, index)?;
+    }
+    Ok(model)
+}
+
 fn add_face(
     model: &mut Model,
-    named: &NamedSurface<'_>,
+    named: &HeightSurface<'_>,
     index: usize,
-) -> Result<(), SurfacesError> {
+) -> Result<(), PiecewiseError> {
     let surface = named.surface;
     let heights = surface.points().iter().map(|point| point[2]).collect();
     let (u_knots, v_knots) = (surface.u_knots().clone(), surface.v_knots().clone());
