@@ -87,7 +87,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("relief-studies", &STUDIES),
     ("relief-sections", &["nurbs", "range-image", "skin"]),
     (
-        "relief-sections",
         "relief-surfaces",
         &["nurbs", "range-image", "regrid", "scan-files", "surfacing"],
     ),
