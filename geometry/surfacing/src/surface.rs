@@ -17,6 +17,7 @@ use crate::knots::{
 };
 use crate::optimal;
 use crate::problem::Problem;
+use crate::within::fit_within;
 
 /// What is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -199,7 +200,10 @@ pub fn make(
             Axis::new(&knots.u).ok_or(SurfaceError::Singular)?,
             Axis::new(&knots.v).ok_or(SurfaceError::Singular)?,
         );
-        let fitted = problem.fit_axes(&u, &v);
+        let fitted = match settings.placement {
+            Placement::Optimal => fit_within(&problem, &u, &v, &part)?.fit,
+            _ => problem.fit_axes(&u, &v),
+        };
         if settings.placement == Placement::Optimal && fitted.score.max > settings.tolerance_mm {
             return Err(out_of_reach(&problem, fitted.score.max));
         }

@@ -31,6 +31,9 @@ struct Options {
     /// A recorded scan to be measured, too (PLY in metres)
     #[arg(long, value_name = "FILE")]
     scan: Option<PathBuf>,
+    /// Measure only surfaces whose name has this in it, and no fairing
+    #[arg(long, value_name = "WORD")]
+    only: Option<String>,
     /// Leave grids and figures for the judge in this folder
     #[arg(long, value_name = "FOLDER")]
     data: Option<PathBuf>,
@@ -87,6 +90,7 @@ fn study(options: &Options) -> Result<()> {
     placements::measure(
         options.short,
         options.scan.as_deref(),
+        options.only.as_deref(),
         options.data.as_deref(),
     )
 }

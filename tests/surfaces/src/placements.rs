@@ -34,7 +34,13 @@ struct Ours {
 type Surface = (&'static str, fn(f64, f64) -> f64, [f64; 3]);
 
 /// Measures, prints tables, leaves data; fails where a bar is missed.
-pub(crate) fn measure(short: bool, scan: Option<&Path>, data: Option<&Path>) -> Result<()> {
+pub(crate) fn measure(
+    short: bool,
+    scan: Option<&Path>,
+    only: Option<&str>,
+    data: Option<&Path>,
+) -> Result<()> {
+    let is_wanted = |name: &str| only.is_none_or(|word| name.contains(word));
     let surfaces: [Surface; 3] = [
         ("franke", franke, [0.5, 0.1, 0.02]),
         ("peaks", peaks, [0.5, 0.1, 0.02]),
@@ -46,7 +52,7 @@ pub(crate) fn measure(short: bool, scan: Option<&Path>, data: Option<&Path>) -> 
         "| surface | tolerance mm | uniform 2^k | max | polyline | max | derivative | max | optimal | max | rms | fewest uniform as near | ratio |"
     );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
-    for (name, z, tolerances) in surfaces {
+    for (name, z, tolerances) in surfaces.into_iter().filter(|s| is_wanted(s.0)) {
         let grid = grid(side, side, 200.0 / (side - 1) as f64, z);
         let tolerances = if short {
             &tolerances[1..2]
@@ -62,11 +68,24 @@ pub(crate) fn measure(short: bool, scan: Option<&Path>, data: Option<&Path>) -> 
         for (name, grid, tolerances) in [
             ("scan, flank", &flank, &[1.0, 0.5, 0.2][..]),
             ("scan, whole", &whole, &[5.0, 2.0][..]),
-        ] {
+        ]
+        .into_iter()
+        .filter(|scan| is_wanted(scan.0))
+        {
             let case = compare(name, grid, tolerances, &mut missed)?;
             leave(data, &case)?;
         }
     }
+    if only.is_none() {
+        fairings(short, surfaces, &mut missed)?;
+    }
+    if !missed.is_empty() {
+        bail!("missed:\n  {}", missed.join("\n  "));
+    }
+    Ok(())
+}
+
+fn fairings(short: bool, surfaces: [Surface; 3], missed: &mut Vec<String>) -> Result<()> {
     println!();
     println!(
         "| surface with noise of 0.05 mm, 200 mm wide | bound mm | variation of the truth | before | after | falls by | greatest move | at the bound | rms to the truth before | after |"
@@ -75,17 +94,8 @@ pub(crate) fn measure(short: bool, scan: Option<&Path>, data: Option<&Path>) -> 
     for (name, z, _) in surfaces {
         for bound_mm in [0.05, 0.15] {
             // At about a scanner's pitch: on coarser grids shape is most of the variation.
-            fairing(
-                name,
-                z,
-                bound_mm,
-                if short { 161 } else { 401 },
-                &mut missed,
-            )?;
+            fairing(name, z, bound_mm, if short { 161 } else { 401 }, missed)?;
         }
-    }
-    if !missed.is_empty() {
-        bail!("missed:\n  {}", missed.join("\n  "));
     }
     Ok(())
 }

@@ -8,11 +8,14 @@
 //! 3. Where that does not reach the tolerance, spans that exceed it are halved.
 //! 4. Knots are taken away while the tolerance holds, and moved to lower the deviations,
 //!    in turn ([`polish`]).
+//! 5. More are taken away as long as a surface of those left can be drawn within the tolerance
+//!    where least squares are not ([`draw`]).
 //!
 //! Masked nodes are filled anew from the surface between the steps, so that they ask for no
 //! knots of their own.
 
 mod density;
+mod draw;
 mod polish;
 
 use range_image::{Cancelled, Monitor};

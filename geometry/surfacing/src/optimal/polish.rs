@@ -12,7 +12,7 @@ use crate::problem::{Problem, Score};
 /// grid alone.
 const MOST_VISITS: usize = 600_000_000;
 /// Knots whose loss is tried in earnest, those that are missed least first.
-const TRIED: usize = 8;
+pub(super) const TRIED: usize = 8;
 /// Knots to either side of a lost one that make up for it.
 const REACH: usize = 3;
 /// First and last share of the way to the next knot by which one is moved.
@@ -24,28 +24,28 @@ const GAIN: f64 = 0.995;
 const JOIN: f64 = 1.5;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Along {
+pub(super) enum Along {
     U,
     V,
 }
 
 /// Knots with what is needed to judge others that differ along one direction.
-struct State {
-    knots: Knots,
-    u: Axis,
-    v: Axis,
+pub(super) struct State {
+    pub(super) knots: Knots,
+    pub(super) u: Axis,
+    pub(super) v: Axis,
     /// Coefficients along y of each column, and along x of each row.
     along_v: Vec<f64>,
     along_u: Vec<f64>,
     score: Score,
 }
 
-struct Polish<'a> {
-    problem: &'a mut Problem,
+pub(super) struct Polish<'a> {
+    pub(super) problem: &'a mut Problem,
     /// Knots of creases along x and y, which stay where they are.
     fixed: &'a [Vec<f64>; 2],
-    monitor: &'a dyn Monitor,
-    fits_left: usize,
+    pub(super) monitor: &'a dyn Monitor,
+    pub(super) fits_left: usize,
     fits: usize,
 }
 
@@ -101,11 +101,11 @@ pub(super) fn polish(
     {
         safe = state.knots;
     }
-    Ok(safe)
+    polish.draw(safe)
 }
 
 impl Polish<'_> {
-    fn state(&mut self, knots: Knots) -> Option<State> {
+    pub(super) fn state(&mut self, knots: Knots) -> Option<State> {
         let (u, v) = (Axis::new(&knots.u)?, Axis::new(&knots.v)?);
         let along_v = fit::along_v(&v, &self.problem.z);
         let along_u = fit::along_u(&u, &self.problem.z, self.problem.rows);
@@ -211,7 +211,7 @@ impl Polish<'_> {
     }
 
     /// What it costs to lose each knot, least first.
-    fn losses(&mut self, state: &State) -> Vec<(Score, Along, usize)> {
+    pub(super) fn losses(&mut self, state: &State) -> Vec<(Score, Along, usize)> {
         let mut losses: Vec<(Score, Along, usize)> = Vec::new();
         for along in [Along::U, Along::V] {
             let breaks = breaks_of(state, along).clone();
@@ -353,7 +353,7 @@ impl Polish<'_> {
     }
 
     /// Moves all knots to where the deviations are least.
-    fn move_all(
+    pub(super) fn move_all(
         &mut self,
         state: &mut State,
         cost: impl Fn(&Score) -> f64,
