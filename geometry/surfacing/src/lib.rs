@@ -33,7 +33,7 @@ mod within;
 pub use axis::Breaks;
 pub use character::{CharacterLine, Features, LineKind, grid_lines, split_at_creases};
 pub use error::SurfaceError;
-pub use fairing::{FairingReport, fair};
+pub use fairing::{FairingReport, curvature_variation, fair};
 pub use grid::HeightGrid;
 pub use knots::{Break, JumpThresholds, Knots, Placement};
 pub use surface::{Made, Piece, Settings, SurfaceReport, fit_with, make};

@@ -31,7 +31,7 @@ struct Options {
     /// A recorded scan to be measured, too (PLY in metres)
     #[arg(long, value_name = "FILE")]
     scan: Option<PathBuf>,
-    /// Measure only surfaces whose name has this in it, and no fairing
+    /// Measure only surfaces whose name has this in it; `fairing`: only that
     #[arg(long, value_name = "WORD")]
     only: Option<String>,
     /// Leave grids and figures for the judge in this folder
