@@ -120,7 +120,7 @@ mod tests {
     use range_image::Unmonitored;
 
     /// Hills with a sharp one, which least squares flatten, and a hole beside it.
-    fn problem(tolerance: f64, is_holed: bool) -> Problem {
+    fn problem(tolerance: f64, is_holed: bool) -> Problem<'static> {
         let z = (0..60 * 50).map(|n| {
             let (x, y) = ((n / 50) as f64, (n % 50) as f64);
             let (a, b) = (x - 27.0, y - 22.0);
@@ -130,7 +130,7 @@ mod tests {
             libm::sin(x * 0.2) + 3.0 * libm::exp(-(a * a + b * b) / 40.0)
         });
         let grid = HeightGrid::new(1.0, [0.0; 2], 60, 50, z.collect()).unwrap();
-        Problem::new(&grid, tolerance)
+        Problem::new(&grid, tolerance, &Unmonitored)
     }
 
     fn axes() -> (Axis, Axis) {

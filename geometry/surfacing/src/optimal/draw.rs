@@ -11,7 +11,7 @@ use crate::within::{STEP_FITS, fit_within};
 /// the others will not do.
 const HOPELESS: f64 = 6.0;
 
-impl Polish<'_> {
+impl Polish<'_, '_> {
     /// Takes away knots as long as a surface can be drawn within the tolerance.
     pub(super) fn draw(&mut self, knots: Knots) -> Result<Knots, Cancelled> {
         let Some(mut state) = self.state(knots.clone()) else {
@@ -22,7 +22,7 @@ impl Polish<'_> {
     }
 
     fn draw_fewer(&mut self, state: &mut State) -> Result<bool, Cancelled> {
-        let losses = self.losses(state);
+        let losses = self.losses(state)?;
         for (score, along, index) in losses.into_iter().take(TRIED) {
             if score.max > HOPELESS * self.problem.tolerance {
                 continue;

@@ -40,8 +40,8 @@ pub(super) struct State {
     score: Score,
 }
 
-pub(super) struct Polish<'a> {
-    pub(super) problem: &'a mut Problem,
+pub(super) struct Polish<'a, 'b> {
+    pub(super) problem: &'a mut Problem<'b>,
     /// Knots of creases along x and y, which stay where they are.
     fixed: &'a [Vec<f64>; 2],
     pub(super) monitor: &'a dyn Monitor,
@@ -104,7 +104,7 @@ pub(super) fn polish(
     polish.draw(safe)
 }
 
-impl Polish<'_> {
+impl Polish<'_, '_> {
     pub(super) fn state(&mut self, knots: Knots) -> Option<State> {
         let (u, v) = (Axis::new(&knots.u)?, Axis::new(&knots.v)?);
         let along_v = fit::along_v(&v, &self.problem.z);
@@ -211,7 +211,10 @@ impl Polish<'_> {
     }
 
     /// What it costs to lose each knot, least first.
-    pub(super) fn losses(&mut self, state: &State) -> Vec<(Score, Along, usize)> {
+    pub(super) fn losses(
+        &mut self,
+        state: &State,
+    ) -> Result<Vec<(Score, Along, usize)>, Cancelled> {
         let mut losses: Vec<(Score, Along, usize)> = Vec::new();
         for along in [Along::U, Along::V] {
             let breaks = breaks_of(state, along).clone();
@@ -222,19 +225,20 @@ impl Polish<'_> {
                     continue;
                 }
                 previous = breaks.inner[index];
+                self.monitor.check()?;
                 if let Some(score) = self.try_other(state, along, &breaks.without(index)) {
                     losses.push((score, along, index));
                 }
             }
         }
         losses.sort_by(|a, b| a.0.soft.total_cmp(&b.0.soft));
-        losses
+        Ok(losses)
     }
 
     fn remove_one(&mut self, state: &mut State) -> Result<bool, Cancelled> {
         self.told()?;
         let tolerance = self.problem.tolerance;
-        let losses = self.losses(state);
+        let losses = self.losses(state)?;
         // Where many can go without a word, they go at once.
         let mut gone = false;
         for along in [Along::U, Along::V] {
@@ -267,7 +271,7 @@ impl Polish<'_> {
 
     /// Takes away a knot that is missed, and moves all others to make up for it.
     fn remove_boldly(&mut self, state: &mut State) -> Result<bool, Cancelled> {
-        let losses = self.losses(state);
+        let losses = self.losses(state)?;
         for (_, along, index) in losses.into_iter().take(TRIED) {
             let mut knots = state.knots.clone();
             match along {
@@ -330,6 +334,7 @@ impl Polish<'_> {
         while step > 3.0 * LAST_STEP {
             let mut is_better = false;
             for index in from..to {
+                self.monitor.check()?;
                 for other in self.moves(along, &breaks, index, step) {
                     let Some(tried) = self.try_other(state, along, &other) else {
                         continue;
@@ -364,6 +369,7 @@ impl Polish<'_> {
             for along in [Along::U, Along::V] {
                 let mut index = 0;
                 while index < breaks_of(state, along).inner.len() {
+                    self.monitor.check()?;
                     let breaks = breaks_of(state, along).clone();
                     for other in self.moves(along, &breaks, index, step) {
                         if let Some(score) = self.try_other(state, along, &other)
