@@ -20,7 +20,7 @@ const MOST_GAIN: f64 = 40.0;
 const LEAST_SPAN: f64 = 0.05;
 
 /// Of how many knots one is left out at a time.
-const REMOVED_OF: usize = 64;
+const REMOVED_OF: usize = 256;
 
 /// Inner knots over the nodes of a direction, ascending, repeated ones as often as they
 /// count, at most three times.
@@ -112,8 +112,8 @@ impl Breaks {
         }
     }
 
-    /// Leaves out knots until each basis function is held by a node: of 64 and fewer one at a
-    /// time, of more a sixty-fourth of them, so that the work grows with their number and no faster.
+    /// Leaves out knots until each basis function is held by a node: of 256 and fewer one at a
+    /// time, of more a 256th of them, so that the work grows with their number and no faster.
     #[must_use]
     pub fn solvable(mut self) -> Self {
         while Axis::new(&self).is_none() && !self.inner.is_empty() {
