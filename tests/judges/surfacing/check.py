@@ -22,14 +22,16 @@ import warnings
 
 import numpy
 import scipy
-from scipy.ndimage import distance_transform_edt
 from scipy.interpolate import RectBivariateSpline, bisplev, bisplrep
+from scipy.ndimage import distance_transform_edt
 
 # A root mean square deviation this little above ours is equal to it: FITPACK stops within a
 # thousandth of the sum of squares that it is given.
 SLACK = 1.001
 
 
+# Of FITPACK's search for the smoothing.
+MOST_ITERATIONS = 200
 # Rounds in which masked nodes are filled.
 ROUNDS = 12
 # With more control points than this bisplrep takes hours.
@@ -50,7 +52,10 @@ def regrid(x, y, z, rms, _):
         filled = z[tuple(nearest)]
     smooth = (~masked).sum() * (rms * SLACK) ** 2
     for _ in range(ROUNDS if masked.any() else 1):
-        spline = RectBivariateSpline(x, y, filled, s=smooth)
+        try:
+            spline = RectBivariateSpline(x, y, filled, s=smooth, maxit=MOST_ITERATIONS)
+        except ValueError as error:
+            return " ".join(str(error).split())[:80]
         filled[masked] = spline(x, y)[masked]
     u, v = spline.get_knots()
     return told(z, spline(x, y), (len(u) - 4) * (len(v) - 4))
