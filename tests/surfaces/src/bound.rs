@@ -161,7 +161,10 @@ mod tests {
         assert_eq!(knots_needed(&lines, 0.01), 2);
         // Fewer are ruled out by less and less.
         let bounds = [0, 1, 2].map(|count| nearest(&lines, count));
-        assert!(bounds[0] > 2.0 * bounds[1] && bounds[1] > 0.01, "{bounds:?}");
+        assert!(
+            bounds[0] > 2.0 * bounds[1] && bounds[1] > 0.01,
+            "{bounds:?}"
+        );
         assert!(bounds[2] < 0.01, "{bounds:?}");
     }
 

@@ -23,7 +23,8 @@ const HOLED: &str = "franke, holes";
 
 const HEAD: &str = "# B-spline surfaces, measured
 
-`cargo xtask study surfaces --write` makes this page.
+`cargo xtask study surfaces --write --scan bun000.ply` makes this page; the scan is a view of the Stanford
+bunny, whose flank by itself has no masked nodes.
 
 Control points of `relief surface` by each placement of knots, and the greatest deviation from the
 grid. *Uniform 2^k* doubles spans. *Fewest of any equal spans* is the least number of control points
