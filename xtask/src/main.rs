@@ -156,6 +156,7 @@ fn full() -> anyhow::Result<()> {
     study::run(&study::Study::Surfaces {
         short: false,
         scan: None,
+        write: false,
     })?;
     study::run(&study::Study::Segmentation {
         options: ["--set", "judge", "--full", "--peers", "--check"]

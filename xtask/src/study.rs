@@ -92,6 +92,9 @@ pub(crate) enum Study {
         /// A recorded scan to be measured, too (PLY in metres)
         #[arg(long, value_name = "FILE")]
         scan: Option<PathBuf>,
+        /// Write docs/studies/surfaces.md, too
+        #[arg(long)]
+        write: bool,
     },
 }
 
@@ -116,7 +119,7 @@ pub(crate) fn run(study: &Study) -> Result<()> {
         Study::Regrid { options } => program("study-regrid", options),
         Study::Segmentation { options } => program("study-segmentation", options),
         Study::Shapes { options } => program("study-shapes", options),
-        Study::Surfaces { short, scan } => surfaces(*short, scan.as_deref()),
+        Study::Surfaces { short, scan, write } => surfaces(*short, scan.as_deref(), *write),
         Study::Throughput { usb, options } => {
             let mut options = options.clone();
             if *usb {
@@ -129,8 +132,11 @@ pub(crate) fn run(study: &Study) -> Result<()> {
     }
 }
 
+/// Where the figures of B-spline surfaces are kept.
+const SURFACES_PAGE: &str = "docs/studies/surfaces.md";
+
 /// Our surfaces first, whose control points SciPy is then asked to match.
-fn surfaces(short: bool, scan: Option<&Path>) -> Result<()> {
+fn surfaces(short: bool, scan: Option<&Path>, write: bool) -> Result<()> {
     let place = shell::root().join("target");
     let data = place.join("studies/surfaces");
     if data.exists() {
@@ -142,10 +148,19 @@ fn surfaces(short: bool, scan: Option<&Path>) -> Result<()> {
     if let Some(scan) = scan {
         words.extend(["--scan".into(), scan.into()]);
     }
+    words.extend(
+        write
+            .then(|| ["--write".into(), SURFACES_PAGE.into()])
+            .into_iter()
+            .flatten(),
+    );
     program_of("relief-surfaces", "study-surfaces", &words)?;
     let python = judge::python(&place.join("judges"), &[judge::SCIPY])?;
     let mut check = vec!["-B", "tests/judges/surfacing/check.py", &data];
     check.extend((!short).then_some("--bisplrep"));
+    if write {
+        check.extend(["--append", SURFACES_PAGE]);
+    }
     shell::run(&python, &check)
 }
 

@@ -246,6 +246,14 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
+/// How much curvature varies, as [`FairingReport`] has it: mean square of the third derivative
+/// along x and y, mm^-4, over what no feature crosses.
+#[must_use]
+pub fn curvature_variation(grid: &HeightGrid, features: &Features) -> f64 {
+    let scale = grid.pitch_mm() * grid.pitch_mm() * grid.pitch_mm();
+    Energy::new(grid, features).mean_square(grid.raw_z_mm()) / (scale * scale)
+}
+
 /// The grid with its points moved by at most `bound_mm`, and what that did.
 ///
 /// # Errors

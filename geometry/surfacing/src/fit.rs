@@ -6,6 +6,7 @@
 //! conjugate gradients. Masked nodes count with a small weight, and with what was filled in
 //! there, so that no control point is left undetermined.
 
+use range_image::Monitor;
 use rayon::prelude::*;
 
 use crate::axis::{Axis, DEGREE};
@@ -123,13 +124,13 @@ pub(crate) fn at(line: &[f64], node: &crate::axis::AtNode) -> f64 {
 }
 
 /// Least squares over the nodes of which `is_data` holds; the others draw weakly to what
-/// `filled` has there. `start` is where the iteration begins.
+/// `filled` has there. `start` is where the iteration begins; cancelled, it ends where it is.
 pub(crate) fn masked(
     u: &Axis,
     v: &Axis,
-    filled: &[f64],
-    is_data: &[bool],
+    (filled, is_data): (&[f64], &[bool]),
     start: Vec<f64>,
+    monitor: &dyn Monitor,
 ) -> Vec<f64> {
     let weighted = |mut z: Vec<f64>| {
         for (z, &is_data) in z.iter_mut().zip(is_data) {
@@ -169,7 +170,7 @@ pub(crate) fn masked(
     let mut size = dot(&residual, &preconditioned);
     let enough = DROP * DROP * dot(&project(filled), &precondition(&project(filled)));
     for _ in 0..MOST_STEPS {
-        if size <= enough {
+        if size <= enough || monitor.is_cancelled() {
             break;
         }
         let image = project(&weighted(values(u, v, &direction)));
@@ -205,6 +206,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::axis::Breaks;
+    use range_image::Unmonitored;
 
     fn axis(nodes: usize, spans: usize) -> Axis {
         Axis::new(&Breaks::uniform(nodes, spans)).unwrap()
@@ -250,7 +252,7 @@ mod tests {
             .collect();
         let start = full(&u, &v, &filled);
         let before = values(&u, &v, &start);
-        let coefficients = masked(&u, &v, &filled, &is_data, start);
+        let coefficients = masked(&u, &v, (&filled, &is_data), start, &Unmonitored);
         let after = values(&u, &v, &coefficients);
         let worst = |values: &[f64]| {
             let off = values.iter().enumerate().filter(|(n, _)| is_data[*n]);

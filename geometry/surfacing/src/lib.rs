@@ -11,6 +11,9 @@
 //! - [`knots`]: the paper's three placements; [`optimal`]: ours.
 //! - [`surface`]: all of it in order, with a report.
 //!
+//! With optimal knots the surface is drawn within the tolerance where that of least squares is
+//! beyond it.
+//!
 //! The surface is cubic and open in both directions (section 4); x and y are its parameters,
 //! so that its control points lie at the knots' averages and only their z is fitted.
 
@@ -25,11 +28,12 @@ pub mod knots;
 mod optimal;
 mod problem;
 pub mod surface;
+mod within;
 
 pub use axis::Breaks;
 pub use character::{CharacterLine, Features, LineKind, grid_lines, split_at_creases};
 pub use error::SurfaceError;
-pub use fairing::{FairingReport, fair};
+pub use fairing::{FairingReport, curvature_variation, fair};
 pub use grid::HeightGrid;
 pub use knots::{Break, JumpThresholds, Knots, Placement};
 pub use surface::{Made, Piece, Settings, SurfaceReport, fit_with, make};

@@ -1,5 +1,6 @@
 //! A grid to be fitted within a tolerance, and how well knots do at it.
 
+use range_image::Monitor;
 use rayon::prelude::*;
 
 use crate::axis::Axis;
@@ -31,7 +32,7 @@ pub(crate) struct Fit {
 }
 
 /// The data with their holes filled.
-pub(crate) struct Problem {
+pub(crate) struct Problem<'a> {
     pub(crate) columns: usize,
     pub(crate) rows: usize,
     pub(crate) z: Vec<f64>,
@@ -39,10 +40,12 @@ pub(crate) struct Problem {
     pub(crate) is_full: bool,
     /// Greatest deviation wanted, millimetres.
     pub(crate) tolerance: f64,
+    /// Who may end the work. Fits end early then, and are worth nothing.
+    monitor: &'a dyn Monitor,
 }
 
-impl Problem {
-    pub(crate) fn new(grid: &HeightGrid, tolerance: f64) -> Self {
+impl<'a> Problem<'a> {
+    pub(crate) fn new(grid: &HeightGrid, tolerance: f64, monitor: &'a dyn Monitor) -> Self {
         let raw = grid.raw_z_mm();
         Self {
             columns: grid.columns(),
@@ -51,6 +54,7 @@ impl Problem {
             is_data: raw.iter().map(|z| !z.is_nan()).collect(),
             is_full: grid.is_full(),
             tolerance,
+            monitor,
         }
     }
 
@@ -68,7 +72,7 @@ impl Problem {
     pub(crate) fn fit_axes(&self, u: &Axis, v: &Axis) -> Fit {
         let mut coefficients = fit::full(u, v, &self.z);
         if !self.is_full {
-            coefficients = fit::masked(u, v, &self.z, &self.is_data, coefficients);
+            coefficients = fit::masked(u, v, (&self.z, &self.is_data), coefficients, self.monitor);
         }
         Fit {
             score: self.score(u, v, &coefficients),

@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use nurbs::BSplineSurface;
-use range_image::Monitor;
+use range_image::{Monitor, Unmonitored};
 
 use crate::axis::{Axis, Breaks};
 use crate::character::{CharacterLine, LineKind, grid_lines, split_at_creases};
@@ -17,6 +17,7 @@ use crate::knots::{
 };
 use crate::optimal;
 use crate::problem::Problem;
+use crate::within::fit_within;
 
 /// What is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -193,13 +194,17 @@ pub fn make(
         let Some(block) = data.block(columns.clone(), rows.clone()) else {
             continue;
         };
-        let mut problem = Problem::new(&block, settings.tolerance_mm);
+        let mut problem = Problem::new(&block, settings.tolerance_mm, &part);
         let knots = placed(&mut problem, &block, settings, &part)?;
         let (u, v) = (
             Axis::new(&knots.u).ok_or(SurfaceError::Singular)?,
             Axis::new(&knots.v).ok_or(SurfaceError::Singular)?,
         );
-        let fitted = problem.fit_axes(&u, &v);
+        let fitted = match settings.placement {
+            Placement::Optimal => fit_within(&problem, &u, &v, &part)?.fit,
+            _ => problem.fit_axes(&u, &v),
+        };
+        monitor.check()?;
         if settings.placement == Placement::Optimal && fitted.score.max > settings.tolerance_mm {
             return Err(out_of_reach(&problem, fitted.score.max));
         }
@@ -243,7 +248,7 @@ pub fn fit_with(
     grid: &HeightGrid,
     knots: &Knots,
 ) -> Result<(BSplineSurface, f64, f64), SurfaceError> {
-    let problem = Problem::new(grid, 1.0);
+    let problem = Problem::new(grid, 1.0, &Unmonitored);
     let fitted = problem.fit(knots).ok_or(SurfaceError::Singular)?;
     let surface = in_space(grid, knots, &fitted.coefficients)?;
     let mean = fitted.score.sum_of_squares / grid.valid_nodes().max(1) as f64;

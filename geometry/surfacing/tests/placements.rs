@@ -9,7 +9,8 @@
 mod common;
 
 use common::{draws, face, franke, grid, peaks, waves};
-use range_image::Unmonitored;
+use range_image::{Monitor, Unmonitored};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use surfacing::{
     Breaks, HeightGrid, Knots, LineKind, Made, Placement, Settings, SurfaceError, fit_with, make,
 };
@@ -235,6 +236,34 @@ fn what_cannot_be_is_told() {
     }
     // With knots at nearly all nodes it does come as near as rounding.
     assert!(made(&grid, 1e-9, Placement::Optimal).report.max_mm <= 1e-9);
+}
+
+/// Ends the work when it has been asked so many times whether to.
+struct Ends(AtomicUsize);
+
+impl Monitor for Ends {
+    fn is_cancelled(&self) -> bool {
+        let left = self.0.load(Ordering::Relaxed);
+        self.0.store(left.saturating_sub(1), Ordering::Relaxed);
+        left == 0
+    }
+
+    fn progress(&self, _: f64) {}
+}
+
+#[test]
+fn the_work_ends_when_it_is_asked_to() {
+    let whole = grid(61, 61, 1.0, peaks);
+    let mut z = whole.raw_z_mm().to_vec();
+    z[1700..1730].fill(f64::NAN);
+    let holed = whole.with_z(z).unwrap();
+    for grid in [whole, holed] {
+        for asked in [0, 10, 100, 1000, 3000] {
+            let ends = Ends(AtomicUsize::new(asked));
+            let ended = make(&grid, &Settings::new(0.05), &ends);
+            assert!(matches!(ended, Err(SurfaceError::Cancelled(_))), "{asked}");
+        }
+    }
 }
 
 #[test]

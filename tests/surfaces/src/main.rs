@@ -7,6 +7,7 @@
 //! ```
 
 // Surfaces in closed form, as in the crate's own tests.
+mod bound;
 #[allow(dead_code, reason = "shared with tests; one is not measured here")]
 #[path = "../../../geometry/surfacing/tests/common/mod.rs"]
 mod common;
@@ -31,6 +32,12 @@ struct Options {
     /// A recorded scan to be measured, too (PLY in metres)
     #[arg(long, value_name = "FILE")]
     scan: Option<PathBuf>,
+    /// Measure only surfaces whose name has this in it; `fairing`: only that
+    #[arg(long, value_name = "WORD")]
+    only: Option<String>,
+    /// Write what is measured to this page, too
+    #[arg(long, value_name = "FILE")]
+    write: Option<PathBuf>,
     /// Leave grids and figures for the judge in this folder
     #[arg(long, value_name = "FOLDER")]
     data: Option<PathBuf>,
@@ -87,6 +94,8 @@ fn study(options: &Options) -> Result<()> {
     placements::measure(
         options.short,
         options.scan.as_deref(),
+        options.only.as_deref(),
         options.data.as_deref(),
+        options.write.as_deref(),
     )
 }

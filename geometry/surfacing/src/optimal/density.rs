@@ -1,5 +1,7 @@
 //! How many knots go where, for one direction by itself.
 
+use range_image::{Cancelled, Monitor};
+
 use crate::axis::{Axis, Breaks};
 use crate::optimal::worst_within;
 
@@ -35,7 +37,15 @@ impl Direction {
 
     /// The fewest knots found with which no node is farther off than the target; else the
     /// last ones tried. A span's deviation grows with the fourth power of its width.
-    pub(super) fn spread(&mut self, target: f64, off: impl Fn(&Axis) -> Vec<f64>) -> Breaks {
+    ///
+    /// # Errors
+    /// [`Cancelled`] at the monitor's wish.
+    pub(super) fn spread(
+        &mut self,
+        target: f64,
+        off: impl Fn(&Axis) -> Vec<f64>,
+        monitor: &dyn Monitor,
+    ) -> Result<Breaks, Cancelled> {
         let rounds = if self.is_first {
             FIRST_ROUNDS
         } else {
@@ -45,6 +55,7 @@ impl Direction {
         let mut best: Option<Breaks> = None;
         let mut last = Breaks::none(self.nodes);
         for _ in 0..rounds {
+            monitor.check()?;
             let breaks = self.breaks().solvable();
             let Some(axis) = Axis::new(&breaks) else {
                 break;
@@ -60,7 +71,7 @@ impl Direction {
             self.adapt(&breaks, &off, target);
             last = breaks;
         }
-        best.unwrap_or(last)
+        Ok(best.unwrap_or(last))
     }
 
     /// Spans that hold equal parts of the density, and the fixed knots.

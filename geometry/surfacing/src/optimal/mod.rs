@@ -8,11 +8,14 @@
 //! 3. Where that does not reach the tolerance, spans that exceed it are halved.
 //! 4. Knots are taken away while the tolerance holds, and moved to lower the deviations,
 //!    in turn ([`polish`]).
+//! 5. More are taken away as long as a surface of those left can be drawn within the tolerance
+//!    where least squares are not ([`draw`]).
 //!
 //! Masked nodes are filled anew from the surface between the steps, so that they ask for no
 //! knots of their own.
 
 mod density;
+mod draw;
 mod polish;
 
 use range_image::{Cancelled, Monitor};
@@ -27,6 +30,11 @@ const SHARES: [f64; 8] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.42, 0.35];
 
 /// Times that holes are filled anew once the tolerance holds.
 const REFILLS: usize = 2;
+
+/// Rounds of halving after which spans are halved that are within the tolerance by more and more, and
+/// what the least share of it comes down to with each.
+const PATIENT: usize = 12;
+const HASTE: f64 = 0.7;
 
 /// Places the knots. `fixed` are those that character lines ask for, along x and y.
 ///
@@ -51,8 +59,8 @@ pub(crate) fn place(
         monitor.check()?;
         let target = share * problem.tolerance;
         let candidate = Knots {
-            u: u.spread(target, |axis| problem.columns_off(axis)),
-            v: v.spread(target, |axis| problem.rows_off(axis)),
+            u: u.spread(target, |axis| problem.columns_off(axis), monitor)?,
+            v: v.spread(target, |axis| problem.rows_off(axis), monitor)?,
         };
         monitor.progress(0.3 * (step + 1) as f64 / SHARES.len() as f64);
         let is_near = problem
@@ -92,8 +100,13 @@ fn halve_until_near(
     mut knots: Knots,
     monitor: &dyn Monitor,
 ) -> Result<Knots, Cancelled> {
-    loop {
+    let mut share = 0.5;
+    for round in 0.. {
         monitor.check()?;
+        if round >= PATIENT {
+            // A span or two at a time would take as many rounds as there are nodes.
+            share *= HASTE;
+        }
         let Some(fit) = problem.fit(&knots) else {
             return Ok(every_node(problem));
         };
@@ -103,13 +116,13 @@ fn halve_until_near(
         let (Some(u), Some(v)) = (Axis::new(&knots.u), Axis::new(&knots.v)) else {
             return Ok(every_node(problem));
         };
-        let mut target = 0.5 * problem.tolerance;
+        let mut target = share * problem.tolerance;
         let mut finer = knots.clone();
         let (columns_off, rows_off) = (problem.columns_off(&u), problem.rows_off(&v));
         // Both directions may be within their share, and yet not their sum.
         for _ in 0..6 {
-            finer.u = halved(&knots.u, &columns_off, target);
-            finer.v = halved(&knots.v, &rows_off, target);
+            finer.u = halved(&knots.u, &columns_off, target, monitor)?;
+            finer.v = halved(&knots.v, &rows_off, target, monitor)?;
             if finer != knots {
                 break;
             }
@@ -125,6 +138,7 @@ fn halve_until_near(
         problem.refill(&finer);
         knots = finer;
     }
+    Ok(knots)
 }
 
 /// A knot at every node but those next to the ends: the interpolating spline.
@@ -141,21 +155,38 @@ pub(crate) fn every_node(problem: &Problem) -> Knots {
 
 /// Knots with those spans halved in which a node is farther off than the target, as far as
 /// the nodes hold them.
-fn halved(breaks: &Breaks, off: &[f64], target: f64) -> Breaks {
-    let mut breaks = breaks.clone();
-    for span in breaks.edges().windows(2) {
-        let &[low, high] = span else { continue };
-        if worst_within(off, low, high) <= target {
-            continue;
-        }
-        let mut inner = breaks.inner.clone();
-        inner.push((low + high) / 2.0);
-        let finer = Breaks::new(breaks.nodes, inner);
-        if finer.inner.len() > breaks.inner.len() && Axis::new(&finer).is_some() {
-            breaks = finer;
-        }
+fn halved(
+    breaks: &Breaks,
+    off: &[f64],
+    target: f64,
+    monitor: &dyn Monitor,
+) -> Result<Breaks, Cancelled> {
+    let edges = breaks.edges();
+    let spans = edges.windows(2).filter_map(|span| match span {
+        &[low, high] if worst_within(off, low, high) > target => Some((low + high) / 2.0),
+        _ => None,
+    });
+    with_held(breaks.clone(), &spans.collect::<Vec<f64>>(), monitor)
+}
+
+/// Knots with more, as many of these as the nodes hold: all at once, or each half of them by itself.
+fn with_held(breaks: Breaks, more: &[f64], monitor: &dyn Monitor) -> Result<Breaks, Cancelled> {
+    if more.is_empty() {
+        return Ok(breaks);
     }
-    breaks
+    monitor.check()?;
+    let mut inner = breaks.inner.clone();
+    inner.extend(more);
+    let finer = Breaks::new(breaks.nodes, inner);
+    if finer.inner.len() == breaks.inner.len() + more.len() && Axis::new(&finer).is_some() {
+        return Ok(finer);
+    }
+    if more.len() == 1 {
+        return Ok(breaks);
+    }
+    let (first, second) = more.split_at(more.len() / 2);
+    let breaks = with_held(breaks, first, monitor)?;
+    with_held(breaks, second, monitor)
 }
 
 /// The greatest of the nodes' values within a span, the nodes at its ends included.

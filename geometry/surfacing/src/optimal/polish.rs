@@ -12,7 +12,7 @@ use crate::problem::{Problem, Score};
 /// grid alone.
 const MOST_VISITS: usize = 600_000_000;
 /// Knots whose loss is tried in earnest, those that are missed least first.
-const TRIED: usize = 8;
+pub(super) const TRIED: usize = 8;
 /// Knots to either side of a lost one that make up for it.
 const REACH: usize = 3;
 /// First and last share of the way to the next knot by which one is moved.
@@ -24,28 +24,28 @@ const GAIN: f64 = 0.995;
 const JOIN: f64 = 1.5;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Along {
+pub(super) enum Along {
     U,
     V,
 }
 
 /// Knots with what is needed to judge others that differ along one direction.
-struct State {
-    knots: Knots,
-    u: Axis,
-    v: Axis,
+pub(super) struct State {
+    pub(super) knots: Knots,
+    pub(super) u: Axis,
+    pub(super) v: Axis,
     /// Coefficients along y of each column, and along x of each row.
     along_v: Vec<f64>,
     along_u: Vec<f64>,
     score: Score,
 }
 
-struct Polish<'a> {
-    problem: &'a mut Problem,
+pub(super) struct Polish<'a, 'b> {
+    pub(super) problem: &'a mut Problem<'b>,
     /// Knots of creases along x and y, which stay where they are.
     fixed: &'a [Vec<f64>; 2],
-    monitor: &'a dyn Monitor,
-    fits_left: usize,
+    pub(super) monitor: &'a dyn Monitor,
+    pub(super) fits_left: usize,
     fits: usize,
 }
 
@@ -101,11 +101,11 @@ pub(super) fn polish(
     {
         safe = state.knots;
     }
-    Ok(safe)
+    polish.draw(safe)
 }
 
-impl Polish<'_> {
-    fn state(&mut self, knots: Knots) -> Option<State> {
+impl Polish<'_, '_> {
+    pub(super) fn state(&mut self, knots: Knots) -> Option<State> {
         let (u, v) = (Axis::new(&knots.u)?, Axis::new(&knots.v)?);
         let along_v = fit::along_v(&v, &self.problem.z);
         let along_u = fit::along_u(&u, &self.problem.z, self.problem.rows);
@@ -211,7 +211,10 @@ impl Polish<'_> {
     }
 
     /// What it costs to lose each knot, least first.
-    fn losses(&mut self, state: &State) -> Vec<(Score, Along, usize)> {
+    pub(super) fn losses(
+        &mut self,
+        state: &State,
+    ) -> Result<Vec<(Score, Along, usize)>, Cancelled> {
         let mut losses: Vec<(Score, Along, usize)> = Vec::new();
         for along in [Along::U, Along::V] {
             let breaks = breaks_of(state, along).clone();
@@ -222,19 +225,20 @@ impl Polish<'_> {
                     continue;
                 }
                 previous = breaks.inner[index];
+                self.monitor.check()?;
                 if let Some(score) = self.try_other(state, along, &breaks.without(index)) {
                     losses.push((score, along, index));
                 }
             }
         }
         losses.sort_by(|a, b| a.0.soft.total_cmp(&b.0.soft));
-        losses
+        Ok(losses)
     }
 
     fn remove_one(&mut self, state: &mut State) -> Result<bool, Cancelled> {
         self.told()?;
         let tolerance = self.problem.tolerance;
-        let losses = self.losses(state);
+        let losses = self.losses(state)?;
         // Where many can go without a word, they go at once.
         let mut gone = false;
         for along in [Along::U, Along::V] {
@@ -267,7 +271,7 @@ impl Polish<'_> {
 
     /// Takes away a knot that is missed, and moves all others to make up for it.
     fn remove_boldly(&mut self, state: &mut State) -> Result<bool, Cancelled> {
-        let losses = self.losses(state);
+        let losses = self.losses(state)?;
         for (_, along, index) in losses.into_iter().take(TRIED) {
             let mut knots = state.knots.clone();
             match along {
@@ -330,6 +334,7 @@ impl Polish<'_> {
         while step > 3.0 * LAST_STEP {
             let mut is_better = false;
             for index in from..to {
+                self.monitor.check()?;
                 for other in self.moves(along, &breaks, index, step) {
                     let Some(tried) = self.try_other(state, along, &other) else {
                         continue;
@@ -353,7 +358,7 @@ impl Polish<'_> {
     }
 
     /// Moves all knots to where the deviations are least.
-    fn move_all(
+    pub(super) fn move_all(
         &mut self,
         state: &mut State,
         cost: impl Fn(&Score) -> f64,
@@ -364,6 +369,7 @@ impl Polish<'_> {
             for along in [Along::U, Along::V] {
                 let mut index = 0;
                 while index < breaks_of(state, along).inner.len() {
+                    self.monitor.check()?;
                     let breaks = breaks_of(state, along).clone();
                     for other in self.moves(along, &breaks, index, step) {
                         if let Some(score) = self.try_other(state, along, &other)
