@@ -58,7 +58,15 @@ fn a_barrel_becomes_a_surface_that_holds_its_points() {
     for method in ["relief", "jo"] {
         let file = barrel(6, |_, _| ());
         let more = [
-            "--json", "--method", method, "--report", "r.json", "-o", "b.igs",
+            "--json",
+            "--method",
+            method,
+            "--report",
+            "r.json",
+            "--pictures",
+            "drawn",
+            "-o",
+            "b.igs",
         ];
         let output = skin(folder.path(), &file, &more);
         assert!(output.status.success(), "{}", stderr(&output));
@@ -71,6 +79,12 @@ fn a_barrel_becomes_a_surface_that_holds_its_points() {
         let report: Value = serde_json::from_slice(&report).unwrap();
         let points = report["data_points"].as_array().unwrap();
         assert_eq!((points.len(), &report["counts"]), (6 * 72, &told["counts"]));
+        for (index, name) in ["sections.png", "deviations.png"].into_iter().enumerate() {
+            let path = Path::new("drawn").join(name);
+            assert_eq!(told["pictures"][index], path.to_str().unwrap());
+            let png = fs::read(folder.path().join(path)).unwrap();
+            assert!(png.starts_with(b"\x89PNG") && png.len() > 2000, "{name}");
+        }
         assert_eq!(points[0]["before_mm"].is_null(), method == "relief");
         // The file has that surface, and it holds the points by itself.
         let bytes = fs::read(folder.path().join("b.igs")).unwrap();

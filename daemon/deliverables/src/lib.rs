@@ -36,8 +36,8 @@ pub use further::{
     MillError, MillOf, Milled, OperationFigures, SectionFigures, SimulationFigures, SkinCounts,
     SkinDeviation, SkinFigures, SkinOptions, SkinReport, SkinSettingsReport, SurfaceFigures,
     SurfaceReport, SurfaceSettingsReport, SurfaceWords, SurfacesError, ToolpathOptions,
-    ToolpathReport, ToolpathSettingsReport, cut_remark, mill, rows_of, surface_pictures,
-    surface_remarks, write_height_surfaces,
+    ToolpathReport, ToolpathSettingsReport, cut_remark, mill, rows_of, skin_pictures,
+    surface_pictures, surface_remarks, write_height_surfaces,
 };
 pub use manifest::{MANIFEST_NAME, Manifest, ManifestFile};
 pub use meshes::{

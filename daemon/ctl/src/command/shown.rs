@@ -1,8 +1,12 @@
 //! Work that shows on standard error how far it is, and that Ctrl-C ends.
 
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
+use deliverables::write_atomically;
 use range_image::Monitor;
 
 use crate::failure::Failure;
@@ -70,4 +74,21 @@ pub(crate) async fn work<T: Send + 'static>(
         }
     };
     joined.map_err(|error| Failure::at(format!("{what} broke off"), &error))?
+}
+
+/// Draws pictures into a directory, which is made if it is not there; each comes as PNG with its name.
+pub(crate) fn pictures(
+    directory: &Path,
+    draw: impl FnOnce() -> io::Result<Vec<(String, Vec<u8>)>>,
+) -> Result<Vec<PathBuf>, Failure> {
+    let cannot =
+        |error: io::Error| Failure::at(format!("cannot draw into {}", directory.display()), &error);
+    fs::create_dir_all(directory).map_err(cannot)?;
+    let put = |(name, png): (String, Vec<u8>)| {
+        let path = directory.join(name);
+        write_atomically::<io::Error>(&path, |sink| sink.write_all(&png))
+            .map_err(|error| Failure::at(format!("cannot draw {}", path.display()), &error))?;
+        Ok(path)
+    };
+    draw().map_err(cannot)?.into_iter().map(put).collect()
 }

@@ -14,7 +14,7 @@ use toolpath::{Surface, ToolpathError};
 use super::milled::{MillError, mill};
 use super::options::{MillOf, SkinOptions, ToolpathOptions};
 use super::report::{SkinReport, SurfaceReport, ToolpathReport};
-use super::skinned::{SkinFigures, cut_remark, rows_of};
+use super::skinned::{SkinFigures, cut_remark, rows_of, skin_pictures};
 use super::surface_file::{HeightSurface, surface_model};
 use super::surface_pictures::surface_pictures;
 use super::surfaced::{
@@ -263,6 +263,15 @@ fn skinned(
     };
     if !put_surfaces(extras, inputs, name, &[named])? {
         return Ok(Ok(None));
+    }
+    match skin_pictures(inputs.name, &found, options.settings.tolerance_mm) {
+        Ok(drawn) => {
+            for (picture, png) in drawn {
+                let picture = format!("skin-{picture}");
+                extras.put(&picture, &|sink| Ok(sink.write_all(&png)?))?;
+            }
+        }
+        Err(error) => extras.refuse("pictures of the sections", &error),
     }
     let remarks = found.warnings.iter().map(ToString::to_string);
     for remark in cut_remark(&cut).into_iter().chain(remarks) {

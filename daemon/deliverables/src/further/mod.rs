@@ -18,7 +18,9 @@ pub use report::{
     SkinReport, SkinSettingsReport, SurfaceReport, SurfaceSettingsReport, ToolpathReport,
     ToolpathSettingsReport,
 };
-pub use skinned::{SectionFigures, SkinCounts, SkinDeviation, SkinFigures, cut_remark, rows_of};
+pub use skinned::{
+    SectionFigures, SkinCounts, SkinDeviation, SkinFigures, cut_remark, rows_of, skin_pictures,
+};
 pub use surface_file::{HeightSurface, SurfacesError, write_height_surfaces};
 pub use surface_pictures::surface_pictures;
 pub use surfaced::{

@@ -1,7 +1,11 @@
 //! What is told of a skinned surface.
 
+use std::io;
+
 use serde::{Deserialize, Serialize};
 use skin::{Method, Settings, Skin};
+
+use crate::picture;
 
 /// A skinned surface in numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -134,4 +138,22 @@ pub fn cut_remark(cut: &skin::Cut) -> Option<String> {
 #[must_use]
 pub fn rows_of(every_mm: f64, pitch_mm: f64) -> usize {
     (every_mm / pitch_mm).round().max(1.0) as usize
+}
+
+/// Sections as they lie, and how far their data points are off, as PNG with the names of their files.
+///
+/// # Errors
+/// A picture that is too large for its format.
+pub fn skin_pictures(
+    name: &str,
+    skin: &Skin,
+    tolerance_mm: f64,
+) -> io::Result<Vec<(String, Vec<u8>)>> {
+    let (mut sections, mut deviations) = (Vec::new(), Vec::new());
+    picture::write_sections(skin, name, &mut sections)?;
+    picture::write_section_deviations(skin, tolerance_mm, name, &mut deviations)?;
+    Ok(vec![
+        ("sections.png".to_owned(), sections),
+        ("deviations.png".to_owned(), deviations),
+    ])
 }

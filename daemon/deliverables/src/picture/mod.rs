@@ -11,12 +11,14 @@ mod range;
 mod regions;
 mod residuals;
 mod scale;
+mod sections;
 
 use std::io::Write;
 
 use compare::{Comparison, Tolerance};
 use pipeline::Outcome;
 use range_image::RangeImage;
+use skin::Skin;
 
 use crate::deviations::Deviations;
 use canvas::Canvas;
@@ -152,6 +154,28 @@ pub fn write_machined(
     sink: impl Write,
 ) -> std::io::Result<()> {
     encode(&machined::draw(deviations, name, subtitle), sink)
+}
+
+/// Draws skinned sections beside each other, data and curve, and writes them as PNG.
+///
+/// # Errors
+/// What the sink reports.
+pub fn write_sections(skin: &Skin, name: &str, sink: impl Write) -> std::io::Result<()> {
+    encode(&sections::sections(skin, name), sink)
+}
+
+/// Draws how far the data points of each section are from the surface, and were before knots were
+/// removed if that is known, and writes it as PNG.
+///
+/// # Errors
+/// What the sink reports.
+pub fn write_section_deviations(
+    skin: &Skin,
+    tolerance_mm: f64,
+    name: &str,
+    sink: impl Write,
+) -> std::io::Result<()> {
+    encode(&sections::deviations(skin, tolerance_mm, name), sink)
 }
 
 /// Draws the share of inliers among the samples around each node, ready to be written as

@@ -49,6 +49,10 @@ pub(crate) struct Args {
     /// Write a report as JSON, too, with the deviation of every data point
     #[arg(long, value_name = "FILE.json")]
     pub(super) report: Option<PathBuf>,
+    /// Draw sections.png and deviations.png into this directory, too: data and surface of each
+    /// section, and how far each data point is off
+    #[arg(long, value_name = "DIR")]
+    pub(super) pictures: Option<PathBuf>,
     /// Name of the surface in CAD programs; default: that of the input
     #[arg(long, value_name = "NAME")]
     name: Option<String>,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use cad_exchange::iges::NamedSurface;
-use deliverables::{SkinFigures, write_atomically};
+use deliverables::{SkinFigures, skin_pictures, write_atomically};
 use serde::Serialize;
 use skin::{Skin, SkinError};
 
@@ -19,6 +19,8 @@ pub(super) struct Skinned {
     pub(super) output: PathBuf,
     #[serde(flatten)]
     pub(super) figures: SkinFigures,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) pictures: Vec<PathBuf>,
     pub(super) warnings: Vec<String>,
 }
 
@@ -62,6 +64,9 @@ fn skin_file(args: &Args, shown: &Shown) -> Result<Skinned, Failure> {
         }
     }
     args.report.as_deref().map_or(Ok(()), places::check_file)?;
+    args.pictures
+        .as_deref()
+        .map_or(Ok(()), places::check_directory)?;
     let timestamp = args.timestamp()?;
     let read = read::read(args, shown)?;
     shown.begin("skin");
@@ -85,11 +90,18 @@ fn skin_file(args: &Args, shown: &Shown) -> Result<Skinned, Failure> {
         Ok(())
     })
     .map_err(|error| Failure::at(format!("cannot write {}", output.display()), &error))?;
+    let pictures = match &args.pictures {
+        Some(directory) => shown::pictures(directory, || {
+            skin_pictures(&name, &found, settings.tolerance_mm)
+        })?,
+        None => Vec::new(),
+    };
     let mut warnings = read.notes;
     warnings.extend(found.warnings.iter().map(ToString::to_string));
     let skinned = Skinned {
         output,
         figures: SkinFigures::of(&found, &settings),
+        pictures,
         warnings,
     };
     if let Some(path) = &args.report {

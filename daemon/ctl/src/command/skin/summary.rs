@@ -33,6 +33,8 @@ pub(super) fn told(skinned: &Skinned) -> String {
         100.0 * deviation.within_tolerance_share
     ));
     lines.push(format!("written to   {}", skinned.output.display()));
+    let pictures = skinned.pictures.iter();
+    lines.extend(pictures.map(|path| format!("picture      {}", path.display())));
     lines.join("\n")
 }
 

@@ -1,7 +1,6 @@
 //! The surface itself.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use deliverables::{
     CharacterLineFigures, FairingFigures, HeightSurface, ManifestFile, SurfaceFigures,
@@ -9,7 +8,7 @@ use deliverables::{
     write_height_surfaces,
 };
 use serde::Serialize;
-use surfacing::{HeightGrid, Made, Placement, Settings, SurfaceError};
+use surfacing::{HeightGrid, Placement, Settings, SurfaceError};
 
 use super::{Args, summary};
 use crate::command::shown::{self, Shown};
@@ -120,7 +119,9 @@ fn surface_of_file(args: &Args, shown: &Shown) -> Result<Surfaced, Failure> {
     })
     .map_err(|error| Failure::at(format!("cannot write {}", output.display()), &error))?;
     let pictures = match &args.pictures {
-        Some(directory) => draw(directory, &args.scan_name(), &grid, &made, &settings)?,
+        Some(directory) => shown::pictures(directory, || {
+            surface_pictures(&args.scan_name(), &grid, &made, &settings)
+        })?,
         None => Vec::new(),
     };
     let mut warnings: Vec<String> = input
@@ -151,24 +152,4 @@ fn refused(args: &Args, error: SurfaceError) -> Failure {
         SurfaceError::Cancelled(_) => Failure::Interrupted,
         error => Failure::Failed(format!("{}: {error}", args.scan.display())),
     }
-}
-
-/// Draws the deviations, and contours and curvature before and after fairing.
-fn draw(
-    directory: &Path,
-    scan: &str,
-    grid: &HeightGrid,
-    made: &Made,
-    settings: &Settings,
-) -> Result<Vec<PathBuf>, Failure> {
-    let cannot = |error| Failure::at(format!("cannot draw into {}", directory.display()), &error);
-    fs::create_dir_all(directory).map_err(cannot)?;
-    let drawn = surface_pictures(scan, grid, made, settings).map_err(cannot)?;
-    let put = |(name, png): (String, Vec<u8>)| {
-        let path = directory.join(name);
-        write_atomically::<std::io::Error>(&path, |sink| sink.write_all(&png))
-            .map_err(|error| Failure::at(format!("cannot draw {}", path.display()), &error))?;
-        Ok(path)
-    };
-    drawn.into_iter().map(put).collect()
 }
