@@ -125,6 +125,8 @@ async fn a_scan_ends_in_surfaces_and_an_nc_program() -> Result<()> {
         "surface-deviations.png",
         "surface-contours.png",
         "surface-curvature.png",
+        "skin-sections.png",
+        "skin-deviations.png",
         "toolpath.png",
     ] {
         is_listed(&result, name)?;

@@ -19,6 +19,7 @@ const HEAD: usize = 54;
 /// Places along a curve.
 const PLACES: usize = 240;
 const CURVE: Rgb = [11, 98, 168];
+const LIMIT: Rgb = [176, 182, 189];
 const BEFORE: Rgb = [179, 38, 30];
 
 /// A section, and what belongs to it.
@@ -109,10 +110,10 @@ pub(super) fn sections(skin: &Skin, name: &str) -> Canvas {
             .map(|own| span(own.points.iter().map(|p| p.place_mm[d])));
         each.map(|(low, high)| high - low).fold(0.0, f64::max)
     };
-    let room = (SIDE - 4 * MARGIN - TEXT_HEIGHT) as f64;
+    let room = (SIDE - 4 * MARGIN - 2 * TEXT_HEIGHT) as f64;
     let scale = room / extent(right).max(extent(up)).max(1e-9);
     let subtitle = format!(
-        "{}: {} to the right, {} up, data and surface, the farthest point; {:.3} mm per pixel",
+        "{}: {} to the right, {} up, data and surface, and how far the farthest point is off; {:.3} mm per pixel",
         remark(skin.sections.len(), shown.len()),
         axis(right),
         axis(up),
@@ -123,8 +124,11 @@ pub(super) fn sections(skin: &Skin, name: &str) -> Canvas {
     for (k, own) in shown.iter().enumerate() {
         let (left, top) = (MARGIN + k % ACROSS * SIDE, HEAD + k / ACROSS * SIDE);
         canvas.frame(left, top, SIDE - 6, SIDE - 6, NOTHING);
-        let label = fitted(&format!("{}: {:.3} mm", own.name, own.most_mm()), SIDE - 20);
+        let label = fitted(own.name, SIDE - 20);
         canvas.text(left + 6, top + 4, &label, Weight::Regular, INK);
+        let most = format!("max {:.3} mm", own.most_mm());
+        let below = top + 6 + TEXT_HEIGHT;
+        canvas.text(left + 6, below, &most, Weight::Regular, FAINT);
         let middle = |d: usize| {
             let (low, high) = span(own.points.iter().map(|p| p.place_mm[d]));
             low.midpoint(high)
@@ -132,7 +136,7 @@ pub(super) fn sections(skin: &Skin, name: &str) -> Canvas {
         let (cx, cy) = (middle(right), middle(up));
         let center = [
             (left + SIDE / 2) as f64,
-            (top + (SIDE + TEXT_HEIGHT) / 2) as f64,
+            (top + SIDE / 2 + TEXT_HEIGHT) as f64,
         ];
         let place = |p: [f64; 3]| {
             [
@@ -194,7 +198,7 @@ pub(super) fn deviations(skin: &Skin, tolerance_mm: f64, name: &str) -> Canvas {
         canvas.text(MARGIN, bottom - 17, &most, Weight::Regular, FAINT);
         canvas.fill(left, bottom, STRIP_WIDTH, 1, FAINT);
         let limit = bottom as f64 - deep * tolerance_mm / high;
-        canvas.fill(left, limit.round() as usize, STRIP_WIDTH, 1, NOTHING);
+        canvas.fill(left, limit.round() as usize, STRIP_WIDTH, 1, LIMIT);
         let along = |at: f64| left as f64 + at.clamp(0.0, 1.0) * STRIP_WIDTH as f64;
         let up = |off_mm: f64| bottom as f64 - deep * (off_mm / high).min(1.0);
         let mut order: Vec<usize> = (0..own.points.len()).collect();
