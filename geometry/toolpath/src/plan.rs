@@ -83,6 +83,7 @@ pub fn plan(
     for operation in &operations {
         check::after(machine, operation)?;
     }
+    check::lengths(machine, &operations)?;
     monitor.progress(1.0);
     Ok(Plan { operations, notes })
 }

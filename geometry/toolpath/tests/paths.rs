@@ -326,6 +326,63 @@ fn what_does_not_fit_is_told_by_its_axis() {
 }
 
 #[test]
+fn tools_too_short_for_the_depth_are_told() {
+    let surface = surface(&relief(1, [30.0, 20.0], 0.5));
+    let [low, high] = surface.bounds_mm();
+    let mut sound = machine(&surface, &["ball:6", "flat:8"]);
+    sound.stock.z_mm[1] = high[2] + 6.0;
+    let depth_mm = high[2] + 6.0 - low[2];
+    for tool in &mut sound.tools {
+        (tool.cutting_length_mm, tool.reach_mm) = (Some(depth_mm), Some(depth_mm + 1.0));
+    }
+    planned(&surface, &sound, &settings("ball:6", 0.05));
+
+    let mut stubby = sound.clone();
+    stubby.tools[0].cutting_length_mm = None;
+    stubby.tools[0].reach_mm = Some(5.0);
+    let told = refused(&surface, &stubby, "ball:6").to_string();
+    assert!(
+        told.contains("below the stock's top") && told.contains("its reach_mm is 5 mm"),
+        "{told}"
+    );
+    // Roughing before does not help what holds the tool, which is above stock that stays.
+    let roughed = Settings {
+        rough: Some("flat:8".parse().unwrap()),
+        ..settings("ball:6", 0.05)
+    };
+    let told = plan(&surface, &stubby, &roughed, &Unmonitored).unwrap_err();
+    assert!(told.to_string().contains("its reach_mm is 5 mm"), "{told}");
+
+    let mut blunt = sound.clone();
+    blunt.tools[0].cutting_length_mm = Some(5.0);
+    let told = refused(&surface, &blunt, "ball:6").to_string();
+    assert!(
+        told.contains("its cutting_length_mm is 5 mm") && told.contains("rough first"),
+        "{told}"
+    );
+    planned(&surface, &blunt, &roughed);
+    blunt.tools[1].cutting_length_mm = Some(1.0);
+    let told = plan(&surface, &blunt, &roughed, &Unmonitored).unwrap_err();
+    assert!(
+        told.to_string().contains("give it a smaller step_down_mm"),
+        "{told}"
+    );
+
+    let mut clamped = sound.clone();
+    clamped.safe_z_mm += 30.0;
+    clamped.fixtures.push(Fixture {
+        name: "tall clamp".to_owned(),
+        place: Cuboid {
+            x_mm: [-20.0, -10.0],
+            y_mm: [5.0, 15.0],
+            z_mm: [-5.0, high[2] + 30.0],
+        },
+    });
+    let told = refused(&surface, &clamped, "ball:6").to_string();
+    assert!(told.contains("below the fixture `tall clamp`"), "{told}");
+}
+
+#[test]
 fn settings_beyond_their_limits_are_told() {
     let surface = surface(&relief(1, [30.0, 20.0], 0.5));
     let machine = machine(&surface, &["ball:6", "flat:6"]);

@@ -30,6 +30,8 @@ GOUGE_MM = 1e-3
 CUSP = 0.05
 # Cusps steeper than this, z of the normal, are told apart: 75 degrees.
 STEEP = math.cos(math.radians(75))
+# The cutter fits where it could leave no more than this share of the cusps.
+FITS = 0.2
 # Places that are looked at before the worst of them are looked at closely.
 MOST_PLACES = 150_000
 # Places along a line across the passes, before the cusps between them are found to a nanometre.
@@ -174,15 +176,15 @@ def cusps(part, cutter, ways, grid, lines, draw):
 
 
 def measured(part, cutter, ridge):
-    """A cusp's height above the least that this cutter could leave there, along the normal, and z of
-    that."""
-    x, y, z, u, v, apart, _, flat = ridge
+    """A cusp's height above the least that this cutter could leave there, along the normal; z of that;
+    and how high that least is above the surface, more than nothing where the cutter does not fit."""
+    x, y, z, u, v, apart, above, flat = ridge
     step = max(apart / 4, 0.01)
     at = (part.facets, part.boxes, part.grid, x, y, u, v, step)
     least, nz = sweep.closing_at(*cutter, *at)
     if cutter[1] == 0.0:
         nz = flat
-    return (z - least) * nz, nz
+    return (z - least) * nz, nz, above - (z - least) * flat
 
 
 def referee(part, cutter, draw):
@@ -224,10 +226,10 @@ def judge(folder, lines):
         deepest, places = gouge(part, cutter, ways, grid, draw)
         asked = told["scallop_mm"]
         drawn, highest = cusps(part, cutter, ways, grid, lines, draw)
-        share = drawn[drawn[:, 1] >= STEEP, 0] / asked
+        share = drawn[told_of(drawn, asked), 0] / asked
         both = np.concatenate([drawn, highest])
-        is_steep = both[:, 1] < STEEP
-        steep = both[is_steep, 0]
+        is_told = told_of(both, asked)
+        others = both[~is_told, 0]
         rows.append({
             "seed": folder.name,
             "program": path.stem,
@@ -239,12 +241,17 @@ def judge(folder, lines):
             "5 %": np.quantile(share, 0.05),
             "median": np.median(share),
             "95 %": np.quantile(share, 0.95),
-            "highest": both[~is_steep, 0].max() / asked,
-            "steep": int(is_steep.sum()),
-            "highest there": steep.max() / asked if len(steep) else math.nan,
+            "highest": both[is_told, 0].max() / asked,
+            "elsewhere": others.max() / asked if len(others) else math.nan,
             "tip, um": 1e3 * tip,
         })
     return rows
+
+
+def told_of(cusps, asked):
+    """Those of which the height is told: no steeper than passes are drawn for, and where the cutter
+    reaches the surface. In a crease it does not, however close passes are."""
+    return (cusps[:, 1] >= STEEP) & (cusps[:, 2] <= FITS * asked)
 
 
 def missed(row):
