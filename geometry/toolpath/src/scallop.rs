@@ -3,11 +3,14 @@
 //! The centre of a ball cutter moves on the surface's offset, whose heights are the tips' heights
 //! shifted. Passes whose distance there is `D` leave cusps of `R - sqrt(R^2 - D^2 / 4)`, less what
 //! the offset bulges between them. Each pass is grown from the one before: at every station it is
-//! as far across as the nearest place of that pass allows.
+//! as far across as the nearest place of that pass allows. Where that one bends away, the notch of
+//! the bend is farther from both than half their distance; there the new pass is drawn nearer, until
+//! the cusp that both leave between them is no higher than it may be.
 
 use range_image::{Cancelled, Monitor};
 use rayon::prelude::*;
 
+use crate::between::Between;
 use crate::cusp;
 use crate::field::Field;
 use crate::parallel::STEEP;
@@ -19,12 +22,17 @@ const NEAR_ENOUGH: f64 = 0.004;
 /// How far corners of a pass may be off it, as a share of the step on a level plane.
 const SMOOTH: f64 = 0.005;
 
+/// Rounds in which places of a new pass are drawn nearer, and the share of the wanted cusp from which
+/// that is done.
+const REPAIRS: usize = 4;
+const TOO_HIGH: f64 = 1.02;
+
 /// A place of a pass that the cutter mills.
 #[derive(Debug, Clone, Copy)]
-struct Place {
-    s: f64,
-    t: f64,
-    tip: Option<f64>,
+pub(crate) struct Place {
+    pub(crate) s: f64,
+    pub(crate) t: f64,
+    pub(crate) tip: Option<f64>,
 }
 
 type Lines = (Vec<Vec<[f64; 2]>>, f64);
@@ -69,11 +77,34 @@ pub(crate) fn passes(
         steep += steps.iter().flatten().filter(|(_, steep)| *steep).count();
         // Where the cutter mills nothing a pass keeps to its neighbours.
         let across = filled(&steps, level);
-        here = here
+        let mut next: Vec<Place> = here
             .par_iter()
             .zip(&across)
             .map(|(place, step)| at(place.s, (place.t + step).min(last)))
             .collect();
+        for _ in 0..REPAIRS {
+            let between = Between {
+                field,
+                passes: [&here, &next],
+                window,
+            };
+            let nearer: Vec<Option<Place>> = (0..here.len())
+                .into_par_iter()
+                .map(|k| {
+                    let cusp = between.cusp_mm(k).filter(|c| *c > TOO_HIGH * cusp_mm)?;
+                    let step = next[k].t - here[k].t;
+                    let nearer = (step * (cusp_mm / cusp).sqrt()).max(level * STEEP);
+                    (nearer < step).then(|| at(here[k].s, here[k].t + nearer))
+                })
+                .collect();
+            if nearer.iter().all(Option::is_none) {
+                break;
+            }
+            for (place, nearer) in next.iter_mut().zip(nearer) {
+                *place = nearer.unwrap_or(*place);
+            }
+        }
+        here = next;
         lines.push(corners(field, &here, level));
     }
     Ok(Some((lines, steep as f64 / all.max(1) as f64)))
@@ -142,6 +173,22 @@ fn cusp_at(field: &Field<'_>, here: Place, step: f64, near: &[Place]) -> Option<
     let (s, t) = (here.s, here.t + step);
     let tip = field.tip_at(s, t)?;
     let radius = field.cutter.radius_mm();
+    let (square, foot, slope) = nearest(near, [s, t, tip])?;
+    let quarter = square / 4.0;
+    if quarter >= radius * radius {
+        return Some(f64::INFINITY);
+    }
+    let amid = field.tip_at(f64::midpoint(s, foot[0]), f64::midpoint(t, foot[1]))?;
+    let bulge = amid - f64::midpoint(tip, foot[2]);
+    let flat = libm::hypot(s - foot[0], t - foot[1]).max(1e-12);
+    let rise = (tip - foot[2]) / flat;
+    let nz = 1.0 / (1.0 + rise * rise + slope * slope).sqrt();
+    Some(radius - (radius * radius - quarter).sqrt() - bulge * nz)
+}
+
+/// The place of a pass nearest to a tip: the square of the distance, the place, and the slope along
+/// the pass there.
+pub(crate) fn nearest(near: &[Place], [s, t, tip]: [f64; 3]) -> Option<(f64, [f64; 3], f64)> {
     let mut nearest: Option<(f64, [f64; 3], f64)> = None;
     for pair in near.windows(2) {
         let &[a, b] = pair else { continue };
@@ -164,17 +211,7 @@ fn cusp_at(field: &Field<'_>, here: Place, step: f64, near: &[Place]) -> Option<
             nearest = Some((square, foot, slope));
         }
     }
-    let (square, foot, slope) = nearest?;
-    let quarter = square / 4.0;
-    if quarter >= radius * radius {
-        return Some(f64::INFINITY);
-    }
-    let amid = field.tip_at(f64::midpoint(s, foot[0]), f64::midpoint(t, foot[1]))?;
-    let bulge = amid - f64::midpoint(tip, foot[2]);
-    let flat = libm::hypot(s - foot[0], t - foot[1]).max(1e-12);
-    let rise = (tip - foot[2]) / flat;
-    let nz = 1.0 / (1.0 + rise * rise + slope * slope).sqrt();
-    Some(radius - (radius * radius - quarter).sqrt() - bulge * nz)
+    nearest
 }
 
 /// Steps where there are none, from the nearest stations that have one.
