@@ -12,7 +12,7 @@ use crate::scallop::{Place, nearest};
 /// Rounds of halving for the place as far from both passes.
 const ROUNDS: usize = 10;
 /// Share of the radius between heights that slopes are told from.
-const APART: f64 = 0.05;
+const APART: f64 = 0.02;
 
 /// Two neighbouring passes.
 pub(crate) struct Between<'a> {

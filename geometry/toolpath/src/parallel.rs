@@ -13,6 +13,8 @@ pub(crate) const STEEP: f64 = 0.258_819;
 /// The step is sought until the highest cusp is this share below what is asked for, at most.
 const NEAR_ENOUGH: f64 = 0.015;
 const ROUNDS: usize = 12;
+/// Stations within the cutter's radius.
+const STATIONS: f64 = 10.0;
 /// The greatest share of the cutter's diameter that a step may be.
 const WIDEST: f64 = 0.9;
 
@@ -48,7 +50,7 @@ pub(crate) fn passes(
     cusp_mm: f64,
     monitor: &dyn Monitor,
 ) -> Result<Option<Passes>, Cancelled> {
-    let stations = field.stations();
+    let stations = field.stations(STATIONS);
     let line = |across: f64| Line::new(field, &stations, across);
     let level = cusp::level_step_mm(&field.cutter, cusp_mm).max(1e-3);
     let widest = (WIDEST * 2.0 * field.cutter.radius_mm()).min(3.0 * level);
@@ -190,7 +192,7 @@ pub(crate) fn limits(
     monitor: &dyn Monitor,
 ) -> Result<Option<[f64; 2]>, Cancelled> {
     let [low, high] = field.t;
-    let stations = field.stations();
+    let stations = field.stations(STATIONS);
     let mills = |across: f64| {
         let line = Line::new(field, &stations, across);
         line.tips.iter().any(Option::is_some)

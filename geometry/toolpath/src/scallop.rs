@@ -17,6 +17,8 @@ use crate::parallel::STEEP;
 
 /// Rounds for the way to the next pass.
 const ROUNDS: usize = 10;
+/// Stations within the cutter's radius: passes bend sharply where the surface does.
+const STATIONS: f64 = 24.0;
 /// How near to the cusp's height that is, as a share of it.
 const NEAR_ENOUGH: f64 = 0.004;
 /// How far corners of a pass may be off it, as a share of the step on a level plane.
@@ -24,7 +26,7 @@ const SMOOTH: f64 = 0.005;
 
 /// Rounds in which places of a new pass are drawn nearer, and the share of the wanted cusp from which
 /// that is done.
-const REPAIRS: usize = 4;
+const REPAIRS: usize = 6;
 const TOO_HIGH: f64 = 1.02;
 
 /// A place of a pass that the cutter mills.
@@ -44,7 +46,7 @@ pub(crate) fn passes(
     monitor: &dyn Monitor,
 ) -> Result<Option<Lines>, Cancelled> {
     let level = cusp::level_step_mm(&field.cutter, cusp_mm).max(1e-3);
-    let stations = field.stations();
+    let stations = field.stations(STATIONS);
     let Some([first, last]) = crate::parallel::limits(field, level, monitor)? else {
         return Ok(None);
     };
