@@ -5,6 +5,7 @@ use range_image::{Cancelled, Monitor};
 use rayon::prelude::*;
 
 use crate::cusp::{self, Near};
+use crate::error::ToolpathError;
 use crate::field::Field;
 
 /// Where the surface is steeper than this, z of its normal, passes are not drawn closer for it:
@@ -17,6 +18,25 @@ const ROUNDS: usize = 12;
 const STATIONS: f64 = 10.0;
 /// The greatest share of the cutter's diameter that a step may be.
 const WIDEST: f64 = 0.9;
+
+/// More finishing passes are not planned: they would take hours to plan, and days to mill.
+const MOST_PASSES: usize = 20_000;
+
+/// Whether there are too many passes.
+///
+/// # Errors
+/// [`ToolpathError::TooMany`]
+pub(crate) fn limit(passes: usize) -> Result<(), ToolpathError> {
+    if passes <= MOST_PASSES {
+        return Ok(());
+    }
+    Err(ToolpathError::TooMany {
+        what: "finishing passes",
+        wanted: passes,
+        most: MOST_PASSES,
+        mend: "choose a larger scallop, or a larger cutter",
+    })
+}
 
 /// Where passes run, and how much was too steep for them.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,7 +69,7 @@ pub(crate) fn passes(
     field: &Field<'_>,
     cusp_mm: f64,
     monitor: &dyn Monitor,
-) -> Result<Option<Passes>, Cancelled> {
+) -> Result<Option<Passes>, ToolpathError> {
     let stations = field.stations(STATIONS);
     let line = |across: f64| Line::new(field, &stations, across);
     let level = cusp::level_step_mm(&field.cutter, cusp_mm).max(1e-3);
@@ -69,8 +89,10 @@ pub(crate) fn passes(
     let mut here = line(first);
     let mut step = level;
     let (mut steep, mut all) = (0, 0);
+    limit(((last - first) / (1.5 * level).min(widest)) as usize)?;
     while here.across < last {
         monitor.check()?;
+        limit(across_mm.len())?;
         monitor.progress((here.across - first) / (last - first));
         let (mut low, mut high) = (0.0_f64, f64::INFINITY);
         let mut best: Option<(Line, Tally)> = None;

@@ -7,11 +7,12 @@
 //! the bend is farther from both than half their distance; there the new pass is drawn nearer, until
 //! the cusp that both leave between them is no higher than it may be.
 
-use range_image::{Cancelled, Monitor};
+use range_image::Monitor;
 use rayon::prelude::*;
 
 use crate::between::Between;
 use crate::cusp;
+use crate::error::ToolpathError;
 use crate::field::Field;
 use crate::parallel::STEEP;
 
@@ -44,7 +45,7 @@ pub(crate) fn passes(
     field: &Field<'_>,
     cusp_mm: f64,
     monitor: &dyn Monitor,
-) -> Result<Option<Lines>, Cancelled> {
+) -> Result<Option<Lines>, ToolpathError> {
     let level = cusp::level_step_mm(&field.cutter, cusp_mm).max(1e-3);
     let stations = field.stations(STATIONS);
     let Some([first, last]) = crate::parallel::limits(field, level, monitor)? else {
@@ -59,8 +60,10 @@ pub(crate) fn passes(
     let mut lines = vec![corners(field, &here, level)];
     let (mut steep, mut all) = (0_usize, 0_usize);
     let most = ((last - first) / (level * STEEP * 0.25)).ceil() as usize + 2;
+    crate::parallel::limit(((last - first) / (1.5 * level)) as usize)?;
     for _ in 0..most {
         monitor.check()?;
+        crate::parallel::limit(lines.len())?;
         let done = here.iter().map(|p| p.t).fold(f64::INFINITY, f64::min);
         if done >= last {
             break;
