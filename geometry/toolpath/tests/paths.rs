@@ -141,6 +141,22 @@ fn cusps_of_constant_scallop_passes_are_all_as_high_as_asked_for() {
 }
 
 #[test]
+fn constant_scallop_passes_leave_no_notches_where_they_bend() {
+    // A hip: two planes, one sloping along the passes and one across.
+    let facets = graph([24.0, 20.0], 0.25, |x, y| 0.9 * x.min(y));
+    let surface = surface(&facets);
+    let machine = machine(&surface, &["ball:6"]);
+    let settings = Settings {
+        pattern: Pattern::Scallop,
+        ..settings("ball:6", 0.02)
+    };
+    let plan = planned(&surface, &machine, &settings);
+    let (gouge, left, _) = simulated(&surface, &machine, &plan, 0.011);
+    assert!(gouge < 4e-4, "{gouge}");
+    assert!((0.95..1.05).contains(&(left / 0.02)), "{left}");
+}
+
+#[test]
 fn roughing_leaves_the_allowance_and_clears_for_finishing() {
     let surface = surface(&relief(6, [40.0, 30.0], 0.4));
     let machine = machine(&surface, &["ball:6", "flat:8"]);
