@@ -47,7 +47,7 @@ fn main() {
 fn one(seed: u64, points: usize, folder: &Path) {
     let cutter_text = CUTTERS[(seed % 5) as usize];
     let cutter: Cutter = cutter_text.parse().unwrap();
-    let pitch_mm = [0.3, 0.2, 0.12][(seed % 3) as usize];
+    let pitch_mm = [0.35, 0.25, 0.2][(seed % 3) as usize];
     let facets = bench::relief(seed, SIZE_MM, pitch_mm);
     fs::write(folder.join("surface.stl"), bench::stl(&facets)).unwrap();
     let began = Instant::now();

@@ -37,7 +37,7 @@ STEEP = math.cos(math.radians(75))
 # The cutter fits where it could leave no more than this share of the cusps.
 FITS = 0.2
 # Places that are looked at before the worst of them are looked at closely.
-MOST_PLACES = 150_000
+MOST_PLACES = 60_000
 # Places along a line across the passes, before the cusps between them are found to a nanometre.
 ALONG_MM = 0.01
 # Another pass, where the tip that leaves the height jumps by so much across.
@@ -283,7 +283,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--check", action="store_true", help="fail where a bar is missed")
-    parser.add_argument("--lines", type=int, default=30, help="lines across the passes")
+    parser.add_argument("--lines", type=int, default=20, help="lines across the passes")
     options = parser.parse_args()
     rows = []
     folders = [folder for folder in sorted(options.folder.iterdir()) if folder.is_dir()]
