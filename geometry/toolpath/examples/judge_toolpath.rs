@@ -108,7 +108,7 @@ fn one(seed: u64, points: usize, folder: &Path) {
         };
         program(&surface, &machine, &settings, &folder.join("scallop.nc"));
     }
-    if seed % 3 == 0 {
+    if seed.is_multiple_of(3) {
         let machine = Machine {
             dialect: Dialect::Fanuc,
             decimals: 3,

@@ -15,7 +15,7 @@ pub(crate) const STEEP: f64 = 0.258_819;
 const NEAR_ENOUGH: f64 = 0.015;
 const ROUNDS: usize = 12;
 /// Stations within the cutter's radius.
-const STATIONS: f64 = 10.0;
+const STATIONS: f64 = 16.0;
 /// The greatest share of the cutter's diameter that a step may be.
 const WIDEST: f64 = 0.9;
 
