@@ -26,8 +26,17 @@ fn planned(surface: &Surface, machine: &Machine, settings: &Settings) -> Plan {
     plan(surface, machine, settings, &Unmonitored).unwrap()
 }
 
-/// How much deeper than a cutter that just touches the path goes, and how much higher, at points
-/// that are denser than any sample of it.
+/// z of the normal of the surface that a cutter's tip stays on.
+fn flatness(surface: &Surface, cutter: &Cutter, [x, y]: [f64; 2]) -> f64 {
+    let tip = |at: [f64; 2]| surface.drop_cutter(cutter, at).unwrap().z_mm;
+    let step = 1e-4;
+    let gx = (tip([x + step, y]) - tip([x - step, y])) / (2.0 * step);
+    let gy = (tip([x, y + step]) - tip([x, y - step])) / (2.0 * step);
+    1.0 / (1.0 + gx * gx + gy * gy).sqrt()
+}
+
+/// How much deeper than a cutter that just touches the path goes, along the normal, and how much
+/// higher, at points that are denser than any sample of it.
 fn depth_and_rise(surface: &Surface, plan: &Plan) -> (f64, f64) {
     let operation = plan.operations.last().unwrap();
     let (mut deepest, mut highest) = (0.0_f64, 0.0_f64);
@@ -41,7 +50,11 @@ fn depth_and_rise(surface: &Surface, plan: &Plan) -> (f64, f64) {
                 let share = k as f64 / count as f64;
                 let at: [f64; 3] = std::array::from_fn(|i| from[i] + share * way[i]);
                 if let Some(tip) = surface.drop_cutter(&operation.cutter, [at[0], at[1]]) {
-                    deepest = deepest.max(tip.z_mm - at[2]);
+                    let depth = tip.z_mm - at[2];
+                    if depth > deepest {
+                        let flat = flatness(surface, &operation.cutter, [at[0], at[1]]);
+                        deepest = deepest.max(depth * flat);
+                    }
                     if step.travel != Travel::Rapid && way[2] == 0.0 {
                         highest = highest.max(at[2] - tip.z_mm);
                     }
