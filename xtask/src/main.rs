@@ -41,7 +41,8 @@ enum Chore {
     /// Hold a command against what other programs make of the same task.
     #[command(subcommand)]
     Peers(peers::Peers),
-    /// Let opencamlib judge our cutters and finishing paths, and be raced; LinuxCNC the NC code.
+    /// Let opencamlib judge our cutters and finishing paths, and be raced; a removal simulation in
+    /// Python the NC code, and LinuxCNC's interpreter.
     ///
     /// Needs Python 3; installs the judge's packages into `target/judges/toolpath`.
     JudgeToolpath(toolpath::Options),

@@ -1,4 +1,4 @@
-//! Lets opencamlib and LinuxCNC judge cutters, paths and NC code.
+//! Lets opencamlib, a removal simulation of its own and LinuxCNC judge cutters, paths and NC code.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use clap::Args;
 use crate::{apt, shell};
 
 /// The judge's packages, pinned: another release may judge otherwise.
-const PACKAGES: [&str; 2] = ["opencamlib==2023.1.11", "numpy"];
+const PACKAGES: [&str; 3] = ["opencamlib==2023.1.11", "numpy==2.4.6", "numba==0.68.1"];
 /// Seeds begin here; lower ones were looked at while the paths were made.
 const FIRST_SEED: &str = "101";
 /// Places at which either drops its cutter, for each surface.
@@ -42,7 +42,11 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     ];
     shell::run("cargo", &words.concat())?;
     let check = "tests/judges/toolpath/check.py";
-    shell::run(&python, &[check, &folder, "--check"])?;
+    shell::run(&python, &["-B", check, &folder, "--check"])?;
+    let removal = "tests/judges/toolpath/removal.py";
+    // What it compiles stays out of the tree.
+    let cache = [("NUMBA_CACHE_DIR", place.join("numba").display().to_string())];
+    shell::run_with(&python, &["-B", removal, &folder, "--check"], &cache)?;
     if options.linuxcnc {
         apt::need(&[("rs274", "linuxcnc-uspace")])?;
         let check = "tests/judges/toolpath/rs274_check.py";

@@ -1,4 +1,4 @@
-//! For `tests/judges/toolpath/check.py`: surfaces from seeds, where our cutters stand on them, our
+//! For the judges of `tests/judges/toolpath`: surfaces from seeds, where our cutters stand on them, our
 //! finishing paths, and how long it took.
 //!
 //! `judge_toolpath OUT FIRST_SEED SEEDS POINTS`
@@ -21,7 +21,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use range_image::Unmonitored;
-use toolpath::{Cutter, Header, Move, Settings, Travel};
+use toolpath::{Cutter, Dialect, Header, Machine, Move, Pattern, Plan, Settings, Surface, Travel};
 
 /// Cutters by turns.
 const CUTTERS: [&str; 5] = ["ball:6", "bull:6:1", "flat:4", "ball:3", "bull:8:2.5"];
@@ -47,7 +47,7 @@ fn main() {
 fn one(seed: u64, points: usize, folder: &Path) {
     let cutter_text = CUTTERS[(seed % 5) as usize];
     let cutter: Cutter = cutter_text.parse().unwrap();
-    let pitch_mm = [0.5, 0.35, 0.25][(seed % 3) as usize];
+    let pitch_mm = [0.35, 0.25, 0.2][(seed % 3) as usize];
     let facets = bench::relief(seed, SIZE_MM, pitch_mm);
     fs::write(folder.join("surface.stl"), bench::stl(&facets)).unwrap();
     let began = Instant::now();
@@ -93,19 +93,29 @@ fn one(seed: u64, points: usize, folder: &Path) {
     let moves = &plan.operations[0].moves;
     write(&folder.join("path.f64"), &path(moves));
     write(&folder.join("moves.f64"), &ends(moves));
-    let header = Header {
-        title: format!("seed {seed}"),
-        author: "judge".to_owned(),
-        timestamp: "2026-01-01".to_owned(),
-    };
-    let mut code = Vec::new();
-    toolpath::write(&machine, &plan.operations, &header, &mut code).unwrap();
-    fs::write(folder.join("path.nc"), code).unwrap();
+    code(&machine, &plan, &folder.join("path.nc"));
     fs::write(
         folder.join("tool.tbl"),
         format!("T1 P1 Z0 D{}\n", 2.0 * cutter.radius_mm()),
     )
     .unwrap();
+
+    // The other pattern, and the other dialect, whose coordinates are coarser.
+    if cutter.disc_mm() == 0.0 {
+        let settings = Settings {
+            pattern: Pattern::Scallop,
+            ..settings.clone()
+        };
+        program(&surface, &machine, &settings, &folder.join("scallop.nc"));
+    }
+    if seed.is_multiple_of(3) {
+        let machine = Machine {
+            dialect: Dialect::Fanuc,
+            decimals: 3,
+            ..machine.clone()
+        };
+        program(&surface, &machine, &settings, &folder.join("fanuc.nc"));
+    }
 
     let mut told = String::new();
     let arcs = moves
@@ -122,12 +132,29 @@ fn one(seed: u64, points: usize, folder: &Path) {
         ("plan_s", plan_s),
         ("moves", moves.len() as f64),
         ("arcs", arcs as f64),
+        ("scallop_mm", settings.scallop_mm),
         ("passes", plan.operations[0].passes as f64),
     ] {
         writeln!(told, "  \"{name}\": {value},").unwrap();
     }
     writeln!(told, "  \"cutter\": \"{cutter_text}\"\n}}").unwrap();
     fs::write(folder.join("told.json"), told).unwrap();
+}
+
+fn program(surface: &Surface, machine: &Machine, settings: &Settings, path: &Path) {
+    let plan = toolpath::plan(surface, machine, settings, &Unmonitored).unwrap();
+    code(machine, &plan, path);
+}
+
+fn code(machine: &Machine, plan: &Plan, path: &Path) {
+    let header = Header {
+        title: "surface".to_owned(),
+        author: "judge".to_owned(),
+        timestamp: "2026-01-01".to_owned(),
+    };
+    let mut code = Vec::new();
+    toolpath::write(machine, &plan.operations, &header, &mut code).unwrap();
+    fs::write(path, code).unwrap();
 }
 
 /// Points all along the moves at a feed.

@@ -132,6 +132,54 @@ pub(crate) fn after(machine: &Machine, operation: &Operation) -> Result<(), Tool
     Ok(())
 }
 
+/// Whether tools are long enough. What holds a tool may be of any width, so that it must stay above
+/// stock and fixtures; cutting edges must be as long as what they cut at once is high.
+pub(crate) fn lengths(machine: &Machine, operations: &[Operation]) -> Result<(), ToolpathError> {
+    let stock = ("the stock's top".to_owned(), machine.stock.z_mm[1]);
+    let fixtures = machine.fixtures.iter();
+    let fixtures = fixtures.map(|f| (format!("the fixture `{}`", f.name), f.place.z_mm[1]));
+    let (what, top_mm) = fixtures.fold(stock.clone(), |a, b| if b.1 > a.1 { b } else { a });
+    for (number, operation) in operations.iter().enumerate() {
+        let tool = machine.tool(&operation.cutter)?;
+        let ends = operation.moves.iter().map(|step| step.to_mm);
+        let lowest = ends.min_by(|a, b| a[2].total_cmp(&b[2]));
+        let Some([x, y, z]) = lowest else { continue };
+        let short = |key, length_mm: f64, depth_mm: f64, what: &str, mend| {
+            if depth_mm <= length_mm + SLACK_MM {
+                return Ok(());
+            }
+            Err(ToolpathError::TooShort {
+                cutter: operation.cutter,
+                depth_mm,
+                what: what.to_owned(),
+                at_mm: [x, y],
+                key,
+                length_mm,
+                mend,
+            })
+        };
+        if let Some(reach_mm) = tool.reach_mm {
+            let mend = "what holds it would go into that; clamp it longer, or lower what is higher";
+            short("reach_mm", reach_mm, top_mm - z, &what, mend)?;
+        }
+        if let Some(length_mm) = tool.cutting_length_mm
+            && number == 0
+        {
+            let depth_mm = stock.1 - z;
+            if operations.len() == 1 {
+                let mend = "choose a tool with longer edges, or rough first";
+                short("cutting_length_mm", length_mm, depth_mm, &stock.0, mend)?;
+            } else {
+                let level_mm = tool.step_down_mm.min(depth_mm);
+                let mend = "give it a smaller step_down_mm";
+                let what = "the level above";
+                short("cutting_length_mm", length_mm, level_mm, what, mend)?;
+            }
+        }
+    }
+    Ok(())
+}
+
 /// A cutter on a straight way against the fixtures, as a cylinder on its tip.
 fn fixtures(
     machine: &Machine,

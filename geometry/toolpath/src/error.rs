@@ -126,6 +126,28 @@ pub enum ToolpathError {
         /// Its top.
         top_mm: f64,
     },
+    /// The tool is too short for how deep it would go.
+    #[error(
+        "the cutter {cutter} would go {depth_mm:.3} mm below {what}, near x {:.2}, y {:.2} mm, and \
+         its {key} is {length_mm} mm: {mend}",
+        at_mm[0], at_mm[1]
+    )]
+    TooShort {
+        /// The cutter.
+        cutter: Cutter,
+        /// How deep it would go.
+        depth_mm: f64,
+        /// Below what.
+        what: String,
+        /// Where.
+        at_mm: [f64; 2],
+        /// Which of its lengths is too short.
+        key: &'static str,
+        /// That length.
+        length_mm: f64,
+        /// What to do.
+        mend: &'static str,
+    },
     /// The simulation found a rapid move in material.
     #[error(
         "the simulation found a rapid move {depth_mm:.3} mm deep in material near x {:.2}, y {:.2} \

@@ -83,10 +83,11 @@ impl<'a> Field<'a> {
         self.tip(self.place(s, t))
     }
 
-    /// Ways along a pass, so close that slopes and cusps can be told from heights there.
-    pub(crate) fn stations(&self) -> Vec<f64> {
+    /// Ways along a pass, so many of them within the cutter's radius that slopes and cusps can be told
+    /// from heights there.
+    pub(crate) fn stations(&self, in_radius: f64) -> Vec<f64> {
         let [low, high] = self.s;
-        let step = (self.cutter.radius_mm() / 10.0).min((high - low) / 64.0);
+        let step = (self.cutter.radius_mm() / in_radius).min((high - low) / 64.0);
         let count = ((high - low) / step).ceil().clamp(8.0, 4000.0) as usize;
         (0..=count)
             .map(|k| low + (high - low) * k as f64 / count as f64)

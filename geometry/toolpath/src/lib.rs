@@ -20,6 +20,7 @@
 //! along the cutter's axis.
 
 mod arc;
+mod between;
 mod check;
 mod cusp;
 mod cutter;

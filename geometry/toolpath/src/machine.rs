@@ -83,6 +83,10 @@ pub struct Tool {
     pub step_down_mm: f64,
     /// Distance of passes of roughing, millimetres.
     pub step_over_mm: f64,
+    /// Length of its cutting edges from the tip, millimetres, if that is known.
+    pub cutting_length_mm: Option<f64>,
+    /// How far its tip stands out of what holds it, millimetres, if that is known.
+    pub reach_mm: Option<f64>,
 }
 
 /// A machine, set up for a part. Millimetres; all but the travel in the coordinates of the model.
@@ -254,6 +258,20 @@ impl Machine {
                 step_mm,
                 step_mm >= LEAST_STEP_MM,
                 "0.01 at least",
+            )?;
+        }
+        for (name, length_mm) in [
+            ("cutting_length_mm", tool.cutting_length_mm),
+            ("reach_mm", tool.reach_mm),
+        ] {
+            positive(name, length_mm.unwrap_or(1.0))?;
+        }
+        if let (Some(cutting_mm), Some(reach_mm)) = (tool.cutting_length_mm, tool.reach_mm) {
+            check(
+                &key("reach_mm"),
+                reach_mm,
+                reach_mm >= cutting_mm,
+                "cutting_length_mm at least",
             )?;
         }
         let most = 2.0 * tool.cutter.radius_mm();

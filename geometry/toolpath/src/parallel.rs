@@ -5,6 +5,7 @@ use range_image::{Cancelled, Monitor};
 use rayon::prelude::*;
 
 use crate::cusp::{self, Near};
+use crate::error::ToolpathError;
 use crate::field::Field;
 
 /// Where the surface is steeper than this, z of its normal, passes are not drawn closer for it:
@@ -13,8 +14,29 @@ pub(crate) const STEEP: f64 = 0.258_819;
 /// The step is sought until the highest cusp is this share below what is asked for, at most.
 const NEAR_ENOUGH: f64 = 0.015;
 const ROUNDS: usize = 12;
+/// Stations within the cutter's radius.
+const STATIONS: f64 = 16.0;
 /// The greatest share of the cutter's diameter that a step may be.
 const WIDEST: f64 = 0.9;
+
+/// More finishing passes are not planned: they would take hours to plan, and days to mill.
+const MOST_PASSES: usize = 20_000;
+
+/// Whether there are too many passes.
+///
+/// # Errors
+/// [`ToolpathError::TooMany`]
+pub(crate) fn limit(passes: usize) -> Result<(), ToolpathError> {
+    if passes <= MOST_PASSES {
+        return Ok(());
+    }
+    Err(ToolpathError::TooMany {
+        what: "finishing passes",
+        wanted: passes,
+        most: MOST_PASSES,
+        mend: "choose a larger scallop, or a larger cutter",
+    })
+}
 
 /// Where passes run, and how much was too steep for them.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,8 +69,8 @@ pub(crate) fn passes(
     field: &Field<'_>,
     cusp_mm: f64,
     monitor: &dyn Monitor,
-) -> Result<Option<Passes>, Cancelled> {
-    let stations = field.stations();
+) -> Result<Option<Passes>, ToolpathError> {
+    let stations = field.stations(STATIONS);
     let line = |across: f64| Line::new(field, &stations, across);
     let level = cusp::level_step_mm(&field.cutter, cusp_mm).max(1e-3);
     let widest = (WIDEST * 2.0 * field.cutter.radius_mm()).min(3.0 * level);
@@ -67,8 +89,10 @@ pub(crate) fn passes(
     let mut here = line(first);
     let mut step = level;
     let (mut steep, mut all) = (0, 0);
+    limit(((last - first) / (1.5 * level).min(widest)) as usize)?;
     while here.across < last {
         monitor.check()?;
+        limit(across_mm.len())?;
         monitor.progress((here.across - first) / (last - first));
         let (mut low, mut high) = (0.0_f64, f64::INFINITY);
         let mut best: Option<(Line, Tally)> = None;
@@ -190,7 +214,7 @@ pub(crate) fn limits(
     monitor: &dyn Monitor,
 ) -> Result<Option<[f64; 2]>, Cancelled> {
     let [low, high] = field.t;
-    let stations = field.stations();
+    let stations = field.stations(STATIONS);
     let mills = |across: f64| {
         let line = Line::new(field, &stations, across);
         line.tips.iter().any(Option::is_some)

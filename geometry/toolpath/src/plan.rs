@@ -83,6 +83,7 @@ pub fn plan(
     for operation in &operations {
         check::after(machine, operation)?;
     }
+    check::lengths(machine, &operations)?;
     monitor.progress(1.0);
     Ok(Plan { operations, notes })
 }
@@ -93,6 +94,7 @@ fn operation(
     name: &str,
     passes: usize,
     moves: &[Move],
+    tip: &dyn Fn([f64; 2]) -> Option<f64>,
 ) -> Result<Operation, ToolpathError> {
     let tool = machine.tool(&cutter)?;
     Ok(Operation {
@@ -101,7 +103,7 @@ fn operation(
         cutter,
         spindle_rpm: machine.spindle_rpm(tool),
         coolant: machine.coolant,
-        moves: quantized(moves, machine.decimals),
+        moves: quantized(moves, machine.decimals, tip),
         passes,
     })
 }
@@ -144,7 +146,7 @@ fn roughing(
         links.retract(&mut moves);
         passes += level.strands.len();
     }
-    operation(machine, cutter, "roughing", passes, &moves)
+    operation(machine, cutter, "roughing", passes, &moves, &|_| None)
 }
 
 fn finishing(
@@ -224,7 +226,7 @@ fn finishing(
     let mut moves = Vec::new();
     links.add(&mut moves, &strands, machine.stock.z_mm[1], None);
     links.retract(&mut moves);
-    let finish = operation(machine, cutter, "finishing", passes, &moves)?;
+    let finish = operation(machine, cutter, "finishing", passes, &moves, &touching)?;
     Ok((finish, steep_share))
 }
 

@@ -3,17 +3,34 @@
 use crate::motion::{Arc, Move, Travel};
 use crate::post::{rounded, scale};
 
-/// Rounds coordinates to so many decimals, heights upwards, so that rounding takes no material. What
-/// does not move any more is left out. Centres of arcs are put as far from one end as from the
+/// A place that rounding moves goes up by so many units of the last decimal at most: at a wall it may
+/// come to stand above that.
+const HIGHEST_LIFT: f64 = 20.0;
+
+/// Rounds coordinates to so many decimals, heights upwards, so that rounding takes no material; where
+/// a slope rises towards the rounded place, up to `tip`, the least height of the tip there. What does
+/// not move any more is left out. Centres of arcs are put as far from one end as from the
 /// other; an arc that rounding has made meaningless becomes a line.
-pub(crate) fn quantized(moves: &[Move], decimals: u8) -> Vec<Move> {
+pub(crate) fn quantized(
+    moves: &[Move],
+    decimals: u8,
+    tip: &dyn Fn([f64; 2]) -> Option<f64>,
+) -> Vec<Move> {
     let scale = scale(decimals);
     let mut out: Vec<Move> = Vec::with_capacity(moves.len());
     for step in moves {
         let [x, y, z] = step.to_mm;
         // What is on the grid already stays, by rounding, too.
-        let up = (z * scale - 1e-6).ceil() / scale + 0.0;
-        let to_mm = [rounded(x, decimals), rounded(y, decimals), up];
+        let up = |z: f64| (z * scale - 1e-6).ceil() / scale + 0.0;
+        let place = [rounded(x, decimals), rounded(y, decimals)];
+        let mut height = up(z);
+        if step.travel != Travel::Rapid
+            && let Some(least) = tip(place)
+            && least - height <= HIGHEST_LIFT / scale
+        {
+            height = height.max(up(least));
+        }
+        let to_mm = [place[0], place[1], height];
         let Some(from) = out.last().map(|last| last.to_mm) else {
             out.push(Move { to_mm, ..*step });
             continue;

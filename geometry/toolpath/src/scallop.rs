@@ -3,28 +3,39 @@
 //! The centre of a ball cutter moves on the surface's offset, whose heights are the tips' heights
 //! shifted. Passes whose distance there is `D` leave cusps of `R - sqrt(R^2 - D^2 / 4)`, less what
 //! the offset bulges between them. Each pass is grown from the one before: at every station it is
-//! as far across as the nearest place of that pass allows.
+//! as far across as the nearest place of that pass allows. Where that one bends away, the notch of
+//! the bend is farther from both than half their distance; there the new pass is drawn nearer, until
+//! the cusp that both leave between them is no higher than it may be.
 
-use range_image::{Cancelled, Monitor};
+use range_image::Monitor;
 use rayon::prelude::*;
 
+use crate::between::Between;
 use crate::cusp;
+use crate::error::ToolpathError;
 use crate::field::Field;
 use crate::parallel::STEEP;
 
 /// Rounds for the way to the next pass.
 const ROUNDS: usize = 10;
+/// Stations within the cutter's radius: passes bend sharply where the surface does.
+const STATIONS: f64 = 24.0;
 /// How near to the cusp's height that is, as a share of it.
 const NEAR_ENOUGH: f64 = 0.004;
 /// How far corners of a pass may be off it, as a share of the step on a level plane.
 const SMOOTH: f64 = 0.005;
 
+/// Rounds in which places of a new pass are drawn nearer, and the share of the wanted cusp from which
+/// that is done.
+const REPAIRS: usize = 6;
+const TOO_HIGH: f64 = 1.02;
+
 /// A place of a pass that the cutter mills.
 #[derive(Debug, Clone, Copy)]
-struct Place {
-    s: f64,
-    t: f64,
-    tip: Option<f64>,
+pub(crate) struct Place {
+    pub(crate) s: f64,
+    pub(crate) t: f64,
+    pub(crate) tip: Option<f64>,
 }
 
 type Lines = (Vec<Vec<[f64; 2]>>, f64);
@@ -34,9 +45,9 @@ pub(crate) fn passes(
     field: &Field<'_>,
     cusp_mm: f64,
     monitor: &dyn Monitor,
-) -> Result<Option<Lines>, Cancelled> {
+) -> Result<Option<Lines>, ToolpathError> {
     let level = cusp::level_step_mm(&field.cutter, cusp_mm).max(1e-3);
-    let stations = field.stations();
+    let stations = field.stations(STATIONS);
     let Some([first, last]) = crate::parallel::limits(field, level, monitor)? else {
         return Ok(None);
     };
@@ -49,8 +60,10 @@ pub(crate) fn passes(
     let mut lines = vec![corners(field, &here, level)];
     let (mut steep, mut all) = (0_usize, 0_usize);
     let most = ((last - first) / (level * STEEP * 0.25)).ceil() as usize + 2;
+    crate::parallel::limit(((last - first) / (1.5 * level)) as usize)?;
     for _ in 0..most {
         monitor.check()?;
+        crate::parallel::limit(lines.len())?;
         let done = here.iter().map(|p| p.t).fold(f64::INFINITY, f64::min);
         if done >= last {
             break;
@@ -69,11 +82,34 @@ pub(crate) fn passes(
         steep += steps.iter().flatten().filter(|(_, steep)| *steep).count();
         // Where the cutter mills nothing a pass keeps to its neighbours.
         let across = filled(&steps, level);
-        here = here
+        let mut next: Vec<Place> = here
             .par_iter()
             .zip(&across)
             .map(|(place, step)| at(place.s, (place.t + step).min(last)))
             .collect();
+        for _ in 0..REPAIRS {
+            let between = Between {
+                field,
+                passes: [&here, &next],
+                window,
+            };
+            let nearer: Vec<Option<Place>> = (0..here.len())
+                .into_par_iter()
+                .map(|k| {
+                    let cusp = between.cusp_mm(k).filter(|c| *c > TOO_HIGH * cusp_mm)?;
+                    let step = next[k].t - here[k].t;
+                    let nearer = (step * (cusp_mm / cusp).sqrt()).max(level * STEEP);
+                    (nearer < step).then(|| at(here[k].s, here[k].t + nearer))
+                })
+                .collect();
+            if nearer.iter().all(Option::is_none) {
+                break;
+            }
+            for (place, nearer) in next.iter_mut().zip(nearer) {
+                *place = nearer.unwrap_or(*place);
+            }
+        }
+        here = next;
         lines.push(corners(field, &here, level));
     }
     Ok(Some((lines, steep as f64 / all.max(1) as f64)))
@@ -142,6 +178,22 @@ fn cusp_at(field: &Field<'_>, here: Place, step: f64, near: &[Place]) -> Option<
     let (s, t) = (here.s, here.t + step);
     let tip = field.tip_at(s, t)?;
     let radius = field.cutter.radius_mm();
+    let (square, foot, slope) = nearest(near, [s, t, tip])?;
+    let quarter = square / 4.0;
+    if quarter >= radius * radius {
+        return Some(f64::INFINITY);
+    }
+    let amid = field.tip_at(f64::midpoint(s, foot[0]), f64::midpoint(t, foot[1]))?;
+    let bulge = amid - f64::midpoint(tip, foot[2]);
+    let flat = libm::hypot(s - foot[0], t - foot[1]).max(1e-12);
+    let rise = (tip - foot[2]) / flat;
+    let nz = 1.0 / (1.0 + rise * rise + slope * slope).sqrt();
+    Some(radius - (radius * radius - quarter).sqrt() - bulge * nz)
+}
+
+/// The place of a pass nearest to a tip: the square of the distance, the place, and the slope along
+/// the pass there.
+pub(crate) fn nearest(near: &[Place], [s, t, tip]: [f64; 3]) -> Option<(f64, [f64; 3], f64)> {
     let mut nearest: Option<(f64, [f64; 3], f64)> = None;
     for pair in near.windows(2) {
         let &[a, b] = pair else { continue };
@@ -164,17 +216,7 @@ fn cusp_at(field: &Field<'_>, here: Place, step: f64, near: &[Place]) -> Option<
             nearest = Some((square, foot, slope));
         }
     }
-    let (square, foot, slope) = nearest?;
-    let quarter = square / 4.0;
-    if quarter >= radius * radius {
-        return Some(f64::INFINITY);
-    }
-    let amid = field.tip_at(f64::midpoint(s, foot[0]), f64::midpoint(t, foot[1]))?;
-    let bulge = amid - f64::midpoint(tip, foot[2]);
-    let flat = libm::hypot(s - foot[0], t - foot[1]).max(1e-12);
-    let rise = (tip - foot[2]) / flat;
-    let nz = 1.0 / (1.0 + rise * rise + slope * slope).sqrt();
-    Some(radius - (radius * radius - quarter).sqrt() - bulge * nz)
+    nearest
 }
 
 /// Steps where there are none, from the nearest stations that have one.

@@ -13,7 +13,7 @@ pub(crate) struct Fineness {
     pub(crate) step_mm: f64,
     /// Least distance.
     pub(crate) least_mm: f64,
-    /// How far the middle between two samples may be off their line.
+    /// How far the middle between two samples, and the quarters, may be off their lines.
     pub(crate) wobble_mm: f64,
 }
 
@@ -122,17 +122,25 @@ fn refine(
         run.push(b);
         return;
     }
-    let s = f64::midpoint(a[0], b[0]);
     // A gap narrower than the samples' distance is bridged.
-    let z = tip(s).unwrap_or(a[1].max(b[1]));
-    let middle = [s, z];
-    if (z - f64::midpoint(a[1], b[1])).abs() > fineness.wobble_mm {
-        refine(a, middle, fineness, tip, run);
-        refine(middle, b, fineness, tip, run);
-    } else {
-        run.push(middle);
-        run.push(b);
+    let between = |p: [f64; 2], q: [f64; 2]| {
+        let s = f64::midpoint(p[0], q[0]);
+        [s, tip(s).unwrap_or(p[1].max(q[1]))]
+    };
+    let is_off = |p: [f64; 2], m: [f64; 2], q: [f64; 2]| {
+        (m[1] - f64::midpoint(p[1], q[1])).abs() > fineness.wobble_mm
+    };
+    let middle = between(a, b);
+    if !is_off(a, middle, b) {
+        // Where a hollow turns into a hump, the middle alone may be on the line.
+        let quarters = [between(a, middle), between(middle, b)];
+        if !is_off(a, quarters[0], middle) && !is_off(middle, quarters[1], b) {
+            run.extend([quarters[0], middle, quarters[1], b]);
+            return;
+        }
     }
+    refine(a, middle, fineness, tip, run);
+    refine(middle, b, fineness, tip, run);
 }
 
 /// Lines, and arcs if wanted, through the corridor on top of a run, from a height at its start.
@@ -230,7 +238,30 @@ mod tests {
             counts.push(pieces.len());
         }
         assert!(counts[0] < 130, "{counts:?}");
-        assert!(counts[1] * 3 < counts[0], "{counts:?}");
+        assert!(counts[1] * 2 < counts[0], "{counts:?}");
+    }
+
+    #[test]
+    fn a_hollow_that_turns_into_a_hump_is_not_cut_off() {
+        let fineness = Fineness::of(2.0, 2e-4, 1e-4);
+        // Between two samples the curve crosses their line in the middle.
+        let step = 10.0 / (10.0 / fineness.step_mm).ceil();
+        let tip = |s: f64| {
+            let inner = (s - 50.0 * step) / step;
+            let wave = if (0.0..=1.0).contains(&inner) {
+                -0.002 * libm::sin(core::f64::consts::TAU * inner)
+            } else {
+                0.0
+            };
+            Some(s + wave)
+        };
+        let run = &sample(10.0, &fineness, &tip)[0];
+        let pieces = fit(run, 0.0, 0.001, false);
+        for k in 0..=100 {
+            let s = step * (50.0 + f64::from(k) / 100.0);
+            let above = height(&pieces, [0.0, 0.0], s) - tip(s).unwrap();
+            assert!(above > -3e-4, "{s}: {above}");
+        }
     }
 
     #[test]

@@ -26,8 +26,17 @@ fn planned(surface: &Surface, machine: &Machine, settings: &Settings) -> Plan {
     plan(surface, machine, settings, &Unmonitored).unwrap()
 }
 
-/// How much deeper than a cutter that just touches the path goes, and how much higher, at points
-/// that are denser than any sample of it.
+/// z of the normal of the surface that a cutter's tip stays on.
+fn flatness(surface: &Surface, cutter: &Cutter, [x, y]: [f64; 2]) -> f64 {
+    let tip = |at: [f64; 2]| surface.drop_cutter(cutter, at).unwrap().z_mm;
+    let step = 1e-4;
+    let gx = (tip([x + step, y]) - tip([x - step, y])) / (2.0 * step);
+    let gy = (tip([x, y + step]) - tip([x, y - step])) / (2.0 * step);
+    1.0 / (1.0 + gx * gx + gy * gy).sqrt()
+}
+
+/// How much deeper than a cutter that just touches the path goes, along the normal, and how much
+/// higher, at points that are denser than any sample of it.
 fn depth_and_rise(surface: &Surface, plan: &Plan) -> (f64, f64) {
     let operation = plan.operations.last().unwrap();
     let (mut deepest, mut highest) = (0.0_f64, 0.0_f64);
@@ -41,7 +50,11 @@ fn depth_and_rise(surface: &Surface, plan: &Plan) -> (f64, f64) {
                 let share = k as f64 / count as f64;
                 let at: [f64; 3] = std::array::from_fn(|i| from[i] + share * way[i]);
                 if let Some(tip) = surface.drop_cutter(&operation.cutter, [at[0], at[1]]) {
-                    deepest = deepest.max(tip.z_mm - at[2]);
+                    let depth = tip.z_mm - at[2];
+                    if depth > deepest {
+                        let flat = flatness(surface, &operation.cutter, [at[0], at[1]]);
+                        deepest = deepest.max(depth * flat);
+                    }
                     if step.travel != Travel::Rapid && way[2] == 0.0 {
                         highest = highest.max(at[2] - tip.z_mm);
                     }
@@ -138,6 +151,22 @@ fn cusps_of_constant_scallop_passes_are_all_as_high_as_asked_for() {
         assert!(gouge < 4e-4, "{name}: {gouge}");
         assert!((left / 0.02 - 1.0).abs() < 0.05, "{name}: {left}");
     }
+}
+
+#[test]
+fn constant_scallop_passes_leave_no_notches_where_they_bend() {
+    // A hip: two planes, one sloping along the passes and one across.
+    let facets = graph([24.0, 20.0], 0.25, |x, y| 0.9 * x.min(y));
+    let surface = surface(&facets);
+    let machine = machine(&surface, &["ball:6"]);
+    let settings = Settings {
+        pattern: Pattern::Scallop,
+        ..settings("ball:6", 0.02)
+    };
+    let plan = planned(&surface, &machine, &settings);
+    let (gouge, left, _) = simulated(&surface, &machine, &plan, 0.011);
+    assert!(gouge < 4e-4, "{gouge}");
+    assert!((0.95..1.05).contains(&(left / 0.02)), "{left}");
 }
 
 #[test]
@@ -323,6 +352,63 @@ fn what_does_not_fit_is_told_by_its_axis() {
     };
     let told = refused(&slope, &steep, "ball:6").to_string();
     assert!(told.contains("below the stock's bottom"), "{told}");
+}
+
+#[test]
+fn tools_too_short_for_the_depth_are_told() {
+    let surface = surface(&relief(1, [30.0, 20.0], 0.5));
+    let [low, high] = surface.bounds_mm();
+    let mut sound = machine(&surface, &["ball:6", "flat:8"]);
+    sound.stock.z_mm[1] = high[2] + 6.0;
+    let depth_mm = high[2] + 6.0 - low[2];
+    for tool in &mut sound.tools {
+        (tool.cutting_length_mm, tool.reach_mm) = (Some(depth_mm), Some(depth_mm + 1.0));
+    }
+    planned(&surface, &sound, &settings("ball:6", 0.05));
+
+    let mut stubby = sound.clone();
+    stubby.tools[0].cutting_length_mm = None;
+    stubby.tools[0].reach_mm = Some(5.0);
+    let told = refused(&surface, &stubby, "ball:6").to_string();
+    assert!(
+        told.contains("below the stock's top") && told.contains("its reach_mm is 5 mm"),
+        "{told}"
+    );
+    // Roughing before does not help what holds the tool, which is above stock that stays.
+    let roughed = Settings {
+        rough: Some("flat:8".parse().unwrap()),
+        ..settings("ball:6", 0.05)
+    };
+    let told = plan(&surface, &stubby, &roughed, &Unmonitored).unwrap_err();
+    assert!(told.to_string().contains("its reach_mm is 5 mm"), "{told}");
+
+    let mut blunt = sound.clone();
+    blunt.tools[0].cutting_length_mm = Some(5.0);
+    let told = refused(&surface, &blunt, "ball:6").to_string();
+    assert!(
+        told.contains("its cutting_length_mm is 5 mm") && told.contains("rough first"),
+        "{told}"
+    );
+    planned(&surface, &blunt, &roughed);
+    blunt.tools[1].cutting_length_mm = Some(1.0);
+    let told = plan(&surface, &blunt, &roughed, &Unmonitored).unwrap_err();
+    assert!(
+        told.to_string().contains("give it a smaller step_down_mm"),
+        "{told}"
+    );
+
+    let mut clamped = sound.clone();
+    clamped.safe_z_mm += 30.0;
+    clamped.fixtures.push(Fixture {
+        name: "tall clamp".to_owned(),
+        place: Cuboid {
+            x_mm: [-20.0, -10.0],
+            y_mm: [5.0, 15.0],
+            z_mm: [-5.0, high[2] + 30.0],
+        },
+    });
+    let told = refused(&surface, &clamped, "ball:6").to_string();
+    assert!(told.contains("below the fixture `tall clamp`"), "{told}");
 }
 
 #[test]

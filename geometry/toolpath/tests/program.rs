@@ -11,7 +11,8 @@ mod bench;
 use bench::{graph, machine, surface};
 use range_image::Unmonitored;
 use toolpath::{
-    Arc, Dialect, Header, Machine, Move, Operation, Plane, Settings, Travel, duration, plan,
+    Arc, Dialect, Header, Machine, Move, Operation, Pattern, Plane, Settings, Travel, duration,
+    plan,
 };
 
 fn header() -> Header {
@@ -303,6 +304,23 @@ fn what_would_take_gigabytes_or_be_a_guess_is_refused() {
     };
     let error = refused(&machine, &fine);
     assert!(error.contains("choose a larger scallop"), "{error}");
+    // Few places on each of very many passes.
+    let long = surface(&graph([5.0, 1900.0], 5.0, |_, y| 0.001 * y));
+    let mut needle = bench::machine(&long, &["ball:1"]);
+    needle.travel.y_mm = [-2000.0, 2100.0];
+    for pattern in [Pattern::Parallel, Pattern::Scallop] {
+        let settings = Settings {
+            scallop_mm: 1e-4,
+            pattern,
+            ..Settings::finishing("ball:1".parse().unwrap())
+        };
+        let error = plan(&long, &needle, &settings, &Unmonitored).unwrap_err();
+        let error = error.to_string();
+        assert!(
+            error.contains("finishing passes: ") && error.contains("20000 at most"),
+            "{error}"
+        );
+    }
     let rough = Settings {
         rough: Some("flat:10".parse().unwrap()),
         ..Settings::finishing("ball:6".parse().unwrap())

@@ -3,8 +3,9 @@
 usage: rs274_check.py DIR [--rs274 PROGRAM]
 
 DIR has a folder for each seed, as `judge_toolpath` leaves them. The stand-alone interpreter of
-LinuxCNC must take each `path.nc`, and what it makes of it must be the moves in `moves.f64`: as many,
-of the same kind, ending at the same places, arcs around the same centres in the same sense.
+LinuxCNC must take each `path.nc` and `scallop.nc`, and what it makes of the first must be the moves in
+`moves.f64`: as many, of the same kind, ending at the same places, arcs around the same centres in the
+same sense.
 """
 
 import argparse
@@ -47,16 +48,28 @@ def interpreted(text):
     return np.array(moves)
 
 
-def judge(folder, program):
+def read(program, folder, name):
+    """What the interpreter prints, and why it does not take the program."""
     done = subprocess.run(
-        [program, "-g", "-t", folder / "tool.tbl", folder / "path.nc"],
+        [program, "-g", "-t", folder / "tool.tbl", folder / name],
         capture_output=True,
         text=True,
         check=False,
     )
     if done.returncode != 0 or "PROGRAM_END" not in done.stdout:
-        return f"not taken: {done.stderr.strip()[-300:]}"
-    theirs = interpreted(done.stdout)
+        return "", f"{name} is not taken: {done.stderr.strip()[-300:]}"
+    return done.stdout, None
+
+
+def judge(folder, program):
+    if (folder / "scallop.nc").exists():
+        _, why = read(program, folder, "scallop.nc")
+        if why:
+            return why
+    text, why = read(program, folder, "path.nc")
+    if why:
+        return why
+    theirs = interpreted(text)
     ours = np.fromfile(folder / "moves.f64").reshape(-1, 8)
     # Before ours it goes up by the machine's own coordinates and to the first place in two moves;
     # behind them it goes up again.

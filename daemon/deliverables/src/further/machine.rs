@@ -76,6 +76,8 @@ struct ToolTable {
     step_down_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     step_over_mm: Option<f64>,
+    cutting_length_mm: Option<f64>,
+    reach_mm: Option<f64>,
 }
 
 fn first_program() -> u32 {
@@ -224,6 +226,8 @@ fn tool(table: &ToolTable) -> Result<Tool, String> {
         plunge_mm_per_min: table.plunge_mm_per_min,
         step_down_mm: table.step_down_mm.unwrap_or(step_down_mm),
         step_over_mm: table.step_over_mm.unwrap_or(step_over_mm),
+        cutting_length_mm: table.cutting_length_mm,
+        reach_mm: table.reach_mm,
     })
 }
 
@@ -279,6 +283,11 @@ mod tests {
                 "plunge_mm_per_min = 300",
                 "plunge_mm_per_min = 0",
                 "tool 1: plunge_mm_per_min = 0",
+            ),
+            (
+                "plunge_mm_per_min = 300",
+                "plunge_mm_per_min = 300\ncutting_length_mm = 20\nreach_mm = 15",
+                "tool 1: reach_mm = 15: must be cutting_length_mm at least",
             ),
             (
                 "spindle_rpm = 12000",

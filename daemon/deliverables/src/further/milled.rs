@@ -214,8 +214,7 @@ fn simulated(
     pitch_mm: f64,
     monitor: &dyn Monitor,
 ) -> Result<HeightField, ToolpathError> {
-    let [low, high] = surface.bounds_mm();
-    let within = [[low[0], high[0]], [low[1], high[1]]];
+    let within = [0, 1].map(|axis| within_mm(surface, machine, plan, axis));
     let field = HeightField::of_stock(&machine.stock, within, pitch_mm)?;
     let removal = field.remove(&plan.operations, monitor)?;
     if removal.rapid_cut_mm > 0.0 {
@@ -225,6 +224,18 @@ fn simulated(
         });
     }
     Ok(removal.field)
+}
+
+/// The stock along an axis as far as tools come: beside the model as well.
+fn within_mm(surface: &Surface, machine: &Machine, plan: &Plan, axis: usize) -> [f64; 2] {
+    let [low, high] = surface.bounds_mm();
+    let [from, to] = machine.stock.axis(axis);
+    let radii = plan.operations.iter().map(|o| o.cutter.radius_mm());
+    let aside = 2.0 * radii.fold(0.0, f64::max);
+    [
+        (low[axis] - aside).max(from).min(low[axis]),
+        (high[axis] + aside).min(to).max(high[axis]),
+    ]
 }
 
 fn measured(field: &HeightField, deviations: &[Option<f64>]) -> SimulationFigures {

@@ -109,6 +109,8 @@ pub(crate) fn machine(surface: &Surface, cutters: &[&str]) -> Machine {
                 plunge_mm_per_min: 300.0,
                 step_down_mm,
                 step_over_mm,
+                cutting_length_mm: None,
+                reach_mm: None,
             }
         })
         .collect();
