@@ -2,6 +2,7 @@
 
 mod convert;
 mod curve;
+mod power;
 mod surface;
 
 /// A curve of cubic pieces in `D` dimensions (IGES entity 112).
