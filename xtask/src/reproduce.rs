@@ -9,19 +9,12 @@ use crate::{judge, shell, study};
 
 const PROGRAM: &str = "study-reproduction";
 const PAGE: &str = "docs/reproduction.md";
-/// Package, program and page of those whose programs draw their pictures themselves: Koo & Lee; Jo,
-/// Kwon & Han.
-const DRAWN: [[&str; 3]; 2] = [
-    [
-        "relief-surfaces",
-        "study-surfaces",
-        "docs/reproduction-koo-lee.md",
-    ],
-    [
-        "relief-sections",
-        "study-sections",
-        "docs/reproduction-jo-kwon-han.md",
-    ],
+/// Koo & Lee, and Jo, Kwon & Han: programs that draw their pictures themselves, of a package, and
+/// their pages.
+const DRAWN_BY: &str = "relief-surfaces";
+const DRAWN: [[&str; 2]; 2] = [
+    ["study-surfaces", "docs/reproduction-koo-lee.md"],
+    ["study-sections", "docs/reproduction-jo-kwon-han.md"],
 ];
 const PICTURES: &str = "docs/pictures/reproduction";
 
@@ -42,8 +35,8 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     let words = |words: &[&str]| -> Vec<OsString> { words.iter().map(Into::into).collect() };
     let drawn = |option: &str| {
         let mut all = DRAWN.into_iter();
-        all.try_for_each(|[package, program, page]| {
-            study::program_of(package, program, &words(&[option, page]))
+        all.try_for_each(|[program, page]| {
+            study::program_of(DRAWN_BY, program, &words(&[option, page]))
         })
     };
     if options.check {

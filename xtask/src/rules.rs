@@ -85,10 +85,16 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("relief-tests", &EVERYTHING),
     ("relief-studies", &STUDIES),
-    ("relief-sections", &["nurbs", "range-image", "skin"]),
     (
         "relief-surfaces",
-        &["nurbs", "range-image", "regrid", "scan-files", "surfacing"],
+        &[
+            "nurbs",
+            "range-image",
+            "regrid",
+            "scan-files",
+            "skin",
+            "surfacing",
+        ],
     ),
     ("relief-vm-systemd", &["sim-scanner"]),
     (

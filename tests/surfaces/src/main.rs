@@ -6,8 +6,8 @@
 //! cargo xtask reproduce
 //! ```
 
-// Surfaces in closed form, as in the crate's own tests.
 mod bound;
+// Surfaces in closed form, as in the crate's own tests.
 #[allow(dead_code, reason = "shared with tests; one is not measured here")]
 #[path = "../../../geometry/surfacing/tests/common/mod.rs"]
 mod common;
@@ -15,12 +15,12 @@ mod paper;
 mod picture;
 mod placements;
 
-use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::Result;
 use clap::Parser;
+use relief_surfaces::kept;
 
 /// Measure B-spline surfaces
 #[derive(Debug, Parser)]
@@ -61,35 +61,10 @@ fn main() -> ExitCode {
 
 fn study(options: &Options) -> Result<()> {
     if let Some(path) = &options.write_paper {
-        let (page, pictures) = paper::page()?;
-        for (name, picture) in pictures {
-            let folder = path.parent().unwrap_or(path).join(paper::PICTURES);
-            fs::create_dir_all(&folder)
-                .with_context(|| format!("cannot make {}", folder.display()))?;
-            fs::write(folder.join(name), picture)
-                .with_context(|| format!("cannot write {name} into {}", folder.display()))?;
-        }
-        fs::write(path, page).with_context(|| format!("cannot write {}", path.display()))?;
-        println!("written to {}", path.display());
-        return Ok(());
+        return kept::write(path, paper::page()?);
     }
     if let Some(path) = &options.check_paper {
-        let kept =
-            fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-        let (page, _) = paper::page()?;
-        for (kept, now) in kept.lines().zip(page.lines()) {
-            if kept != now {
-                bail!(
-                    "{} differs; `cargo xtask reproduce` writes it anew:\n  there: {kept}\n  now:   {now}",
-                    path.display()
-                );
-            }
-        }
-        if kept.lines().count() != page.lines().count() {
-            bail!("{} has another number of lines", path.display());
-        }
-        println!("{}: every figure holds", path.display());
-        return Ok(());
+        return kept::check(path, &paper::page()?.0);
     }
     placements::measure(
         options.short,

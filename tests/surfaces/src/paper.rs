@@ -5,13 +5,12 @@ use std::fmt::Write as _;
 use anyhow::{Context, Result};
 use nurbs::BSplineSurface;
 use range_image::Unmonitored;
+use relief_surfaces::kept::{PICTURES, Page};
 use surfacing::{Breaks, HeightGrid, Knots, Placement, Settings, fair, fit_with, make};
 
 use crate::common::{draws, face};
 use crate::picture::{Row, nets, rows};
 
-/// Where the pictures lie, from the page.
-pub(crate) const PICTURES: &str = "pictures/reproduction";
 /// The section: as many points at this distance (section 5).
 const POINTS: usize = 81;
 const SPACING_MM: f64 = 2.0;
@@ -25,7 +24,7 @@ const NOISE_MM: f64 = 0.025;
 const TOLERANCES_MM: [f64; 2] = [1.0, 0.25];
 
 /// The page and its pictures by name.
-pub(crate) fn page() -> Result<(String, Vec<(&'static str, String)>)> {
+pub(crate) fn page() -> Result<Page> {
     let mut page = String::from(
         "# Koo & Lee, done again\n\n\
          Figures 4 to 6 of Y. H. Koo and D. J. Lee, *A study on the generation of B-spline surface by 3D\n\

@@ -2,6 +2,10 @@
 
 use std::fmt::Write as _;
 
+use relief_surfaces::svg::{begun, line};
+
+const STYLES: &str = ".c{stroke:#0b62a8;stroke-width:1.3}.k{stroke:#b3261e;stroke-width:1.3}\
+                      .n{stroke:#24292f;stroke-width:0.6}";
 const WIDTH: f64 = 640.0;
 const ROW: f64 = 110.0;
 const LEFT: f64 = 150.0;
@@ -18,7 +22,7 @@ pub(crate) struct Row {
 /// The rows as one picture.
 pub(crate) fn rows(rows: &[Row]) -> String {
     let height = ROW * rows.len() as f64 + 10.0;
-    let mut svg = begun(WIDTH, height);
+    let mut svg = begun(WIDTH, height, STYLES);
     for (index, row) in rows.iter().enumerate() {
         let all = || row.points.iter().chain(&row.curve);
         let span = |d: usize| {
@@ -57,7 +61,7 @@ pub(crate) fn rows(rows: &[Row]) -> String {
 /// Nets of heights beside each other, seen from before and above.
 pub(crate) fn nets(nets: &[(&str, usize, &[f64])]) -> String {
     const SIDE: f64 = 330.0;
-    let mut svg = begun(SIDE * nets.len() as f64, 330.0);
+    let mut svg = begun(SIDE * nets.len() as f64, 330.0, STYLES);
     for (index, (label, rows, z)) in nets.iter().enumerate() {
         let columns = z.len() / rows;
         let left = SIDE * index as f64;
@@ -87,23 +91,4 @@ pub(crate) fn nets(nets: &[(&str, usize, &[f64])]) -> String {
     }
     svg.push_str("</svg>\n");
     svg
-}
-
-fn begun(width: f64, height: f64) -> String {
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
-         font-family=\"sans-serif\" font-size=\"12\">\n<style>polyline{{fill:none}}\
-         .c{{stroke:#0b62a8;stroke-width:1.3}}.k{{stroke:#b3261e;stroke-width:1.3}}\
-         .n{{stroke:#24292f;stroke-width:0.6}}</style>\n\
-         <rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>\n"
-    )
-}
-
-fn line(svg: &mut String, points: impl Iterator<Item = [f64; 2]>, class: &str) {
-    let words: Vec<String> = points.map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
-    let _ = writeln!(
-        svg,
-        "<polyline class=\"{class}\" points=\"{}\"/>",
-        words.join(" ")
-    );
 }

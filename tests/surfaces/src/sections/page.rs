@@ -5,13 +5,12 @@ use std::fmt::Write as _;
 use anyhow::{Context, Result};
 use nurbs::BSplineCurve;
 use range_image::Unmonitored;
+use relief_surfaces::kept::{PICTURES, Page};
 use skin::{Method, Settings, Skin, section_curves, skin};
 
 use crate::figures::{Line, deviations, section};
 use crate::torso::{NOISE_MM, POINTS, heights, sections};
 
-/// Where the pictures lie, from the page.
-pub(crate) const PICTURES: &str = "pictures/reproduction";
 const SEED: u64 = 1;
 /// The section that is drawn (section 2.1 of the paper), and the tolerance (section 2.2).
 const DRAWN_AT_MM: f64 = 1298.0;
@@ -31,14 +30,14 @@ const TABLE_2: [Published; 4] = [
 ];
 
 /// The page and its pictures by name.
-pub(crate) fn page() -> Result<(String, Vec<(&'static str, String)>)> {
+pub(crate) fn page() -> Result<Page> {
     let mut page = format!(
         "# Jo, Kwon & Han, done again\n\n\
          Tables 1 and 2 and Figures 1 to 3 and 5 of Jo, Kwon & Han, *A NURBS approximation surface\n\
          representing human body by using knot removal*, with `relief`'s own code (`--method jo` is the\n\
          paper's way). Made by `cargo xtask reproduce`; do not edit by hand.\n\n\
          **The data are made up.** The paper's body scans are not to be had. Ours is a torso by formula\n\
-         (`tests/sections/src/torso.rs`), hip to neck, limbs left out: {POINTS} points a section at angles\n\
+         (`tests/surfaces/src/sections/torso.rs`), hip to neck, limbs left out: {POINTS} points a section at angles\n\
          that are not even, normal noise of {NOISE_MM} mm, seed {SEED}. So the paper's numbers can be\n\
          compared in size only. Its figures are known to us by their captions and text, and Table 1 by\n\
          its caption.\n\n"

@@ -2,6 +2,13 @@
 
 use std::fmt::Write as _;
 
+use relief_surfaces::svg::{begun, line};
+
+const STYLES: &str = ".c{stroke:#0b62a8;stroke-width:1.3}.i{stroke:#b3261e;stroke-width:1.3}\
+                      .p{stroke:#6e7781;stroke-width:0.8;stroke-dasharray:4 3}\
+                      .q{fill:none;stroke:#6e7781}\
+                      .t{stroke:#6e7781;stroke-width:1;stroke-dasharray:6 4}\
+                      .n{stroke:#24292f;stroke-width:0.8}";
 const WIDTH: f64 = 640.0;
 const MARGIN: f64 = 20.0;
 
@@ -28,23 +35,23 @@ pub(crate) fn section(points: &[[f64; 2]], lines: &[Line<'_>]) -> String {
     let scale = (WIDTH - 2.0 * MARGIN) / (x1 - x0);
     let top = MARGIN + 18.0 * lines.len() as f64;
     let place = |[x, y]: [f64; 2]| [MARGIN + (x - x0) * scale, top + (y1 - y) * scale];
-    let mut svg = begun(WIDTH, top + (y1 - y0) * scale + MARGIN);
-    for (index, line) in lines.iter().enumerate() {
+    let mut svg = begun(WIDTH, (top + (y1 - y0) * scale + MARGIN).round(), STYLES);
+    for (index, own) in lines.iter().enumerate() {
         let y = 18.0 + 18.0 * index as f64;
-        drawn(
+        line(
             &mut svg,
             [[MARGIN, y - 4.0], [MARGIN + 30.0, y - 4.0]].into_iter(),
-            line.class,
+            own.class,
         );
         let _ = writeln!(
             svg,
             "<text x=\"{:.1}\" y=\"{y:.1}\">{}</text>",
             MARGIN + 38.0,
-            line.label
+            own.label
         );
-        drawn(&mut svg, line.places.iter().map(|p| place(*p)), line.class);
-        if line.class == "p" {
-            for [x, y] in line.places.iter().map(|p| place(*p)) {
+        line(&mut svg, own.places.iter().map(|p| place(*p)), own.class);
+        if own.class == "p" {
+            for [x, y] in own.places.iter().map(|p| place(*p)) {
                 let _ = writeln!(
                     svg,
                     "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"5\" height=\"5\" class=\"q\"/>",
@@ -68,7 +75,7 @@ pub(crate) fn deviations(tolerance_mm: f64, series: &[(&str, &'static str, &[f64
     let (top, bottom) = (MARGIN + 18.0 * series.len() as f64, HEIGHT - 36.0);
     let high = 1.1 * tolerance_mm;
     let y = |off_mm: f64| bottom - off_mm / high * (bottom - top);
-    let mut svg = begun(WIDTH, HEIGHT);
+    let mut svg = begun(WIDTH, HEIGHT, STYLES);
     let x = |k: usize, count: usize| {
         LEFT + (WIDTH - LEFT - MARGIN) * k as f64 / count.saturating_sub(1).max(1) as f64
     };
@@ -80,14 +87,14 @@ pub(crate) fn deviations(tolerance_mm: f64, series: &[(&str, &'static str, &[f64
             LEFT - 8.0,
             at + 4.0
         );
-        drawn(&mut svg, [[LEFT - 4.0, at], [LEFT, at]].into_iter(), "n");
+        line(&mut svg, [[LEFT - 4.0, at], [LEFT, at]].into_iter(), "n");
     }
-    drawn(
+    line(
         &mut svg,
         [[LEFT, top], [LEFT, bottom], [WIDTH - MARGIN, bottom]].into_iter(),
         "n",
     );
-    drawn(
+    line(
         &mut svg,
         [[LEFT, y(tolerance_mm)], [WIDTH - MARGIN, y(tolerance_mm)]].into_iter(),
         "t",
@@ -100,7 +107,7 @@ pub(crate) fn deviations(tolerance_mm: f64, series: &[(&str, &'static str, &[f64
     );
     for (index, (label, class, off_mm)) in series.iter().enumerate() {
         let at = 18.0 + 18.0 * index as f64;
-        drawn(
+        line(
             &mut svg,
             [[LEFT, at - 4.0], [LEFT + 30.0, at - 4.0]].into_iter(),
             class,
@@ -114,29 +121,8 @@ pub(crate) fn deviations(tolerance_mm: f64, series: &[(&str, &'static str, &[f64
             .iter()
             .enumerate()
             .map(|(k, off)| [x(k, off_mm.len()), y(*off)]);
-        drawn(&mut svg, places, class);
+        line(&mut svg, places, class);
     }
     svg.push_str("</svg>\n");
     svg
-}
-
-fn begun(width: f64, height: f64) -> String {
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" \
-         font-family=\"sans-serif\" font-size=\"12\">\n<style>polyline{{fill:none}}\
-         .c{{stroke:#0b62a8;stroke-width:1.3}}.i{{stroke:#b3261e;stroke-width:1.3}}\
-         .p{{stroke:#6e7781;stroke-width:0.8;stroke-dasharray:4 3}}.q{{fill:none;stroke:#6e7781}}\
-         .t{{stroke:#6e7781;stroke-width:1;stroke-dasharray:6 4}}\
-         .n{{stroke:#24292f;stroke-width:0.8}}</style>\n\
-         <rect width=\"{width:.0}\" height=\"{height:.0}\" fill=\"#fff\"/>\n"
-    )
-}
-
-fn drawn(svg: &mut String, places: impl Iterator<Item = [f64; 2]>, class: &str) {
-    let words: Vec<String> = places.map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
-    let _ = writeln!(
-        svg,
-        "<polyline class=\"{class}\" points=\"{}\"/>",
-        words.join(" ")
-    );
 }
