@@ -3,7 +3,7 @@
 
 use range_image::Cancelled;
 
-use super::polish::{Along, Polish, State, TRIED};
+use super::polish::{Polish, State, TRIED, without};
 use crate::knots::Knots;
 use crate::within::{STEP_FITS, fit_within};
 
@@ -27,12 +27,7 @@ impl Polish<'_, '_> {
             if score.max > HOPELESS * self.problem.tolerance {
                 continue;
             }
-            let mut knots = state.knots.clone();
-            match along {
-                Along::U => knots.u = knots.u.without(index),
-                Along::V => knots.v = knots.v.without(index),
-            }
-            let Some(mut fewer) = self.state(knots) else {
+            let Some(mut fewer) = self.state(without(&state.knots, along, index)) else {
                 continue;
             };
             self.move_all(&mut fewer, |score| score.gentle)?;

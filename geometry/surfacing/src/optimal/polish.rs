@@ -273,12 +273,7 @@ impl Polish<'_, '_> {
     fn remove_boldly(&mut self, state: &mut State) -> Result<bool, Cancelled> {
         let losses = self.losses(state)?;
         for (_, along, index) in losses.into_iter().take(TRIED) {
-            let mut knots = state.knots.clone();
-            match along {
-                Along::U => knots.u = knots.u.without(index),
-                Along::V => knots.v = knots.v.without(index),
-            }
-            let Some(mut fewer) = self.state(knots) else {
+            let Some(mut fewer) = self.state(without(&state.knots, along, index)) else {
                 continue;
             };
             self.move_all(&mut fewer, |score| score.gentle)?;
@@ -389,6 +384,16 @@ impl Polish<'_, '_> {
         }
         Ok(())
     }
+}
+
+/// All knots but one.
+pub(super) fn without(knots: &Knots, along: Along, index: usize) -> Knots {
+    let mut knots = knots.clone();
+    match along {
+        Along::U => knots.u = knots.u.without(index),
+        Along::V => knots.v = knots.v.without(index),
+    }
+    knots
 }
 
 fn breaks_of(state: &State, along: Along) -> &Breaks {
