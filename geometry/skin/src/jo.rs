@@ -196,8 +196,8 @@ mod tests {
     use range_image::Unmonitored;
 
     use crate::settings::{Method, Settings};
-    use crate::skin;
     use crate::testing::waisted;
+    use crate::{section_curves, skin};
 
     fn settings(tolerance_mm: f64) -> Settings {
         Settings {
@@ -225,6 +225,29 @@ mod tests {
                 let (start, end) = (skin.surface.evaluate(0.0, v), skin.surface.evaluate(1.0, v));
                 assert!(crate::space::distance(start, end) < 1e-9);
             }
+        }
+    }
+
+    #[test]
+    fn a_section_has_a_curve_through_all_its_points_and_one_near_them() {
+        let tolerance_mm = 0.3;
+        let all = section_curves(&waisted(3, 90), tolerance_mm, &Unmonitored).unwrap();
+        assert_eq!(all.len(), 3);
+        for own in &all {
+            // The first point is the last again.
+            assert_eq!((own.points.len(), own.points[0]), (91, own.points[90]));
+            let most = |curve: &nurbs::BSplineCurve<3>| {
+                let off_mm = own.points.iter().map(|p| curve.closest(*p).distance);
+                off_mm.fold(0.0, f64::max)
+            };
+            assert!(
+                most(&own.interpolating) < 1e-6,
+                "{}",
+                most(&own.interpolating)
+            );
+            assert!(most(&own.approximating) <= tolerance_mm);
+            let [many, few] = [&own.interpolating, &own.approximating].map(|c| c.points().len());
+            assert!(2 * few < many, "{few} {many}");
         }
     }
 }

@@ -266,3 +266,51 @@ fn image(field: &HeightField, deviations: &[Option<f64>]) -> RangeImage {
     }
     image
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use range_image::Unmonitored;
+
+    use super::*;
+    use crate::further::MachineFile;
+
+    #[test]
+    fn the_stock_is_simulated_beside_the_model_as_far_as_tools_come() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/machine.toml");
+        let machine = MachineFile::read(&file).unwrap().machine().unwrap();
+        // A level plane in the middle of the stock, that reaches nearly to one of its sides.
+        let (x_mm, y_mm, top_mm) = ([-10.0, 39.0], [-8.0, 8.0], machine.stock.z_mm[1] - 2.0);
+        let corner = |x: f64, y: f64| [x, y, top_mm];
+        let corners = [
+            corner(x_mm[0], y_mm[0]),
+            corner(x_mm[1], y_mm[0]),
+            corner(x_mm[1], y_mm[1]),
+            corner(x_mm[0], y_mm[1]),
+        ];
+        let surface = Surface::new(&corners, &[[0, 1, 2], [0, 2, 3]]).unwrap();
+        let settings = Settings::finishing("ball:6".parse().unwrap());
+        let milled = mill(
+            &surface,
+            &machine,
+            &settings,
+            Some(0.2),
+            &Unmonitored,
+            &|| (),
+        )
+        .unwrap();
+        let image = &milled.above_mm;
+        let (first, last) = (image.x_mm(0), image.x_mm(image.columns() - 1));
+        // Twice the radius beside the model, and no farther than the stock.
+        assert!((first + 16.0).abs() < 0.3, "{first}");
+        assert!((last - machine.stock.x_mm[1]).abs() < 0.3, "{last}");
+        // Only what is over the model counts.
+        assert_eq!(image.z_mm(0, 0), None);
+        assert!(
+            milled.simulation.leftover_mm < 0.02,
+            "{:?}",
+            milled.simulation
+        );
+    }
+}
