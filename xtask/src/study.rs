@@ -172,7 +172,8 @@ pub(crate) fn service() -> Result<()> {
 /// Builds all studies. From here, since libraries with build scripts are built anew
 /// where the environment differs, and that of a chore does.
 pub(crate) fn build() -> Result<()> {
-    let words = ["build", "--release", "-p", "relief-studies", "--bins"];
+    let packages = ["-p", "relief-studies", "-p", "relief-surfaces"];
+    let words = [&["build", "--release", "--bins"], &packages[..]].concat();
     shell::run("cargo", &words)
 }
 
