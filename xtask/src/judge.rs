@@ -262,18 +262,14 @@ impl Judges {
         ];
         for (file, kind) in &files {
             let example = [
-                "--package",
-                "cad-exchange",
+                "run",
+                "--quiet",
+                "--release",
                 "--example",
                 "write_sample",
                 "--",
             ];
-            let words = [
-                &["run", "--quiet", "--release"],
-                &example[..],
-                &[file, kind, name],
-            ];
-            shell::quiet("cargo", &words.concat())?;
+            shell::quiet("cargo", &[&example[..], &[file, kind, name]].concat())?;
         }
         let [(iges, _), (shells, _), (step, _)] = &files;
         let check = "tests/judges/occ_check.py";

@@ -9,9 +9,7 @@ use crate::{judge, shell, study};
 
 const PROGRAM: &str = "study-reproduction";
 const PAGE: &str = "docs/reproduction.md";
-/// Koo & Lee, and Jo, Kwon & Han: programs that draw their pictures themselves, of a package, and
-/// their pages.
-const DRAWN_BY: &str = "relief-surfaces";
+/// Koo & Lee, and Jo, Kwon & Han: programs that draw their pictures themselves, and their pages.
 const DRAWN: [[&str; 2]; 2] = [
     ["study-surfaces", "docs/reproduction-koo-lee.md"],
     ["study-sections", "docs/reproduction-jo-kwon-han.md"],
@@ -35,9 +33,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     let words = |words: &[&str]| -> Vec<OsString> { words.iter().map(Into::into).collect() };
     let drawn = |option: &str| {
         let mut all = DRAWN.into_iter();
-        all.try_for_each(|[program, page]| {
-            study::program_of(DRAWN_BY, program, &words(&[option, page]))
-        })
+        all.try_for_each(|[program, page]| study::program(program, &words(&[option, page])))
     };
     if options.check {
         drawn("--check-paper")?;

@@ -104,7 +104,7 @@ pub(crate) fn run(study: &Study) -> Result<()> {
             service()?;
             program("study-crashes", options)
         }
-        Study::Faults { options } => program_of("relief-faults", "study-faults", options),
+        Study::Faults { options } => program("study-faults", options),
         Study::Mutations { options } => program("study-mutations", options),
         Study::Outline { options } => program("study-outline", options),
         Study::Parts { options } => {
@@ -154,7 +154,7 @@ fn surfaces(short: bool, scan: Option<&Path>, write: bool) -> Result<()> {
             .into_iter()
             .flatten(),
     );
-    program_of("relief-surfaces", "study-surfaces", &words)?;
+    program("study-surfaces", &words)?;
     let python = judge::python(&place.join("judges"), &[judge::SCIPY])?;
     let mut check = vec!["-B", "tests/judges/surfacing/check.py", &data];
     check.extend((!short).then_some("--bisplrep"));
@@ -164,30 +164,30 @@ fn surfaces(short: bool, scan: Option<&Path>, write: bool) -> Result<()> {
     shell::run(&python, &check)
 }
 
+// Programs are named without their packages: so they are built with the features that all members of
+// the workspace ask for together, as `cargo run --bin relief` is, and what it has built serves here.
+
 /// Builds the service, which those programs look for beside themselves that run it.
 pub(crate) fn service() -> Result<()> {
-    shell::run("cargo", &["build", "--release", "--package", "reliefd"])
+    shell::run("cargo", &["build", "--release", "--bin", "reliefd"])
 }
 
-/// Builds all studies. From here, since libraries with build scripts are built anew
+/// Builds all studies, and the service. From here, since libraries with build scripts are built anew
 /// where the environment differs, and that of a chore does.
 pub(crate) fn build() -> Result<()> {
-    let packages = ["-p", "relief-studies", "-p", "relief-surfaces"];
-    let words = [&["build", "--release", "--bins"], &packages[..]].concat();
+    let programs = ["study-*", "scan-scene", "soak", "reliefd"];
+    let named = programs.iter().flat_map(|name| ["--bin", name]);
+    let words: Vec<&str> = ["build", "--release"].into_iter().chain(named).collect();
     shell::run("cargo", &words)
 }
 
-/// Runs a study, or another program of their crate, built for speed.
+/// Runs a study, or another program of the workspace, built for speed.
 pub(crate) fn program(name: &str, options: &[OsString]) -> Result<()> {
-    program_of("relief-studies", name, options)
-}
-
-pub(crate) fn program_of(package: &str, name: &str, options: &[OsString]) -> Result<()> {
-    let mut words: Vec<String> = ["run", "--release", "--package", package, "--bin", name]
-        .map(String::from)
-        .to_vec();
-    words.push("--".into());
-    words.extend(options.iter().map(|o| o.to_string_lossy().into_owned()));
-    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let options: Vec<_> = options.iter().map(|o| o.to_string_lossy()).collect();
+    let words = ["run", "--release", "--bin", name, "--"];
+    let words: Vec<&str> = words
+        .into_iter()
+        .chain(options.iter().map(|o| &**o))
+        .collect();
     shell::run("cargo", &words)
 }
