@@ -41,6 +41,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("skin", &["nurbs", "range-image"]),
     ("surfacing", &["nurbs", "range-image"]),
     ("toolpath", &["range-image"]),
+    ("terraces", &["nurbs"]),
+    (
+        "features",
+        &["range-image", "regrid", "segment", "shapes", "terraces"],
+    ),
     (
         "pipeline",
         &[

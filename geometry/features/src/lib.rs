@@ -1,0 +1,7 @@
+//! Machining features of a part that is seen from above: pockets, slots, steps, holes, bosses.
+//!
+//! Jun & Park, *Geometric feature recognition directly from scanned points using artificial
+//! neural networks*: a scan is divided into regions of one feature each, the section curve of a
+//! region is put in a code of a few digits, and a small network tells its class by that.
+
+pub mod class;
