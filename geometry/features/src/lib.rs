@@ -4,4 +4,12 @@
 //! neural networks*: a scan is divided into regions of one feature each, the section curve of a
 //! region is put in a code of a few digits, and a small network tells its class by that.
 
+pub mod border;
+pub mod candidate;
 pub mod class;
+pub mod field;
+pub mod frame;
+pub mod levels;
+pub mod outline;
+pub mod plane;
+pub mod regions;

@@ -1,0 +1,146 @@
+//! What may be features: levels with their outlines, before anything says what they are.
+
+mod border_sides;
+mod merge;
+mod outlined;
+mod top;
+
+use range_image::{Cancelled, Monitor};
+
+use crate::border::{Border, border};
+use crate::frame::Frame;
+use crate::levels::{AROUND, Levels, Sense};
+use crate::outline::Outline;
+use crate::outline::witnesses::Sight;
+
+pub use top::{Top, top};
+
+/// How a level lies in what is around it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lie {
+    /// The body that all others are cut into and stand on.
+    Body,
+    /// Lower than what is around it, where there is something.
+    Hollow,
+    /// Higher than what is around it.
+    Raised,
+}
+
+/// A level that may be a feature.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// Its levels: one, or the pieces of one that another cuts apart.
+    pub levels: Vec<u16>,
+    /// How it lies.
+    pub lie: Lie,
+    /// Its outline in the plan.
+    pub outline: Outline,
+    /// The level that it goes into or stands on.
+    pub host: u16,
+    /// Share of its outermost border that rises, falls, and lies at the frame of the scan.
+    pub rises: f64,
+    /// See `rises`.
+    pub falls: f64,
+    /// Whether the scan ends in it.
+    pub is_cut: bool,
+    /// Nodes of it.
+    pub nodes: usize,
+}
+
+/// Outermost pairs of which at least this share rises are a hollow's.
+const HOLLOW: f64 = 0.2;
+/// Of which at least this share falls, what stands out.
+const RAISED: f64 = 0.6;
+/// So many nodes at the frame of the scan are a cut.
+const CUT: usize = 3;
+
+/// Candidates of all levels; the body first. Smaller ones than `fewest` nodes are left out.
+///
+/// # Errors
+/// Cancelled.
+pub fn candidates(
+    sight: &Sight<'_>,
+    top: &Top,
+    step_mm: f64,
+    seed: u64,
+    fewest: usize,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Candidate>, Cancelled> {
+    let image = &sight.field.image;
+    let own_border = |is_own: &dyn Fn(u16) -> bool| {
+        border(image, sight.regions, sight.levels, step_mm, is_own)
+    };
+    let body = own_border(&|level| level != AROUND);
+    let mut found = Vec::new();
+    if let Some(outline) = outlined::outlined(sight, &body, Lie::Body, seed) {
+        found.push(Candidate {
+            levels: top.levels.clone(),
+            lie: Lie::Body,
+            outline,
+            host: AROUND,
+            rises: 0.0,
+            falls: 1.0,
+            is_cut: body.at_frame >= CUT,
+            nodes: body.nodes,
+        });
+    }
+    for set in merge::sets(sight, top, step_mm) {
+        monitor.check()?;
+        let own = own_border(&|level| set.contains(&level));
+        if own.nodes < fewest {
+            continue;
+        }
+        let [rises, falls, level] = [Sense::Rises, Sense::Falls, Sense::Level]
+            .map(|sense| own.outermost(sense) as f64);
+        let all = (rises + falls + level + own.at_frame as f64).max(1.0);
+        let lie = if rises >= HOLLOW * all {
+            Lie::Hollow
+        } else if falls >= RAISED * all {
+            Lie::Raised
+        } else {
+            continue;
+        };
+        let Some(host) = host(sight.levels, &own, lie) else {
+            continue;
+        };
+        let seed = seed ^ (u64::from(set[0]) << 32);
+        let Some(outline) = outlined::outlined(sight, &own, lie, seed) else {
+            continue;
+        };
+        found.push(Candidate {
+            levels: set,
+            lie,
+            outline,
+            host,
+            rises: rises / all,
+            falls: falls / all,
+            is_cut: own.at_frame >= CUT,
+            nodes: own.nodes,
+        });
+    }
+    Ok(found)
+}
+
+/// The level that most of the border rises to, of a hollow, or falls to.
+fn host(levels: &Levels, own: &Border, lie: Lie) -> Option<u16> {
+    let wanted = match lie {
+        Lie::Hollow => Sense::Rises,
+        Lie::Raised | Lie::Body => Sense::Falls,
+    };
+    let mut counts = vec![0_usize; levels.levels.len()];
+    for pair in &own.pairs {
+        if pair.outermost && pair.sense == wanted && pair.beyond != AROUND {
+            counts[usize::from(pair.beyond)] += 1;
+        }
+    }
+    let most = (0..counts.len()).max_by_key(|k| (counts[*k], std::cmp::Reverse(*k)))?;
+    (counts[most] > 0).then(|| u16::try_from(most).unwrap_or(AROUND))
+}
+
+/// The plan of the part: its top face's.
+#[must_use]
+pub fn frame_of(top: &Top) -> Frame {
+    let [x, y] = top.plane.middle_mm;
+    let origin = nalgebra::Vector3::new(x, y, top.plane.z_mm(x, y));
+    Frame::upon(origin, top.plane.normal())
+}
