@@ -1,6 +1,8 @@
 //! What a feature can be.
 
-/// A class of features. The first six are those of Jun & Park, Table 1, in the order of Table 2.
+/// A class of features that Relief has a meaning for. The first six are those of Jun & Park, Table 1,
+/// in the order of Table 2. Networks know classes by their names alone, so that users add theirs
+/// without code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Class {
     /// A closed hollow with a floor that is not round.
@@ -15,6 +17,10 @@ pub enum Class {
     Hole,
     /// The body that the others are cut into and stand on.
     Block,
+    /// A round hollow that narrows by a level ring: a counterbore.
+    SteppedHole,
+    /// A round hollow that narrows by a cone.
+    CountersunkHole,
 }
 
 impl Class {
@@ -28,6 +34,24 @@ impl Class {
         Self::Block,
     ];
 
+    /// What the default network is taught, in the order of its outputs.
+    pub const TAUGHT: [Self; 8] = [
+        Self::Pocket,
+        Self::Step,
+        Self::Slot,
+        Self::Boss,
+        Self::Hole,
+        Self::Block,
+        Self::SteppedHole,
+        Self::CountersunkHole,
+    ];
+
+    /// The class of a name, if it is one of these.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::TAUGHT.into_iter().find(|own| own.as_str() == name)
+    }
+
     /// Its name in files.
     #[must_use]
     pub fn as_str(self) -> &'static str {
@@ -38,6 +62,8 @@ impl Class {
             Self::Boss => "boss",
             Self::Hole => "hole",
             Self::Block => "block",
+            Self::SteppedHole => "stepped_hole",
+            Self::CountersunkHole => "countersunk_hole",
         }
     }
 }

@@ -6,10 +6,20 @@
 
 pub mod border;
 pub mod candidate;
+mod chance;
 pub mod class;
+pub mod code;
+pub mod edges;
+pub mod feature;
 pub mod field;
 pub mod frame;
 pub mod levels;
+pub mod measure;
+pub mod network;
 pub mod outline;
+pub mod patterns;
 pub mod plane;
+pub mod recognise;
+pub mod reduce;
 pub mod regions;
+pub mod section;

@@ -6,10 +6,8 @@
 //! of them: the mean over the posterior, drawn by random walks (Metropolis et al. 1953), and its
 //! spread is the uncertainty.
 
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
-
 use super::shape::Shape;
+use crate::chance::Chance;
 
 /// A place that lies on one side.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,6 +37,8 @@ pub struct Outline {
     pub witnesses: usize,
 }
 
+/// The stream of draws of the walks.
+const WALK: u64 = 0x0071_11e5;
 /// How sharp the edge is in the end, pitches: places, rays and spots are that exact.
 const SHARPNESS: f64 = 0.03;
 /// Softer edges are gone through first, so that no walk begins in the wrong valley.
@@ -137,7 +137,7 @@ struct Walk<'a> {
     pitch_mm: f64,
     steps: [f64; 6],
     current: f64,
-    dice: Xoshiro256PlusPlus,
+    dice: Chance,
 }
 
 impl<'a> Walk<'a> {
@@ -155,7 +155,7 @@ impl<'a> Walk<'a> {
             pitch_mm,
             steps,
             current: 0.0,
-            dice: Xoshiro256PlusPlus::seed_from_u64(seed),
+            dice: Chance::new(seed, WALK),
         };
         walk.soften(pitch_mm);
         walk
@@ -166,22 +166,17 @@ impl<'a> Walk<'a> {
         self.current = self.log_likelihood(&self.shape);
     }
 
-    /// Evenly drawn from 0 to 1.
-    fn draw(&mut self) -> f64 {
-        (self.dice.next_u64() >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0)
-    }
-
     fn sweep(&mut self, adapt: bool) {
         for index in 0..self.shape.freedom() {
             let mut numbers = self.shape.numbers();
-            let step = self.steps[index] * (2.0 * self.draw() - 1.0);
+            let step = self.steps[index] * (2.0 * self.dice.unit() - 1.0);
             numbers[index] += step;
             self.turn_about_middle(index, step, &mut numbers);
             if let (Shape::Rectangle(_), 5) = (self.shape, index) {
                 // Corners cannot be sharper than sharp: the walk is thrown back there.
                 numbers[5] = numbers[5].abs();
             }
-            let chance = self.draw();
+            let chance = self.dice.unit();
             let taken = self.shape.with(&numbers).is_some_and(|shape| {
                 let likelihood = self.log_likelihood(&shape);
                 let taken = libm::log(chance.max(1e-300)) < likelihood - self.current;
