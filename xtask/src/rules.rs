@@ -115,9 +115,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-const DELIVERABLES: [&str; 16] = [
+const DELIVERABLES: [&str; 17] = [
     "cad-exchange",
     "compare",
+    "features",
     "mesh-files",
     "nurbs",
     "page",
@@ -155,10 +156,11 @@ const DAEMON: [&str; 18] = [
     "toolpath",
 ];
 
-const COMMAND_LINE: [&str; 21] = [
+const COMMAND_LINE: [&str; 22] = [
     "cad-exchange",
     "compare",
     "deliverables",
+    "features",
     "nurbs",
     "pipeline",
     "range-image",

@@ -19,6 +19,7 @@ pub mod network;
 pub mod outline;
 pub mod patterns;
 pub mod plane;
+pub mod ray;
 pub mod recognise;
 pub mod reduce;
 pub mod regions;

@@ -5,8 +5,8 @@ use nalgebra::Vector3;
 use crate::candidate::{Candidate, Lie};
 use crate::class::Class;
 use crate::feature::Dimension;
-use crate::outline::{Outline, Rectangle, Shape};
 use crate::outline::witnesses::Sight;
+use crate::outline::{Outline, Rectangle, Shape};
 use crate::plane::Plane;
 
 /// What is measured of a candidate.
@@ -95,9 +95,8 @@ pub fn measured(
             value_mm: (base.0 - other.0).abs(),
             sigma_mm: (base.1 * base.1 + other.1 * other.1).sqrt(),
         }),
-        None if candidate.lie == Lie::Body => warnings.push(
-            "height not measured: no table was seen that the part stands on".to_owned(),
-        ),
+        None if candidate.lie == Lie::Body => warnings
+            .push("height not measured: no table was seen that the part stands on".to_owned()),
         None => warnings.push("depth not measured: its floor was not seen".to_owned()),
     }
     if candidate.is_cut {
@@ -116,7 +115,8 @@ pub fn measured(
             .iter()
             .any(|level| !sight.levels.levels[usize::from(*level)].is_plane);
     if is_free && candidate.lie == Lie::Hollow {
-        warnings.push("its floor is no plane: the depth is that of the plane through it".to_owned());
+        warnings
+            .push("its floor is no plane: the depth is that of the plane through it".to_owned());
     }
     let (sigma_u, sigma_v) = centre_sigma(&candidate.outline);
     Measured {

@@ -82,7 +82,8 @@ fn least_squares(
     within_mm: f64,
     noise_mm: f64,
 ) -> Option<Plane> {
-    let agrees = |s: &&[f64; 3]| before.is_none_or(|p| (s[2] - p.z_mm(s[0], s[1])).abs() <= within_mm);
+    let agrees =
+        |s: &&[f64; 3]| before.is_none_or(|p| (s[2] - p.z_mm(s[0], s[1])).abs() <= within_mm);
     let kept: Vec<&[f64; 3]> = samples.iter().filter(agrees).collect();
     if kept.len() < 6 {
         return None;
@@ -115,5 +116,9 @@ fn least_squares(
     fitted.rms_mm = (squares / (count - 3.0)).sqrt();
     let deviation = fitted.rms_mm.max(0.5 * noise_mm);
     fitted.covariance = inverse * (deviation * deviation);
-    fitted.values.iter().all(|v| v.is_finite()).then_some(fitted)
+    fitted
+        .values
+        .iter()
+        .all(|v| v.is_finite())
+        .then_some(fitted)
 }

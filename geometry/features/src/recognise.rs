@@ -1,6 +1,6 @@
 //! From the columns of a scan to the tree of features of the part.
 
-use range_image::{Cancelled, Column, Monitor};
+use range_image::{Cancelled, Column, Monitor, RangeImage};
 use segment::SegmentError;
 
 use crate::candidate::{Candidate, Lie, candidates, frame_of, top};
@@ -49,6 +49,8 @@ pub struct Recognition {
     pub features: Vec<Feature>,
     /// The plan: its third axis is the features' axis.
     pub frame: Frame,
+    /// The range image that they were found in.
+    pub image: RangeImage,
     /// Plane of what the part stands on, where that is seen.
     pub table: Option<Plane>,
     /// Standard deviation of z of samples, millimetres.
@@ -90,7 +92,7 @@ pub fn recognise(
     settings: &Settings<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Recognition, RecogniseError> {
-    let field = field(columns, monitor)?;
+    let field = field(columns, camera_mm, monitor)?;
     let step_mm = least_step_mm(&field);
     let regions = regions(&field, columns, monitor)?;
     let levels = levels(&field.image, &regions, step_mm);
@@ -119,9 +121,7 @@ pub fn recognise(
         let id = u32::try_from(features.len()).unwrap_or(u32::MAX);
         ids[index] = Some(id);
         let parent_id = parent.and_then(|p| ids[p]);
-        features.push(feature(
-            &sight, candidate, settings, step_mm, id, parent_id,
-        ));
+        features.push(feature(&sight, candidate, settings, step_mm, id, parent_id));
     }
     Ok(Recognition {
         features,
@@ -129,7 +129,8 @@ pub fn recognise(
         frame,
         noise_mm: field.noise_mm,
         pitch_mm: field.pitch_mm(),
-        notes: regions.notes.clone(),
+        notes: regions.notes,
+        image: field.image,
     })
 }
 
@@ -190,6 +191,7 @@ fn feature(
             told(settings.teller, &attributes, id, &mut warnings)
         }
     };
+    let class = by_place(class, candidate.lie, parent);
     let known = Class::named(&class);
     let host = sight.levels.levels[usize::from(candidate.host)].plane;
     let own = measured(sight, candidate, known, host.as_ref(), step_mm);
@@ -209,6 +211,17 @@ fn feature(
         heights_mm: own.heights_mm,
         through: own.through,
         warnings,
+    }
+}
+
+/// A block and a boss are told by their outlines in Table 2, and by what they stand on otherwise: a
+/// block on a face of the part is a boss with straight sides, and a round body is still the body.
+fn by_place(class: String, lie: Lie, parent: Option<u32>) -> String {
+    let is = |own: Class| class == own.as_str();
+    match lie {
+        Lie::Raised if is(Class::Block) && parent.is_some() => Class::Boss.as_str().to_owned(),
+        Lie::Body if is(Class::Boss) => Class::Block.as_str().to_owned(),
+        _ => class,
     }
 }
 

@@ -1,6 +1,6 @@
 //! Sections of candidates, for their codes.
 
-use crate::candidate::Candidate;
+use crate::candidate::{Candidate, Lie};
 use crate::code::{End, Section};
 use crate::outline::Shape;
 use crate::outline::witnesses::Sight;
@@ -69,7 +69,10 @@ impl Across {
             Shape::Rectangle(rectangle) => {
                 let [first, second] = rectangle.sizes_mm();
                 let [a, b, c, d] = rectangle.walls;
-                let walls = [usize::from(a) + usize::from(b), usize::from(c) + usize::from(d)];
+                let walls = [
+                    usize::from(a) + usize::from(b),
+                    usize::from(c) + usize::from(d),
+                ];
                 // Across as many walls as can be; of two such ways the shorter.
                 let is_first = (walls[0], second) > (walls[1], first) && walls[0] >= walls[1];
                 let (sin, cos) = libm::sincos(rectangle.angle_rad);
@@ -91,16 +94,11 @@ impl Across {
 }
 
 /// One section, and how many of its points are the candidate's own.
-fn cut(
-    sight: &Sight<'_>,
-    candidate: &Candidate,
-    across: &Across,
-    beside_mm: f64,
-) -> (usize, Cut) {
+fn cut(sight: &Sight<'_>, candidate: &Candidate, across: &Across, beside_mm: f64) -> (usize, Cut) {
     let image = &sight.field.image;
     let pitch = image.pitch_mm();
-    let beyond = (BEYOND_SHARE * across.length_mm)
-        .clamp(BEYOND_PITCHES.0 * pitch, BEYOND_PITCHES.1 * pitch);
+    let beyond =
+        (BEYOND_SHARE * across.length_mm).clamp(BEYOND_PITCHES.0 * pitch, BEYOND_PITCHES.1 * pitch);
     let half = 0.5 * across.length_mm + beyond;
     let count = (2.0 * half / pitch).ceil() as usize;
     let mut points = Vec::with_capacity(count);
@@ -122,7 +120,7 @@ fn cut(
         let height = if is_inside && !is_own {
             floor(sight, candidate, point.x, point.y)
         } else {
-            crate::levels::height(image, sight.regions, node)
+            crate::levels::height(image, sight.regions, node).or_else(|| unseen(sight, candidate))
         };
         if let Some(z_mm) = height {
             points.push([s, z_mm]);
@@ -135,6 +133,27 @@ fn cut(
 /// The candidate's own floor at a place.
 fn floor(sight: &Sight<'_>, candidate: &Candidate, x_mm: f64, y_mm: f64) -> Option<f64> {
     let level = candidate.levels.first()?;
-    let plane = sight.levels.levels[usize::from(*level)].plane.as_ref()?;
-    Some(plane.z_mm(x_mm, y_mm))
+    match sight.levels.levels[usize::from(*level)].plane.as_ref() {
+        Some(plane) => Some(plane.z_mm(x_mm, y_mm)),
+        None => unseen(sight, candidate),
+    }
+}
+
+/// A floor that is not seen is taken to be as deep as the hollow is wide: a wall is all that its
+/// code tells of it.
+fn unseen(sight: &Sight<'_>, candidate: &Candidate) -> Option<f64> {
+    let own = candidate.levels.first().copied().unwrap_or_default();
+    let host = match candidate.lie {
+        Lie::Body => sight.levels.levels[usize::from(own)].plane?,
+        _ => sight.levels.levels[usize::from(candidate.host)].plane?,
+    };
+    let [x, y] = host.middle_mm;
+    let size = match candidate.outline.shape {
+        Shape::Circle(circle) => 2.0 * circle.radius_mm,
+        Shape::Rectangle(rectangle) => {
+            let [a, b] = rectangle.sizes_mm();
+            a.min(b)
+        }
+    };
+    Some(host.z_mm(x, y) - size)
 }

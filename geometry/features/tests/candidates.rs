@@ -9,7 +9,8 @@ use range_image::Unmonitored;
 fn published(x: f64, y: f64) -> f64 {
     let (sin, cos) = libm::sincos(5f64.to_radians());
     let (u, v) = (cos * x + sin * y, cos * y - sin * x);
-    let within = |cu: f64, cv: f64, l: f64, w: f64| (u - cu).abs() <= l / 2.0 && (v - cv).abs() <= w / 2.0;
+    let within =
+        |cu: f64, cv: f64, l: f64, w: f64| (u - cu).abs() <= l / 2.0 && (v - cv).abs() <= w / 2.0;
     if !within(0.0, 0.0, 100.871, 50.16) {
         return -23.762;
     }
@@ -36,33 +37,69 @@ fn published(x: f64, y: f64) -> f64 {
 fn measures() {
     let mut off: std::collections::BTreeMap<&str, Vec<(f64, f64)>> = Default::default();
     for seed in 101..113 {
-        let bench = Bench { seed, x_mm: (-60.0 + 0.03 * (seed as f64 - 100.0), 60.0), ..Bench::default() };
+        let bench = Bench {
+            seed,
+            x_mm: (-60.0 + 0.03 * (seed as f64 - 100.0), 60.0),
+            ..Bench::default()
+        };
         let columns = scan(&bench, &published);
-        let field = features::field::field(&columns, &Unmonitored).unwrap();
+        let field = features::field::field(&columns, Some(bench.camera_mm), &Unmonitored).unwrap();
         let step = features::regions::least_step_mm(&field);
         let regions = features::regions::regions(&field, &columns, &Unmonitored).unwrap();
         let levels = features::levels::levels(&field.image, &regions, step);
         let top = top(&regions, &levels, step).unwrap();
         let frame = frame_of(&top);
-        let sight = Sight { columns: &columns, camera_mm: Some(bench.camera_mm), field: &field, regions: &regions, levels: &levels, frame: &frame };
+        let sight = Sight {
+            columns: &columns,
+            camera_mm: Some(bench.camera_mm),
+            field: &field,
+            regions: &regions,
+            levels: &levels,
+            frame: &frame,
+        };
         let found = candidates(&sight, &top, step, 0, 30, &Unmonitored).unwrap();
         for c in &found {
             let cov = |a: usize, b: usize| c.outline.covariance[a][b];
             match c.outline.shape {
                 features::outline::Shape::Circle(k) => {
                     let d = 2.0 * k.radius_mm;
-                    let name = if c.lie == features::candidate::Lie::Hollow { "hole" } else { "boss" };
+                    let name = if c.lie == features::candidate::Lie::Hollow {
+                        "hole"
+                    } else {
+                        "boss"
+                    };
                     let t = if name == "hole" { 8.019 } else { 8.026 };
-                    off.entry(name).or_default().push((d - t, 2.0 * cov(2, 2).sqrt()));
+                    off.entry(name)
+                        .or_default()
+                        .push((d - t, 2.0 * cov(2, 2).sqrt()));
                 }
                 features::outline::Shape::Rectangle(r) => {
                     let [a, b] = r.sizes_mm();
                     let sa = (cov(1, 1) + cov(2, 2) - 2.0 * cov(1, 2)).sqrt();
                     let sb = (cov(3, 3) + cov(4, 4) - 2.0 * cov(3, 4)).sqrt();
-                    for (n, l, w) in [("block", 100.871, 50.16), ("pocket", 79.811, 28.557), ("slot", 18.36, 20.211), ("p2", 12.0, 6.0)] {
+                    for (n, l, w) in [
+                        ("block", 100.871, 50.16),
+                        ("pocket", 79.811, 28.557),
+                        ("slot", 18.36, 20.211),
+                        ("p2", 12.0, 6.0),
+                    ] {
                         if (a - l).abs() < 1.0 && (b - w).abs() < 1.0 {
-                            off.entry(match n { "block" => "block L", "pocket" => "pocket L", "slot" => "slot L", _ => "p2 L" }).or_default().push((a - l, sa));
-                            off.entry(match n { "block" => "block W", "pocket" => "pocket W", "slot" => "slot W", _ => "p2 W" }).or_default().push((b - w, sb));
+                            off.entry(match n {
+                                "block" => "block L",
+                                "pocket" => "pocket L",
+                                "slot" => "slot L",
+                                _ => "p2 L",
+                            })
+                            .or_default()
+                            .push((a - l, sa));
+                            off.entry(match n {
+                                "block" => "block W",
+                                "pocket" => "pocket W",
+                                "slot" => "slot W",
+                                _ => "p2 W",
+                            })
+                            .or_default()
+                            .push((b - w, sb));
                         }
                     }
                 }
@@ -80,17 +117,34 @@ fn measures() {
 }
 #[test]
 fn debug_wrong() {
-    let bench = Bench { seed: 101, outliers: 0.0, dropouts: 0.02, ..Bench::default() };
+    let bench = Bench {
+        seed: 101,
+        outliers: 0.0,
+        dropouts: 0.02,
+        ..Bench::default()
+    };
     let columns = scan(&bench, &published);
-    let field = features::field::field(&columns, &Unmonitored).unwrap();
+    let field = features::field::field(&columns, Some(bench.camera_mm), &Unmonitored).unwrap();
     let step = features::regions::least_step_mm(&field);
     let regions = features::regions::regions(&field, &columns, &Unmonitored).unwrap();
     let levels = features::levels::levels(&field.image, &regions, step);
     let top = top(&regions, &levels, step).unwrap();
     let frame = frame_of(&top);
-    let sight = Sight { columns: &columns, camera_mm: Some(bench.camera_mm), field: &field, regions: &regions, levels: &levels, frame: &frame };
+    let sight = Sight {
+        columns: &columns,
+        camera_mm: Some(bench.camera_mm),
+        field: &field,
+        regions: &regions,
+        levels: &levels,
+        frame: &frame,
+    };
     let own = features::border::border(&field.image, &regions, &levels, step, &|l| l == 2);
-    let pairs: Vec<_> = own.pairs.iter().copied().filter(|p| p.outermost && p.sense == features::levels::Sense::Rises).collect();
+    let pairs: Vec<_> = own
+        .pairs
+        .iter()
+        .copied()
+        .filter(|p| p.outermost && p.sense == features::levels::Sense::Rises)
+        .collect();
     let w = features::outline::witnesses::witnesses(&sight, &pairs);
     let o = frame.origin_mm;
     let (sin, cos) = libm::sincos(5f64.to_radians());
@@ -100,7 +154,13 @@ fn debug_wrong() {
         let (u, v) = (cos * p.x + sin * p.y, cos * p.y - sin * p.x);
         if u.abs() < 35.0 && (v.abs() - 14.2785).abs() < 0.15 && u.abs() > 12.0 {
             let d = v.abs() - 14.2785;
-            *hist.entry(((d / 0.01).floor() as i64, w.inside, (w.doubt * 100.0) as i64)).or_insert(0) += 1;
+            *hist
+                .entry((
+                    (d / 0.01).floor() as i64,
+                    w.inside,
+                    (w.doubt * 100.0) as i64,
+                ))
+                .or_insert(0) += 1;
         }
     }
     println!("{o:?} {hist:#?}");

@@ -17,7 +17,9 @@ pub(super) fn side_of(rectangle: &Rectangle, place: [f64; 2]) -> usize {
         (b - rectangle.second_mm[0]).abs(),
         (b - rectangle.second_mm[1]).abs(),
     ];
-    (0..4).min_by(|x, y| off[*x].total_cmp(&off[*y])).unwrap_or(0)
+    (0..4)
+        .min_by(|x, y| off[*x].total_cmp(&off[*y]))
+        .unwrap_or(0)
 }
 
 /// Which sides are walls, by the pairs nearest to each.

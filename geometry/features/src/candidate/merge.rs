@@ -40,7 +40,9 @@ fn are_one(sight: &Sight<'_>, one: u16, other: u16, step_mm: f64) -> bool {
     };
     let [x, y] = b.middle_mm;
     let off = (a.z_mm(x, y) - b.z_mm(x, y)).abs();
-    if off > ONE_PLANE * step_mm + 3.0 * a.sigma_mm(x, y) || !of(one).is_plane || !of(other).is_plane
+    if off > ONE_PLANE * step_mm + 3.0 * a.sigma_mm(x, y)
+        || !of(one).is_plane
+        || !of(other).is_plane
     {
         return false;
     }
@@ -76,7 +78,9 @@ fn are_one(sight: &Sight<'_>, one: u16, other: u16, step_mm: f64) -> bool {
     let (cuts, widths, rises) = between(one);
     let (other_cuts, other_widths, other_rises) = between(other);
     let runs_across = |count: usize, widths: [f64; 2]| {
-        widths.iter().any(|w| (count as f64) >= ACROSS * w && (count as f64) <= 1.5 * w)
+        widths
+            .iter()
+            .any(|w| (count as f64) >= ACROSS * w && (count as f64) <= 1.5 * w)
     };
     rises > 0
         && other_rises > 0

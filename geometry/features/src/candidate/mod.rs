@@ -51,8 +51,10 @@ pub struct Candidate {
 const HOLLOW: f64 = 0.2;
 /// Of which at least this share falls, what stands out.
 const RAISED: f64 = 0.6;
-/// So many nodes at the frame of the scan are a cut.
-const CUT: usize = 3;
+/// A hollow goes into what at least this share of its walls rise to.
+const HOST: f64 = 0.12;
+/// Where more than this share of the border lies at the frame of the scan, that cuts it.
+const CUT: f64 = 0.06;
 
 /// Candidates of all levels; the body first. Smaller ones than `fewest` nodes are left out.
 ///
@@ -67,9 +69,8 @@ pub fn candidates(
     monitor: &dyn Monitor,
 ) -> Result<Vec<Candidate>, Cancelled> {
     let image = &sight.field.image;
-    let own_border = |is_own: &dyn Fn(u16) -> bool| {
-        border(image, sight.regions, sight.levels, step_mm, is_own)
-    };
+    let own_border =
+        |is_own: &dyn Fn(u16) -> bool| border(image, sight.regions, sight.levels, step_mm, is_own);
     let body = own_border(&|level| level != AROUND);
     let mut found = Vec::new();
     if let Some(outline) = outlined::outlined(sight, &body, Lie::Body, seed) {
@@ -80,7 +81,7 @@ pub fn candidates(
             host: AROUND,
             rises: 0.0,
             falls: 1.0,
-            is_cut: body.at_frame >= CUT,
+            is_cut: body.at_frame as f64 > CUT * (body.pairs.len() + body.at_frame) as f64,
             nodes: body.nodes,
         });
     }
@@ -90,8 +91,8 @@ pub fn candidates(
         if own.nodes < fewest {
             continue;
         }
-        let [rises, falls, level] = [Sense::Rises, Sense::Falls, Sense::Level]
-            .map(|sense| own.outermost(sense) as f64);
+        let [rises, falls, level] =
+            [Sense::Rises, Sense::Falls, Sense::Level].map(|sense| own.outermost(sense) as f64);
         let all = (rises + falls + level + own.at_frame as f64).max(1.0);
         let lie = if rises >= HOLLOW * all {
             Lie::Hollow
@@ -114,14 +115,15 @@ pub fn candidates(
             host,
             rises: rises / all,
             falls: falls / all,
-            is_cut: own.at_frame >= CUT,
+            is_cut: own.at_frame as f64 > CUT * all,
             nodes: own.nodes,
         });
     }
     Ok(found)
 }
 
-/// The level that most of the border rises to, of a hollow, or falls to.
+/// Of a hollow the highest of the levels that enough of the border rises to: what is cut across
+/// several floors is cut from the highest. Of what stands out, the level that most of it falls to.
 fn host(levels: &Levels, own: &Border, lie: Lie) -> Option<u16> {
     let wanted = match lie {
         Lie::Hollow => Sense::Rises,
@@ -133,8 +135,19 @@ fn host(levels: &Levels, own: &Border, lie: Lie) -> Option<u16> {
             counts[usize::from(pair.beyond)] += 1;
         }
     }
-    let most = (0..counts.len()).max_by_key(|k| (counts[*k], std::cmp::Reverse(*k)))?;
-    (counts[most] > 0).then(|| u16::try_from(most).unwrap_or(AROUND))
+    let all: usize = counts.iter().sum();
+    let height = |index: usize| {
+        let plane = levels.levels[index].plane.as_ref();
+        plane.map_or(f64::NEG_INFINITY, |p| p.z_mm(p.middle_mm[0], p.middle_mm[1]))
+    };
+    let found = (0..counts.len()).filter(|k| counts[*k] > 0);
+    let index = match lie {
+        Lie::Hollow => found
+            .filter(|k| counts[*k] as f64 >= HOST * all as f64)
+            .max_by(|a, b| height(*a).total_cmp(&height(*b))),
+        Lie::Raised | Lie::Body => found.max_by_key(|k| (counts[*k], std::cmp::Reverse(*k))),
+    }?;
+    u16::try_from(index).ok()
 }
 
 /// The plan of the part: its top face's.

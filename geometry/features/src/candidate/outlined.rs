@@ -13,12 +13,7 @@ const FEWEST: usize = 12;
 const OPEN: f64 = 0.25;
 
 /// The outline that a border tells of; `None` where that is too short.
-pub(super) fn outlined(
-    sight: &Sight<'_>,
-    border: &Border,
-    lie: Lie,
-    seed: u64,
-) -> Option<Outline> {
+pub(super) fn outlined(sight: &Sight<'_>, border: &Border, lie: Lie, seed: u64) -> Option<Outline> {
     let pitch_mm = sight.field.pitch_mm();
     let pairs: Vec<(Pair, [f64; 2])> = border
         .pairs
@@ -67,7 +62,9 @@ pub(super) fn outlined(
         let cost = one.shape.freedom() as f64 * libm::log(common.len().max(2) as f64);
         log_likelihood(&one.shape, &common, pitch_mm) - 0.5 * cost
     };
-    found.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))
+    found
+        .into_iter()
+        .max_by(|a, b| score(a).total_cmp(&score(b)))
 }
 
 /// Of walls the pairs that rise count, at open sides those that fall.

@@ -1,6 +1,5 @@
 //! The top face of the part.
 
-
 use crate::levels::{AROUND, Levels};
 use crate::plane::Plane;
 use crate::regions::Regions;
@@ -29,15 +28,17 @@ pub fn top(regions: &Regions, levels: &Levels, step_mm: f64) -> Option<Top> {
         if own == AROUND {
             continue;
         }
-        let ends = regions.at_frame(node)
-            || regions.neighbours(node).any(|o| levels.labels[o] == AROUND);
+        let ends =
+            regions.at_frame(node) || regions.neighbours(node).any(|o| levels.labels[o] == AROUND);
         contact[usize::from(own)] += usize::from(ends);
     }
     let all: usize = contact.iter().sum();
     let seen = |index: &usize| *index != usize::from(AROUND) && levels.levels[*index].is_seen();
     let height = |index: usize| {
         let plane = levels.levels[index].plane.as_ref();
-        plane.map_or(f64::NEG_INFINITY, |p| p.z_mm(p.middle_mm[0], p.middle_mm[1]))
+        plane.map_or(f64::NEG_INFINITY, |p| {
+            p.z_mm(p.middle_mm[0], p.middle_mm[1])
+        })
     };
     let ending = |index: &usize| contact[*index] as f64 >= LEAST_SHARE * all.max(1) as f64;
     let large = |index: &usize| levels.levels[*index].nodes >= 25;

@@ -17,10 +17,11 @@ const NOISE_SHARE: f64 = 0.1;
 /// Largest half side of the window that nodes are smoothed over, nodes.
 const SMOOTH_MOST: usize = 3;
 
-/// The range image of what is borne out; `pitches_mm` are the distances of columns and samples.
+/// The range image of what is borne out, which takes in all columns and at least these y; `pitches_mm` are the distances of columns and samples.
 pub(super) fn image(
     columns: &[Column],
     supported: &[Vec<bool>],
+    y_mm: [f64; 2],
     pitches_mm: [f64; 2],
     noise_mm: f64,
 ) -> RangeImage {
@@ -33,6 +34,11 @@ pub(super) fn image(
                 high[axis] = high[axis].max(value);
             }
         }
+    }
+    if low[0].is_finite() {
+        let x_mm = [columns.first(), columns.last()].map(|c| c.map_or(low[0], Column::x_mm));
+        low = [low[0].min(x_mm[0]), low[1].min(y_mm[0])];
+        high = [high[0].max(x_mm[1]), high[1].max(y_mm[1])];
     }
     let [width, height] = [high[0] - low[0], high[1] - low[1]];
     let coarsest = (width * height / MOST_NODES).sqrt();

@@ -23,6 +23,12 @@ pub struct Field {
     pub column_pitch_mm: f64,
     /// Distance of samples along a column, millimetres, the median.
     pub sample_pitch_mm: f64,
+    /// The least and the greatest of all rays that came back with something, see [`crate::ray`].
+    pub rays: [f64; 2],
+    /// Usual step from ray to ray.
+    pub ray_step: f64,
+    /// Median height of what is borne out, millimetres.
+    pub middle_z_mm: f64,
     /// For each sample of each column, whether samples around it bear it out.
     pub supported: Vec<Vec<bool>>,
 }
@@ -60,11 +66,17 @@ pub enum FieldError {
 /// Fewest columns, and fewest samples in one for it to count.
 const FEWEST: usize = 8;
 
-/// Makes the range image of columns that are in the order of their x.
+/// Makes the range image of columns that are in the order of their x. Their rays come from
+/// `camera_mm`, y and z, or run along z. The image takes in all columns and rays, whether they came
+/// back with something or not.
 ///
 /// # Errors
 /// Too few samples, or cancelled.
-pub fn field(columns: &[Column], monitor: &dyn Monitor) -> Result<Field, FieldError> {
+pub fn field(
+    columns: &[Column],
+    camera_mm: Option<[f64; 2]>,
+    monitor: &dyn Monitor,
+) -> Result<Field, FieldError> {
     let filled = columns.iter().filter(|c| c.samples().len() >= FEWEST);
     let samples = columns.iter().map(|c| c.samples().len()).sum();
     if filled.clone().count() < FEWEST {
@@ -85,9 +97,13 @@ pub fn field(columns: &[Column], monitor: &dyn Monitor) -> Result<Field, FieldEr
     monitor.check()?;
     let supported = support::supported(columns, noise_mm);
     monitor.check()?;
+    let (rays, ray_step) = rays(columns, camera_mm);
+    let middle_z_mm = middle(columns, &supported);
+    let y_mm = rays.map(|own| crate::ray::passes(camera_mm, own, middle_z_mm));
     let image = grid::image(
         columns,
         &supported,
+        y_mm,
         [column_pitch_mm, sample_pitch_mm],
         noise_mm,
     );
@@ -96,8 +112,42 @@ pub fn field(columns: &[Column], monitor: &dyn Monitor) -> Result<Field, FieldEr
         noise_mm,
         column_pitch_mm,
         sample_pitch_mm,
+        rays,
+        ray_step,
+        middle_z_mm,
         supported,
     })
+}
+
+/// The least and the greatest ray, and the usual step between two.
+fn rays(columns: &[Column], camera_mm: Option<[f64; 2]>) -> ([f64; 2], f64) {
+    let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+    let mut steps = Vec::with_capacity(columns.len());
+    for column in columns {
+        let samples = column.samples().iter();
+        let mut own: Vec<f64> = samples
+            .map(|s| crate::ray::ray(camera_mm, s.y_mm, s.z_mm))
+            .filter(|ray| ray.is_finite())
+            .collect();
+        own.sort_by(f64::total_cmp);
+        if let (Some(first), Some(last)) = (own.first(), own.last()) {
+            ends = [ends[0].min(*first), ends[1].max(*last)];
+        }
+        steps.extend(median_step(own.into_iter()));
+    }
+    (ends, median(&mut steps).unwrap_or(1.0))
+}
+
+/// Median height of what is borne out.
+fn middle(columns: &[Column], supported: &[Vec<bool>]) -> f64 {
+    let pairs = columns.iter().zip(supported);
+    let mut heights: Vec<f64> = pairs
+        .flat_map(|(column, kept)| {
+            let samples = column.samples().iter().zip(kept);
+            samples.filter(|(_, k)| **k).map(|(s, _)| s.z_mm)
+        })
+        .collect();
+    median(&mut heights).unwrap_or(0.0)
 }
 
 /// Median of the positive steps of a sequence.

@@ -69,10 +69,8 @@ pub(crate) fn sense(
     (node, other): (usize, usize),
     step_mm: f64,
 ) -> Sense {
-    let (Some(here), Some(there)) = (
-        height(image, regions, node),
-        height(image, regions, other),
-    ) else {
+    let (Some(here), Some(there)) = (height(image, regions, node), height(image, regions, other))
+    else {
         // What is not seen lies below what is.
         return match height(image, regions, node) {
             None => Sense::Rises,

@@ -8,8 +8,8 @@ use range_image::RangeImage;
 use crate::plane::Plane;
 use crate::regions::{OUTSIDE, Region, Regions};
 
-pub(crate) use contact::{height, sense};
 pub use contact::{Contact, Sense};
+pub(crate) use contact::{height, sense};
 
 /// The index of what surrounds the part.
 pub const AROUND: u16 = 0;

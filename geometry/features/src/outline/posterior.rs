@@ -49,6 +49,8 @@ const SETTLING_SWEEPS: usize = 150;
 const KEPT_SWEEPS: usize = 700;
 /// Witnesses further from the first outline than this, pitches, always say the same.
 const NEAR: f64 = 4.0;
+/// And in the end than this.
+const NARROW: f64 = 1.6;
 /// Contradicted by more than this, pitches, a witness is not merely unsharp.
 const FAR_OFF: f64 = 0.6;
 
@@ -63,6 +65,7 @@ pub fn outline(start: Shape, witnesses: &[Witness], pitch_mm: f64, seed: u64) ->
             walk.sweep(true);
         }
     }
+    walk.narrow();
     walk.soften(SHARPNESS * pitch_mm);
     for _ in 0..SETTLING_SWEEPS {
         walk.sweep(true);
@@ -161,6 +164,14 @@ impl<'a> Walk<'a> {
         walk
     }
 
+    /// Leaves out the witnesses that always say the same from here on.
+    fn narrow(&mut self) {
+        let shape = self.shape;
+        let within = NARROW * self.pitch_mm;
+        self.witnesses
+            .retain(|w| shape.distance_mm(w.place).abs() <= within);
+    }
+
     fn soften(&mut self, sharpness_mm: f64) {
         self.sharpness_mm = sharpness_mm;
         self.current = self.log_likelihood(&self.shape);
@@ -226,7 +237,7 @@ impl<'a> Walk<'a> {
         let (mut far, mut all) = (0, 0);
         for witness in &self.witnesses {
             let distance = shape.distance_mm(witness.place);
-            if distance.abs() > 2.5 * self.pitch_mm || witness.doubt > 0.1 {
+            if distance.abs() > NARROW * self.pitch_mm || witness.doubt > 0.1 {
                 continue;
             }
             all += 1;

@@ -23,7 +23,9 @@ pub fn circle(places: &[[f64; 2]]) -> Option<Circle> {
     }
     let solved = normal.try_inverse()? * right;
     let mut centre = [solved.x, solved.y];
-    let mut radius = (solved.z + solved.x * solved.x + solved.y * solved.y).max(0.0).sqrt();
+    let mut radius = (solved.z + solved.x * solved.x + solved.y * solved.y)
+        .max(0.0)
+        .sqrt();
     for _ in 0..50 {
         let (mut sum, mut along) = (0.0, [0.0; 2]);
         for [u, v] in places {
@@ -90,17 +92,31 @@ pub fn rectangle(places: &[[f64; 2]]) -> Option<Rectangle> {
     (a > 0.0 && b > 0.0).then_some(fine.1)
 }
 
-/// Where the sides across an axis lie: the median of what lies in the outermost tenth at each end.
+/// Where the sides across an axis lie: where places are densest among the outermost fifth at each
+/// end, since a side has many at one distance, and walls along the axis are spread evenly.
 fn sides(along: &[[f64; 2]], axis: usize) -> [f64; 2] {
     let mut values: Vec<f64> = along.iter().map(|p| p[axis]).collect();
     values.sort_by(f64::total_cmp);
     let at = |share: f64| values[((values.len() - 1) as f64 * share) as usize];
-    let (low, high) = (at(0.01), at(0.99));
-    let band = 0.1 * (high - low);
-    let mut least: Vec<f64> = values.iter().copied().filter(|v| *v <= low + band).collect();
-    let mut most: Vec<f64> = values.iter().copied().filter(|v| *v >= high - band).collect();
+    let (low, high) = (at(0.005), at(0.995));
+    let window = (0.02 * (high - low)).max(1e-9);
+    let densest = |outward: &dyn Fn(f64) -> f64, own: &[f64]| {
+        let near = own.iter().filter(|v| outward(**v) <= 0.2 * (high - low));
+        let best = near.max_by_key(|v| {
+            let inside = own.iter().filter(|o| (*o - *v).abs() <= window).count();
+            // Of equally dense places the outermost.
+            (inside, std::cmp::Reverse((outward(**v) / window * 16.0) as i64))
+        });
+        let Some(best) = best else { return own[0] };
+        let mut around: Vec<f64> = own
+            .iter()
+            .copied()
+            .filter(|o| (o - best).abs() <= window)
+            .collect();
+        median(&mut around).unwrap_or(*best)
+    };
     [
-        median(&mut least).unwrap_or(low),
-        median(&mut most).unwrap_or(high),
+        densest(&|v| (v - low).max(0.0), &values),
+        densest(&|v| (high - v).max(0.0), &values),
     ]
 }

@@ -9,10 +9,11 @@ use range_image::{Column, RangeImage};
 
 use super::posterior::Witness;
 use crate::border::Pair;
-use crate::field::{Field, median};
+use crate::field::Field;
 use crate::frame::Frame;
 use crate::levels::{Levels, Sense};
 use crate::plane::Plane;
+use crate::ray::{passes, ray};
 use crate::regions::Regions;
 
 /// Nodes to either side of the border whose samples are asked.
@@ -96,25 +97,12 @@ impl Zone {
             }
         }
         Self {
-            node: nearest.into_iter().map(|(n, (_, pair))| (n, pair)).collect(),
+            node: nearest
+                .into_iter()
+                .map(|(n, (_, pair))| (n, pair))
+                .collect(),
             columns: low..=high.max(low),
         }
-    }
-}
-
-/// A ray's place in its column: the tangent of its angle, or y where rays are parallel.
-fn ray(camera_mm: Option<[f64; 2]>, y_mm: f64, z_mm: f64) -> f64 {
-    match camera_mm {
-        Some([y, z]) => (y_mm - y) / (z - z_mm),
-        None => y_mm,
-    }
-}
-
-/// Where a ray is at a height.
-fn passes(camera_mm: Option<[f64; 2]>, ray: f64, z_mm: f64) -> f64 {
-    match camera_mm {
-        Some([y, z]) => y + ray * (z - z_mm),
-        None => ray,
     }
 }
 
@@ -135,58 +123,54 @@ fn of_column<'p>(
         if let Some(pair) = pair_at(sample.y_mm)
             && let Some(side) = Side::of(sight, pair, column.x_mm(), sample.y_mm)
         {
-            let above = sample.z_mm - side.upper_mm;
-            // Where its ray passed that height: exact, however far the sample strays along it.
-            let y_mm = passes(
-                camera,
-                ray(camera, sample.y_mm, sample.z_mm),
-                side.upper_mm,
-            );
-            if -side.under_mm <= above && above <= side.within_mm {
-                // A sample of the wall just under the edge looks the same.
-                let slack_mm = match camera {
-                    Some(_) => side.under_mm * ray(camera, sample.y_mm, sample.z_mm).abs(),
-                    None => 0.0,
-                };
-                let mut witness = side.witness(sight, column.x_mm(), y_mm, true, DOUBT);
-                witness.slack_mm = slack_mm;
-                found.push(witness);
-            } else if above < -side.within_mm {
-                let doubt = if side.is_lower(sight, pair, column.x_mm(), sample) {
-                    DOUBT
-                } else {
-                    DOUBT_BETWEEN
-                };
-                found.push(side.witness(sight, column.x_mm(), y_mm, false, doubt));
-            }
+            found.extend(side.told(sight, pair, column.x_mm(), sample));
         }
     }
-    let mut steps: Vec<f64> = rays.windows(2).map(|two| two[1].0 - two[0].0).collect();
-    let Some(step) = median(&mut steps).filter(|step| *step > 0.0) else {
-        return;
-    };
-    for two in rays.windows(2) {
-        let gaps = ((two[1].0 - two[0].0) / step).round();
-        if !(2.0..=60.0).contains(&gaps) {
-            continue;
-        }
-        let apart = (two[1].0 - two[0].0) / gaps;
-        for k in 1..gaps as usize {
-            let at = two[0].0 + apart * k as f64;
-            let guess = passes(camera, at, two[0].1.max(two[1].1));
-            if let Some(pair) = pair_at(guess)
-                && let Some(side) = Side::of(sight, pair, column.x_mm(), guess)
-            {
-                let y_mm = passes(camera, at, side.upper_mm);
-                found.push(side.witness(sight, column.x_mm(), y_mm, false, DOUBT_OF_MISSING));
+    missing(sight, column.x_mm(), &rays, pair_at, found);
+}
+
+/// Most missing rays in a row that are looked at.
+const MOST_MISSING: f64 = 400.0;
+
+/// Rays that came back with nothing, between those that did and at both ends of the column.
+fn missing<'p>(
+    sight: &Sight<'_>,
+    x_mm: f64,
+    rays: &[(f64, f64)],
+    pair_at: &dyn Fn(f64) -> Option<&'p Pair>,
+    found: &mut Vec<Witness>,
+) {
+    let step = sight.field.ray_step;
+    let [first, last] = sight.field.rays;
+    let level = sight.field.middle_z_mm;
+    let mut before = (first - step, f64::NEG_INFINITY);
+    let ends = [(last + step, f64::NEG_INFINITY)];
+    for &(at, z_mm) in rays.iter().chain(&ends) {
+        let gaps = ((at - before.0) / step).round();
+        let apart = (at - before.0) / gaps.max(1.0);
+        if (2.0..=MOST_MISSING).contains(&gaps) {
+            let near = before.1.max(z_mm);
+            let near = if near.is_finite() { near } else { level };
+            for k in 1..gaps as usize {
+                let ray = before.0 + apart * k as f64;
+                let guess = passes(sight.camera_mm, ray, near);
+                if let Some(pair) = pair_at(guess)
+                    && let Some(side) = Side::of(sight, pair, x_mm, guess)
+                {
+                    let y_mm = passes(sight.camera_mm, ray, side.upper_mm);
+                    found.push(side.witness(sight, x_mm, y_mm, false, DOUBT_OF_MISSING));
+                }
             }
         }
+        before = (at, z_mm);
     }
 }
 
 /// The two surfaces beside a pair, at one place.
 struct Side {
     upper_mm: f64,
+    /// Where the upper surface is no plane and the lower one is, that tells what lies on it.
+    lower_mm: Option<f64>,
     within_mm: f64,
     under_mm: f64,
     inner_is_upper: bool,
@@ -199,14 +183,67 @@ impl Side {
             Sense::Falls => true,
             Sense::Level => return None,
         };
-        let upper = if inner_is_upper { pair.inner } else { pair.outer };
+        let (upper, lower) = match inner_is_upper {
+            true => (pair.inner, pair.outer),
+            false => (pair.outer, pair.inner),
+        };
         let (upper_mm, slack_mm) = height(sight, upper, x_mm, y_mm)?;
+        let lower_mm = match slack_mm > 0.0 {
+            true => height(sight, lower, x_mm, y_mm)
+                .filter(|(_, slack_mm)| *slack_mm == 0.0)
+                .map(|(z_mm, _)| z_mm),
+            false => None,
+        };
         Some(Self {
             upper_mm,
+            lower_mm,
             within_mm: DEVIATIONS * sight.field.noise_mm + slack_mm,
             under_mm: UNDER_DEVIATIONS * sight.field.noise_mm + slack_mm,
             inner_is_upper,
         })
+    }
+
+    /// What a sample says.
+    fn told(
+        &self,
+        sight: &Sight<'_>,
+        pair: &Pair,
+        x_mm: f64,
+        sample: &range_image::Sample,
+    ) -> Option<Witness> {
+        let camera = sight.camera_mm;
+        if let Some(lower_mm) = self.lower_mm {
+            let above = sample.z_mm - lower_mm;
+            let noise_mm = sight.field.noise_mm;
+            return if above.abs() <= DEVIATIONS * noise_mm {
+                Some(self.witness(sight, x_mm, sample.y_mm, false, DOUBT))
+            } else if above > 0.0 && sample.z_mm <= self.upper_mm + self.within_mm {
+                Some(self.witness(sight, x_mm, sample.y_mm, true, DOUBT_BETWEEN))
+            } else {
+                None
+            };
+        }
+        let above = sample.z_mm - self.upper_mm;
+        let own = ray(camera, sample.y_mm, sample.z_mm);
+        // Where its ray passed that height: exact, however far the sample strays along it.
+        let y_mm = passes(camera, own, self.upper_mm);
+        if -self.under_mm <= above && above <= self.within_mm {
+            let mut witness = self.witness(sight, x_mm, y_mm, true, DOUBT);
+            // A sample of the wall just under the edge looks the same.
+            witness.slack_mm = match camera {
+                Some(_) => self.under_mm * own.abs(),
+                None => 0.0,
+            };
+            Some(witness)
+        } else if above < -self.within_mm {
+            let doubt = match self.is_lower(sight, pair, x_mm, sample) {
+                true => DOUBT,
+                false => DOUBT_BETWEEN,
+            };
+            Some(self.witness(sight, x_mm, y_mm, false, doubt))
+        } else {
+            None
+        }
     }
 
     /// Whether a sample below the upper surface lies on what is below, and not half on both.
@@ -217,7 +254,11 @@ impl Side {
         x_mm: f64,
         sample: &range_image::Sample,
     ) -> bool {
-        let lower = if self.inner_is_upper { pair.outer } else { pair.inner };
+        let lower = if self.inner_is_upper {
+            pair.outer
+        } else {
+            pair.inner
+        };
         match height(sight, lower, x_mm, sample.y_mm) {
             Some((z_mm, slack_mm)) => {
                 sample.z_mm <= z_mm + DEVIATIONS * sight.field.noise_mm + slack_mm

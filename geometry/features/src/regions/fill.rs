@@ -8,9 +8,9 @@ use super::{NONE, OUTSIDE, Region, Regions};
 /// samples or the dust beside a step, and no hollow.
 const THIN: u32 = 2;
 
-/// Gives each connected piece of unlabelled nodes to the lowest region beside it where regions of
-/// different height meet there; makes it a void where it is wide and all around it is of one
-/// height; and spreads the regions around into it elsewhere.
+/// Lets the regions around each connected piece of unlabelled nodes grow into it, all but the
+/// highest where they are of different heights; makes it a void where it is wide and all around
+/// it is of one height.
 pub(super) fn fill(image: &RangeImage, divided: &mut Regions, step_mm: f64) {
     let pieces = pieces(divided);
     for piece in pieces {
@@ -31,26 +31,38 @@ pub(super) fn fill(image: &RangeImage, divided: &mut Regions, step_mm: f64) {
         let is_thin = depth(divided, &piece) <= THIN;
         let lowest = around.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1));
         let highest = around.iter().map(|a| a.1).fold(f64::NEG_INFINITY, f64::max);
-        let given = match lowest {
+        match lowest {
             // Beyond what was seen lies whatever surrounds the part.
-            _ if is_framed && !is_thin => Some(OUTSIDE),
-            Some((label, z_mm)) if highest - z_mm > step_mm => Some(label),
-            Some(_) if is_thin => None,
-            Some(_) => {
-                divided.regions.push(Region::Void);
-                u16::try_from(divided.regions.len() - 1).ok()
+            _ if is_framed && !is_thin => give(divided, &piece, OUTSIDE),
+            // What is hidden is hidden by the highest: the others go on below it, each where it is
+            // nearest.
+            Some((_, z_mm)) if highest - z_mm > step_mm => {
+                let low: Vec<u16> = around
+                    .iter()
+                    .filter(|(_, z)| highest - z > step_mm)
+                    .map(|(label, _)| *label)
+                    .collect();
+                spread(divided, &piece, &|label| low.contains(&label));
             }
-            None => Some(OUTSIDE),
-        };
-        match given {
-            Some(label) => piece.iter().for_each(|n| divided.labels[*n] = label),
-            None => spread(divided, &piece),
+            Some(_) if is_thin => spread(divided, &piece, &|_| true),
+            Some(_) => {
+                let label = u16::try_from(divided.regions.len()).unwrap_or(OUTSIDE);
+                divided.regions.push(Region::Void);
+                give(divided, &piece, label);
+            }
+            None => give(divided, &piece, OUTSIDE),
         }
     }
 }
 
+fn give(divided: &mut Regions, piece: &[usize], label: u16) {
+    for node in piece {
+        divided.labels[*node] = label;
+    }
+}
+
 /// Height of a region at a node, millimetres: of the node itself where it was measured.
-fn height(image: &RangeImage, divided: &Regions, label: u16, node: usize) -> f64 {
+pub(super) fn height(image: &RangeImage, divided: &Regions, label: u16, node: usize) -> f64 {
     let z_mm = image.raw_z_mm()[node];
     if !z_mm.is_nan() {
         return z_mm;
@@ -112,15 +124,15 @@ fn depth(divided: &Regions, piece: &[usize]) -> u32 {
     steps
 }
 
-/// Lets the regions around a piece grow into it, a ring at a time.
-fn spread(divided: &mut Regions, piece: &[usize]) {
+/// Lets those regions around a piece that may grow into it, a ring at a time.
+fn spread(divided: &mut Regions, piece: &[usize], may: &dyn Fn(u16) -> bool) {
     let mut left: Vec<usize> = piece.to_vec();
     while !left.is_empty() {
         let given: Vec<(usize, u16)> = left
             .iter()
             .filter_map(|&node| {
                 let near = divided.neighbours(node).map(|o| divided.labels[o]);
-                near.filter(|l| *l != NONE).min().map(|label| (node, label))
+                near.filter(|l| *l != NONE && may(*l)).min().map(|label| (node, label))
             })
             .collect();
         if given.is_empty() {

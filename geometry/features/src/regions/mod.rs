@@ -4,8 +4,11 @@
 //! are what its walls hide from laser or sensor. Where nothing lower does, they are a hollow whose
 //! floor is not seen.
 
+mod crumbs;
 mod fill;
+mod hidden;
 mod surface;
+mod table;
 
 use range_image::{Column, Monitor, RangeImage};
 use segment::{SegmentError, SegmentSettings, View};
@@ -72,8 +75,12 @@ pub fn regions(
         .zip(columns.last())
         .map(|(first, last)| (first.x_mm(), last.x_mm()));
     let background = segment::background(image, &map, &View { x_mm, y_mm: None });
+    let table = match background.regions.is_empty() {
+        true => table::table(image, &map),
+        false => None,
+    };
     let is_outside: Vec<bool> = (0..=map.regions())
-        .map(|label| background.region(label).is_some())
+        .map(|label| background.region(label).is_some() || table == Some(label))
         .collect();
     // Labels of the part follow the outside's.
     let mut next = OUTSIDE;
@@ -93,6 +100,7 @@ pub fn regions(
         .map(|label| renamed[usize::from(*label)])
         .collect();
     scraps_outside(image, &background, &mut labels, field.noise_mm);
+    crumbs::kept(image, &mut labels, &mut next, least_step_mm(field));
     monitor.check()?;
     let (surfaces, table) = surface::surfaces(field, columns, &labels, usize::from(next));
     monitor.check()?;
@@ -105,6 +113,7 @@ pub fn regions(
         regions,
         notes: background.notes,
     };
+    hidden::hidden(image, &mut divided, least_step_mm(field));
     fill::fill(image, &mut divided, least_step_mm(field));
     Ok(divided)
 }
