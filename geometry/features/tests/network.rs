@@ -70,7 +70,7 @@ fn files_that_are_no_network_are_refused() {
         ("relief-feature-network", "relief-machine", "relief-machine"),
         ("digits = 7", "digits = 8", "must be 11"),
         ("hidden = 15", "hidden = 14", "neuron 1 has 16 weights"),
-        ("\"hole\", \"block\"", "\"hole\"", "none of classes"),
+        ("class = \"hole\"", "class = \"hull\"", "none of classes"),
         (
             "\"hole\", \"block\"",
             "\"hole\", \"hole\"",
