@@ -155,10 +155,11 @@ const DAEMON: [&str; 18] = [
     "toolpath",
 ];
 
-const COMMAND_LINE: [&str; 21] = [
+const COMMAND_LINE: [&str; 22] = [
     "cad-exchange",
     "compare",
     "deliverables",
+    "features",
     "nurbs",
     "pipeline",
     "range-image",

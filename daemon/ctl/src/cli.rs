@@ -6,8 +6,8 @@ use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    abort, change, compare, convert, demo, doctor, fetch, jobs, laser, manual, rerun, resume, scan,
-    scans, skin, status, surface, token, toolpath, watch, webhooks,
+    abort, change, compare, convert, demo, doctor, features, fetch, jobs, laser, manual, rerun,
+    resume, scan, scans, skin, status, surface, token, toolpath, watch, webhooks,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
@@ -33,6 +33,7 @@ pub(crate) enum Command {
     Demo(demo::Args),
     Convert(convert::Args),
     Compare(compare::Args),
+    Features(features::Args),
     Skin(skin::Args),
     Surface(surface::Args),
     Toolpath(toolpath::Args),

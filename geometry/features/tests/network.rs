@@ -79,7 +79,7 @@ fn files_that_are_no_network_are_refused() {
         (
             "seed = 1",
             "seed = 1\nsalt = 2",
-            "line 12: unknown field `salt`",
+            "line 13: unknown field `salt`",
         ),
         ("seed = 1", "seed = -1", "recipe.seed"),
         ("4543212", "4543218", "digits are 1 to 5"),
