@@ -31,9 +31,9 @@ pub(crate) struct Args {
         default_value = "network.toml"
     )]
     pub(super) output: PathBuf,
-    /// Seed of every random draw
-    #[arg(long, value_name = "N", default_value_t = Recipe::SHIPPED.seed)]
-    seed: u64,
+    /// Seed of every random draw; default: that of the built-in network
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
     /// Digits of a code that the network looks at; shorter codes are filled up, longer ones thinned
     #[arg(long, value_name = "N", default_value_t = Recipe::SHIPPED.digits)]
     digits: usize,
@@ -78,7 +78,7 @@ impl Args {
             }
         };
         Recipe {
-            seed: self.seed,
+            seed: self.seed.unwrap_or(base.seed),
             ..base
         }
     }
@@ -86,8 +86,8 @@ impl Args {
     /// Where the network goes, which is none of the files that are read.
     pub(super) fn output(&self) -> Result<&Path, Failure> {
         // A seed in a file is a TOML integer.
-        if i64::try_from(self.seed).is_err() {
-            let message = format!("--seed {}: must be at most {}", self.seed, i64::MAX);
+        if let Some(seed) = self.seed.filter(|&own| i64::try_from(own).is_err()) {
+            let message = format!("--seed {seed}: must be at most {}", i64::MAX);
             return Err(Failure::Usage(message));
         }
         if self.output.extension().is_none_or(|own| own != "toml") {
