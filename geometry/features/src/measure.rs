@@ -69,7 +69,10 @@ pub fn measured(
         (w, plane.sigma_mm(at.x, at.y))
     };
     let mut warnings = Vec::new();
-    let own = floor.as_ref().map(on);
+    let own = match candidate.tip {
+        Some(tip) => Some((tip.shoulder_mm, tip.sigma_mm)),
+        None => floor.as_ref().map(on),
+    };
     let base = match candidate.lie {
         Lie::Body => own.unwrap_or((0.0, 0.0)),
         _ => host.map_or((0.0, 0.0), on),
@@ -114,7 +117,12 @@ pub fn measured(
             .levels
             .iter()
             .any(|level| !sight.levels.levels[usize::from(*level)].is_plane);
-    if is_free && candidate.lie == Lie::Hollow {
+    if let Some(tip) = candidate.tip {
+        let angle = 2.0 * (90.0 - libm::atan(tip.slope).to_degrees());
+        warnings.push(format!(
+            "its bottom is a cone of about {angle:.0} degrees; the depth is that of its edge"
+        ));
+    } else if is_free && candidate.lie == Lie::Hollow {
         warnings
             .push("its floor is no plane: the depth is that of the plane through it".to_owned());
     }

@@ -117,7 +117,7 @@ fn cut(sight: &Sight<'_>, candidate: &Candidate, across: &Across, beside_mm: f64
         let is_inside = candidate.outline.shape.distance_mm(place) < -0.5 * pitch;
         let is_own = candidate.levels.contains(&level);
         own += usize::from(is_own);
-        let height = if is_inside && !is_own {
+        let height = if is_inside && (!is_own || candidate.tip.is_some()) {
             floor(sight, candidate, point.x, point.y)
         } else {
             crate::levels::height(image, sight.regions, node).or_else(|| unseen(sight, candidate))
@@ -133,6 +133,13 @@ fn cut(sight: &Sight<'_>, candidate: &Candidate, across: &Across, beside_mm: f64
 /// The candidate's own floor at a place.
 fn floor(sight: &Sight<'_>, candidate: &Candidate, x_mm: f64, y_mm: f64) -> Option<f64> {
     let level = candidate.levels.first()?;
+    if let Some(tip) = candidate.tip {
+        // What a drill leaves at the bottom is no floor to be told by.
+        let [u, v, _] = sight
+            .frame
+            .local(nalgebra::Vector3::new(x_mm, y_mm, 0.0));
+        return Some(sight.frame.world([u, v, tip.shoulder_mm]).z);
+    }
     match sight.levels.levels[usize::from(*level)].plane.as_ref() {
         Some(plane) => Some(plane.z_mm(x_mm, y_mm)),
         None => unseen(sight, candidate),
@@ -155,5 +162,8 @@ fn unseen(sight: &Sight<'_>, candidate: &Candidate) -> Option<f64> {
             a.min(b)
         }
     };
-    Some(host.z_mm(x, y) - size)
+    let base = host.z_mm(x, y);
+    let floor = sight.levels.levels[usize::from(own)].plane;
+    let floor = floor.map_or(base, |plane| plane.z_mm(x, y));
+    Some(base.min(floor) - size)
 }

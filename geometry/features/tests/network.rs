@@ -70,7 +70,7 @@ fn files_that_are_no_network_are_refused() {
         ("relief-feature-network", "relief-machine", "relief-machine"),
         ("digits = 7", "digits = 8", "must be 11"),
         ("hidden = 15", "hidden = 14", "neuron 1 has 16 weights"),
-        ("\"hole\", \"block\"", "\"hole\"", "none of classes"),
+        ("class = \"hole\"", "class = \"hull\"", "none of classes"),
         (
             "\"hole\", \"block\"",
             "\"hole\", \"hole\"",
@@ -79,7 +79,7 @@ fn files_that_are_no_network_are_refused() {
         (
             "seed = 1",
             "seed = 1\nsalt = 2",
-            "line 12: unknown field `salt`",
+            "line 13: unknown field `salt`",
         ),
         ("seed = 1", "seed = -1", "recipe.seed"),
         ("4543212", "4543218", "digits are 1 to 5"),

@@ -3,6 +3,7 @@
 mod border_sides;
 mod merge;
 mod outlined;
+pub(crate) mod tip;
 mod top;
 
 use range_image::{Cancelled, Monitor};
@@ -13,6 +14,7 @@ use crate::levels::{AROUND, Levels, Sense};
 use crate::outline::Outline;
 use crate::outline::witnesses::Sight;
 
+pub use tip::Tip;
 pub use top::{Top, top};
 
 /// How a level lies in what is around it.
@@ -45,6 +47,8 @@ pub struct Candidate {
     pub is_cut: bool,
     /// Nodes of it.
     pub nodes: usize,
+    /// The cone that its floor is, of a drilled hole.
+    pub tip: Option<Tip>,
 }
 
 /// Outermost pairs of which at least this share rises are a hollow's.
@@ -83,43 +87,102 @@ pub fn candidates(
             falls: 1.0,
             is_cut: body.at_frame as f64 > CUT * (body.pairs.len() + body.at_frame) as f64,
             nodes: body.nodes,
+            tip: None,
         });
     }
-    for set in merge::sets(sight, top, step_mm) {
+    let mut sets = merge::sets(sight, top, step_mm);
+    let mut others: Vec<Candidate> = Vec::new();
+    while let Some(set) = (!sets.is_empty()).then(|| sets.remove(0)) {
         monitor.check()?;
-        let own = own_border(&|level| set.contains(&level));
-        if own.nodes < fewest {
+        let Some(own) = candidate(sight, set, step_mm, seed, fewest) else {
             continue;
+        };
+        // Pieces of one floor, of which the rest is hidden, have one outline.
+        match others.iter().position(|other| are_one(sight, other, &own)) {
+            Some(index) => {
+                let mut both = others.remove(index).levels;
+                both.extend(own.levels);
+                both.sort_by_key(|l| {
+                    let level = &sight.levels.levels[usize::from(*l)];
+                    (!level.is_seen(), std::cmp::Reverse(level.nodes), *l)
+                });
+                sets.insert(0, both);
+            }
+            None => others.push(own),
         }
-        let [rises, falls, level] =
-            [Sense::Rises, Sense::Falls, Sense::Level].map(|sense| own.outermost(sense) as f64);
-        let all = (rises + falls + level + own.at_frame as f64).max(1.0);
-        let lie = if rises >= HOLLOW * all {
-            Lie::Hollow
-        } else if falls >= RAISED * all {
-            Lie::Raised
-        } else {
-            continue;
-        };
-        let Some(host) = host(sight.levels, &own, lie) else {
-            continue;
-        };
-        let seed = seed ^ (u64::from(set[0]) << 32);
-        let Some(outline) = outlined::outlined(sight, &own, lie, seed) else {
-            continue;
-        };
-        found.push(Candidate {
-            levels: set,
-            lie,
-            outline,
-            host,
-            rises: rises / all,
-            falls: falls / all,
-            is_cut: own.at_frame as f64 > CUT * all,
-            nodes: own.nodes,
-        });
     }
+    found.extend(others);
     Ok(found)
+}
+
+/// Whether two hollows go into the same, and each has the middle of the other inside.
+fn are_one(sight: &Sight<'_>, one: &Candidate, other: &Candidate) -> bool {
+    let middle = |candidate: &Candidate| {
+        let level = candidate.levels.first()?;
+        let nodes = sight.levels.labels.iter().enumerate();
+        let (mut sum, mut count) = ([0.0; 2], 0.0);
+        for (node, _) in nodes.filter(|(_, label)| *label == level) {
+            let (column, row) = (node / sight.levels.rows, node % sight.levels.rows);
+            let image = &sight.field.image;
+            sum = [sum[0] + image.x_mm(column), sum[1] + image.y_mm(row)];
+            count += 1.0;
+        }
+        let point = nalgebra::Vector3::new(sum[0] / count, sum[1] / count, 0.0);
+        let [u, v, _] = sight.frame.local(point);
+        Some([u, v])
+    };
+    let holds = |a: &Candidate, b: &Candidate| {
+        middle(b).is_some_and(|place| a.outline.shape.distance_mm(place) < 0.0)
+    };
+    let both = one.lie == Lie::Hollow && other.lie == Lie::Hollow && one.host == other.host;
+    both && holds(one, other) && holds(other, one)
+}
+
+/// The candidate of a set of levels, if they are one.
+fn candidate(
+    sight: &Sight<'_>,
+    set: Vec<u16>,
+    step_mm: f64,
+    seed: u64,
+    fewest: usize,
+) -> Option<Candidate> {
+    let own = border(
+        &sight.field.image,
+        sight.regions,
+        sight.levels,
+        step_mm,
+        &|level| set.contains(&level),
+    );
+    if own.nodes < fewest {
+        return None;
+    }
+    let [rises, falls, level] =
+        [Sense::Rises, Sense::Falls, Sense::Level].map(|sense| own.outermost(sense) as f64);
+    let all = (rises + falls + level + own.at_frame as f64).max(1.0);
+    let lie = if rises >= HOLLOW * all {
+        Lie::Hollow
+    } else if falls >= RAISED * all {
+        Lie::Raised
+    } else {
+        return None;
+    };
+    let host = host(sight.levels, &own, lie)?;
+    let seed = seed ^ (u64::from(*set.first()?) << 32);
+    let outline = outlined::outlined(sight, &own, lie, seed)?;
+    let tip = (lie == Lie::Hollow)
+        .then(|| tip::tip(sight, *set.first()?, &outline.shape))
+        .flatten();
+    Some(Candidate {
+        tip,
+        levels: set,
+        lie,
+        outline,
+        host,
+        rises: rises / all,
+        falls: falls / all,
+        is_cut: own.at_frame as f64 > CUT * all,
+        nodes: own.nodes,
+    })
 }
 
 /// Of a hollow the highest of the levels that enough of the border rises to: what is cut across

@@ -1,7 +1,7 @@
 //! How well a network does on patterns that it was not taught.
 
 use super::classifier::Classifier;
-use super::recipe::{TrainError, patterns};
+use super::recipe::{Teaching, TrainError, patterns};
 use crate::chance::Chance;
 use crate::code::{Attributes, Digit, Form, Sense};
 use crate::patterns::{GivenPattern, Pattern, Purpose};
@@ -57,14 +57,21 @@ pub fn foreign_codes(count: usize, seed: u64) -> Vec<Attributes> {
     (0..count).map(|_| one()).collect()
 }
 
+/// Sections of each class that the published network is judged by.
+const PER_CLASS: usize = 600;
+
 /// Judges a network by patterns drawn for that, as many as it was taught, of the classes that it
-/// has, and by as many random codes.
+/// has, and by as many random codes. The published one, which was taught six rows, is judged by drawn
+/// sections as well.
 ///
 /// # Errors
-/// Where patterns are given with the published recipe.
+/// None of a network that was trained.
 pub fn judge(classifier: &Classifier, given: &[GivenPattern]) -> Result<Judged, TrainError> {
-    let recipe = &classifier.trained().recipe;
-    let patterns = patterns(recipe, given, Purpose::Judging)?;
+    let mut recipe = classifier.trained().recipe.clone();
+    if recipe.teaching == Teaching::Table2 {
+        recipe.teaching = Teaching::Drawn(PER_CLASS);
+    }
+    let patterns = patterns(&recipe, given, Purpose::Judging)?;
     Ok(judged(classifier, &patterns, recipe.seed))
 }
 

@@ -43,7 +43,8 @@ pub struct Recipe {
 impl Recipe {
     /// The default network's.
     pub const SHIPPED: Self = Self {
-        seed: 1,
+        // Of the first five, the one whose training ended with the least error.
+        seed: 5,
         teaching: Teaching::Drawn(600),
         digits: 15,
         hidden: 30,

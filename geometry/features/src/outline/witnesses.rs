@@ -18,6 +18,8 @@ use crate::regions::Regions;
 
 /// Nodes to either side of the border whose samples are asked.
 const REACH: usize = 3;
+/// Columns and rays beyond the last ones of the scan.
+const BEYOND: u32 = 4;
 /// Samples within so many deviations of a surface lie on it.
 const DEVIATIONS: f64 = 4.5;
 /// Further below the upper surface than this it may lie on the wall, just under the edge.
@@ -27,6 +29,8 @@ const UNDER_DEVIATIONS: f64 = 2.5;
 const DOUBT: f64 = 0.03;
 /// Between both surfaces lies the wall, or a reading of both at once.
 const DOUBT_BETWEEN: f64 = 0.12;
+/// Surfaces are near each other where no more than so many slacks part them.
+const NEAR_SLACKS: f64 = 4.0;
 /// How often a missing sample was on the upper surface nevertheless.
 const DOUBT_OF_MISSING: f64 = 0.25;
 
@@ -54,13 +58,23 @@ pub fn witnesses(sight: &Sight<'_>, pairs: &[Pair]) -> Vec<Witness> {
     let image = &sight.field.image;
     let (first, _) = image.origin();
     let mut found = Vec::new();
-    for column in sight.columns {
+    let empty = |x_mm: Option<f64>, beyond: f64| {
+        let step = beyond * sight.field.column_pitch_mm;
+        Column::new(x_mm.unwrap_or(0.0) + step, Vec::new())
+    };
+    // Beyond its last columns and rays, too, the scan has none.
+    let before = (1..=BEYOND).map(|k| empty(sight.columns.first().map(Column::x_mm), -f64::from(k)));
+    let behind = (1..=BEYOND).map(|k| empty(sight.columns.last().map(Column::x_mm), f64::from(k)));
+    let beyond: Vec<Column> = before.chain(behind).collect();
+    for column in sight.columns.iter().chain(&beyond) {
         let at = (column.x_mm() / image.pitch_mm()).round() as i64 - first;
+        // The image has no nodes beyond its frame: those at the frame speak for what is there.
+        let at = at.clamp(0, sight.regions.columns as i64 - 1);
         if !usize::try_from(at).is_ok_and(|at| columns.contains(&at)) {
             continue;
         }
         let pair_at = |y_mm: f64| {
-            let at = sight.regions.node(image, column.x_mm(), y_mm)?;
+            let at = sight.regions.nearest(image, column.x_mm(), y_mm)?;
             let pair = *node.get(&at)?;
             pairs.get(pair)
         };
@@ -143,8 +157,9 @@ fn missing<'p>(
     let step = sight.field.ray_step;
     let [first, last] = sight.field.rays;
     let level = sight.field.middle_z_mm;
-    let mut before = (first - step, f64::NEG_INFINITY);
-    let ends = [(last + step, f64::NEG_INFINITY)];
+    let beyond = f64::from(BEYOND) * step;
+    let mut before = (first - beyond, f64::NEG_INFINITY);
+    let ends = [(last + beyond, f64::NEG_INFINITY)];
     for &(at, z_mm) in rays.iter().chain(&ends) {
         let gaps = ((at - before.0) / step).round();
         let apart = (at - before.0) / gaps.max(1.0);
@@ -213,15 +228,7 @@ impl Side {
     ) -> Option<Witness> {
         let camera = sight.camera_mm;
         if let Some(lower_mm) = self.lower_mm {
-            let above = sample.z_mm - lower_mm;
-            let noise_mm = sight.field.noise_mm;
-            return if above.abs() <= DEVIATIONS * noise_mm {
-                Some(self.witness(sight, x_mm, sample.y_mm, false, DOUBT))
-            } else if above > 0.0 && sample.z_mm <= self.upper_mm + self.within_mm {
-                Some(self.witness(sight, x_mm, sample.y_mm, true, DOUBT_BETWEEN))
-            } else {
-                None
-            };
+            return self.told_by_lower(sight, x_mm, sample, lower_mm);
         }
         let above = sample.z_mm - self.upper_mm;
         let own = ray(camera, sample.y_mm, sample.z_mm);
@@ -243,6 +250,33 @@ impl Side {
             Some(self.witness(sight, x_mm, y_mm, false, doubt))
         } else {
             None
+        }
+    }
+
+    /// As [`Self::told`], by the lower surface: what lies on it is below, what lies as high as the
+    /// upper one, or somewhat above the lower where both are near, is not.
+    fn told_by_lower(
+        &self,
+        sight: &Sight<'_>,
+        x_mm: f64,
+        sample: &range_image::Sample,
+        lower_mm: f64,
+    ) -> Option<Witness> {
+        let camera = sight.camera_mm;
+        let own = ray(camera, sample.y_mm, sample.z_mm);
+        let passing = passes(camera, own, self.upper_mm);
+        let above = sample.z_mm - lower_mm;
+        let is_near = self.upper_mm - lower_mm <= NEAR_SLACKS * self.within_mm;
+        if above.abs() <= DEVIATIONS * sight.field.noise_mm {
+            Some(self.witness(sight, x_mm, passing, false, DOUBT))
+        } else if above < 0.0 || sample.z_mm > self.upper_mm + self.within_mm {
+            None
+        } else if sample.z_mm >= self.upper_mm - self.within_mm {
+            Some(self.witness(sight, x_mm, sample.y_mm, true, DOUBT))
+        } else if is_near {
+            Some(self.witness(sight, x_mm, sample.y_mm, true, DOUBT_BETWEEN))
+        } else {
+            Some(self.witness(sight, x_mm, passing, false, DOUBT_BETWEEN))
         }
     }
 

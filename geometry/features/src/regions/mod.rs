@@ -7,6 +7,7 @@
 mod crumbs;
 mod fill;
 mod hidden;
+mod strays;
 mod surface;
 mod table;
 
@@ -45,6 +46,8 @@ pub struct Regions {
 
 /// The index of the outside.
 pub const OUTSIDE: u16 = 0;
+/// Nodes beyond the frame that are taken for those at it.
+const BESIDE: f64 = 6.0;
 /// No label yet.
 const NONE: u16 = u16::MAX;
 /// A step of z between regions is at least so many deviations of single samples ...
@@ -75,12 +78,16 @@ pub fn regions(
         .zip(columns.last())
         .map(|(first, last)| (first.x_mm(), last.x_mm()));
     let background = segment::background(image, &map, &View { x_mm, y_mm: None });
-    let table = match background.regions.is_empty() {
+    let mut known = background.regions.iter();
+    let table = match !known.any(|region| table::surrounds(&map, region.label)) {
         true => table::table(image, &map),
         false => None,
     };
     let is_outside: Vec<bool> = (0..=map.regions())
-        .map(|label| background.region(label).is_some() || table == Some(label))
+        .map(|label| {
+            let known = background.region(label).is_some() && table::surrounds(&map, label);
+            known || table == Some(label)
+        })
         .collect();
     // Labels of the part follow the outside's.
     let mut next = OUTSIDE;
@@ -102,7 +109,11 @@ pub fn regions(
     scraps_outside(image, &background, &mut labels, field.noise_mm);
     crumbs::kept(image, &mut labels, &mut next, least_step_mm(field));
     monitor.check()?;
-    let (surfaces, table) = surface::surfaces(field, columns, &labels, usize::from(next));
+    let (mut surfaces, mut table) = surface::surfaces(field, columns, &labels, usize::from(next));
+    if strays::unlabel(image, &mut labels, &surfaces, field.noise_mm) {
+        crumbs::kept(image, &mut labels, &mut next, least_step_mm(field));
+        (surfaces, table) = surface::surfaces(field, columns, &labels, usize::from(next));
+    }
     monitor.check()?;
     let mut regions = vec![Region::Outside(table)];
     regions.extend(surfaces.into_iter().map(Region::Part));
@@ -147,6 +158,20 @@ impl Regions {
         let index = |value: f64, first: i64, count: usize| {
             let at = (value / image.pitch_mm()).round() - first as f64;
             (at >= 0.0 && at < count as f64).then_some(at as usize)
+        };
+        let column = index(x_mm, i, self.columns)?;
+        let row = index(y_mm, j, self.rows)?;
+        Some(column * self.rows + row)
+    }
+
+    /// As [`Self::node`], of places up to a few pitches beyond the frame that at the frame.
+    #[must_use]
+    pub fn nearest(&self, image: &RangeImage, x_mm: f64, y_mm: f64) -> Option<usize> {
+        let (i, j) = image.origin();
+        let index = |value: f64, first: i64, count: usize| {
+            let at = (value / image.pitch_mm()).round() - first as f64;
+            let beyond = (-BESIDE..count as f64 + BESIDE).contains(&at);
+            (beyond && count > 0).then(|| at.clamp(0.0, (count - 1) as f64) as usize)
         };
         let column = index(x_mm, i, self.columns)?;
         let row = index(y_mm, j, self.rows)?;

@@ -20,6 +20,13 @@ pub struct Surface {
     pub slope_rad: f64,
 }
 
+impl Surface {
+    /// Whether the samples that agree with the plane stray as the noise lets them.
+    pub(super) fn lies_flat(&self, noise_mm: f64) -> bool {
+        self.plane.rms_mm <= NOISES * noise_mm + 1e-6
+    }
+}
+
 /// Samples within so many nodes of another region are not asked.
 const MARGIN: usize = 2;
 /// A region is a plane where its samples stray by no more than this times the noise ...

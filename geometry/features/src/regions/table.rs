@@ -3,9 +3,22 @@
 use range_image::{RangeImage, RegionMap};
 
 /// Of the frame of the image the table takes at least this share ...
-const LEAST_OF_FRAME: f64 = 0.5;
+const LEAST_OF_FRAME: f64 = 0.4;
 /// ... and of its borders with others at least this share rises from it.
 const LEAST_RISING: f64 = 0.9;
+
+/// Whether a region takes so much of the frame of the image that it may be what surrounds the part,
+/// and no ledge of it.
+pub(super) fn surrounds(map: &RegionMap, label: u16) -> bool {
+    let (columns, rows) = (map.columns(), map.rows());
+    let along = (0..columns).flat_map(|c| [(c, 0), (c, rows - 1)]);
+    let frame = along.chain((0..rows).flat_map(|r| [(0, r), (columns - 1, r)]));
+    let own = frame.filter(|(c, r)| map.label(*c, *r) == label).count();
+    own as f64 >= SURROUNDS * (2 * (columns + rows)) as f64
+}
+
+/// Least share of the frame for that.
+const SURROUNDS: f64 = 0.15;
 
 /// The region that lies around and below all others, if one does: a part that is cut by none of
 /// the view's sides stands on it.
@@ -33,8 +46,8 @@ pub(super) fn table(image: &RangeImage, map: &RegionMap) -> Option<u16> {
                 across((column, row), (column, row + 1));
             }
             let at_frame = column == 0 || row == 0 || column + 1 == columns || row + 1 == rows;
+            framed += usize::from(at_frame);
             if at_frame && map.label(column, row) != 0 {
-                framed += 1;
                 of_frame[usize::from(map.label(column, row))] += 1;
             }
         }

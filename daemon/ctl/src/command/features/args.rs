@@ -1,9 +1,10 @@
 //! What the user may say, and what follows from it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use scan_files::Units;
 
+use super::train;
 use crate::command::units::UnitName;
 
 /// Recognise the machining features of a part in a scan, without a service
@@ -13,11 +14,13 @@ use crate::command::units::UnitName;
 /// reads. A neural network tells what a feature is by the code of its section (Jun & Park); what is
 /// like nothing that it was taught is told as unknown.
 #[derive(Debug, clap::Args)]
-#[command(arg_required_else_help = true)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(crate) struct Args {
+    #[command(subcommand)]
+    pub(super) action: Option<Action>,
     /// The scan file
-    #[arg(value_name = "SCAN")]
-    pub(super) scan: PathBuf,
+    #[arg(value_name = "SCAN", required = true)]
+    scan: Option<PathBuf>,
     /// Where to write the features; default: the scan's name with the ending .features.json, in the
     /// current directory
     #[arg(short, long, value_name = "OUT.json")]
@@ -46,14 +49,25 @@ pub(crate) struct Args {
     pub(super) threads: usize,
 }
 
+#[derive(Debug, clap::Subcommand)]
+pub(super) enum Action {
+    Train(train::Args),
+}
+
 impl Args {
+    /// The scan file; clap has seen to it that there is one.
+    pub(super) fn scan(&self) -> &Path {
+        self.scan.as_deref().unwrap_or(Path::new(""))
+    }
+
     pub(super) fn units(&self) -> Option<Units> {
         self.units.map(UnitName::units)
     }
 
     /// Name of the part in pictures and files.
     pub(super) fn name(&self) -> String {
-        let stem = self.scan.file_stem().unwrap_or(self.scan.as_os_str());
+        let scan = self.scan();
+        let stem = scan.file_stem().unwrap_or(scan.as_os_str());
         let stem = stem.to_string_lossy();
         stem.split('.').next().unwrap_or("part").to_owned()
     }

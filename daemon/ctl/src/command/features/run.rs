@@ -29,7 +29,7 @@ pub(super) struct Recognised {
 }
 
 /// Recognises; Ctrl-C ends it without leaving half a file.
-pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
+pub(super) async fn run(args: Args, json: bool) -> Result<(), Failure> {
     let found = shown::work("recognition", move |shown| of_file(&args, shown)).await?;
     for warning in &found.warnings {
         eprintln!("relief: note: {warning}");
@@ -41,7 +41,7 @@ fn of_file(args: &Args, shown: &Shown) -> Result<Recognised, Failure> {
     let output = args.output();
     for written in std::iter::once(&output).chain(&args.picture) {
         places::check_file(written)?;
-        if convert::same_file(written, &args.scan) {
+        if convert::same_file(written, args.scan()) {
             return Err(Failure::Usage(format!(
                 "{} is the scan itself; name another file",
                 written.display()
@@ -49,7 +49,7 @@ fn of_file(args: &Args, shown: &Shown) -> Result<Recognised, Failure> {
         }
     }
     let network = network(&args.network)?;
-    let mut scan = input::read(&args.scan, args.units())?;
+    let mut scan = input::read(args.scan(), args.units())?;
     scan.columns.sort_by(range_image::Column::compare_x);
     let settings = Settings {
         teller: match args.classes_by_chance {
@@ -67,7 +67,7 @@ fn of_file(args: &Args, shown: &Shown) -> Result<Recognised, Failure> {
     .map_err(|error| Failure::at("cannot recognise features", &error))?
     .map_err(|error| match error {
         RecogniseError::Cancelled(_) => Failure::Interrupted,
-        other => Failure::at(args.scan.display(), &other),
+        other => Failure::at(args.scan().display(), &other),
     })?;
     let seconds = began.elapsed().as_secs_f64();
     let file = FeaturesFile::of(&recognition);
@@ -83,7 +83,7 @@ fn of_file(args: &Args, shown: &Shown) -> Result<Recognised, Failure> {
     let mut warnings: Vec<String> = scan
         .notes
         .iter()
-        .map(|note| format!("{}: {note}", args.scan.display()))
+        .map(|note| format!("{}: {note}", args.scan().display()))
         .collect();
     warnings.extend(recognition.notes.iter().cloned());
     Ok(Recognised {
