@@ -4,6 +4,7 @@
 //! neural networks*: a scan is divided into regions of one feature each, the section curve of a
 //! region is put in a code of a few digits, and a small network tells its class by that.
 
+pub mod arrangement;
 pub mod border;
 pub mod candidate;
 mod chance;
@@ -24,3 +25,4 @@ pub mod recognise;
 pub mod reduce;
 pub mod regions;
 pub mod section;
+pub mod treatment;

@@ -3,11 +3,12 @@
 use range_image::{Cancelled, Column, Monitor, RangeImage};
 use segment::SegmentError;
 
+use crate::arrangement::{Pattern, patterns};
 use crate::candidate::{Candidate, Lie, candidates, frame_of, top};
 use crate::chance::Chance;
 use crate::class::Class;
 use crate::code::{Attributes, Form, Sense, code, written};
-use crate::feature::Feature;
+use crate::feature::{Dimension, Feature};
 use crate::field::{FieldError, field};
 use crate::frame::Frame;
 use crate::levels::levels;
@@ -18,6 +19,7 @@ use crate::outline::witnesses::Sight;
 use crate::plane::Plane;
 use crate::regions::{least_step_mm, regions};
 use crate::section::section;
+use crate::treatment::{Kind, Treatment, treatments};
 
 /// Class of what the network has no answer for.
 pub const UNKNOWN: &str = "unknown";
@@ -47,6 +49,8 @@ pub struct Settings<'a> {
 pub struct Recognition {
     /// Features, the block first, parents before what they hold.
     pub features: Vec<Feature>,
+    /// Equal holes in rows and on circles.
+    pub patterns: Vec<Pattern>,
     /// The plan: its third axis is the features' axis.
     pub frame: Frame,
     /// The range image that they were found in.
@@ -123,7 +127,18 @@ pub fn recognise(
         let parent_id = parent.and_then(|p| ids[p]);
         features.push(feature(&sight, candidate, settings, step_mm, id, parent_id));
     }
+    let treated = treatments(&sight, &found);
+    for treatment in treated {
+        let id = u32::try_from(features.len()).unwrap_or(u32::MAX);
+        let Some(parent) = ids[treatment.of] else {
+            continue;
+        };
+        let of = features.iter().find(|f| f.id == parent).cloned();
+        features.extend(of.map(|of| edge(&sight, &treatment, &of, id)));
+    }
+    let patterns = patterns(&features);
     Ok(Recognition {
+        patterns,
         features,
         table: levels.levels[0].plane,
         frame,
@@ -219,6 +234,10 @@ fn feature(
 fn by_place(class: String, lie: Lie, parent: Option<u32>) -> String {
     let is = |own: Class| class == own.as_str();
     match lie {
+        // Rings and cones are features of their own, on the hole or of its edge.
+        Lie::Hollow if is(Class::CountersunkHole) || is(Class::SteppedHole) => {
+            Class::Hole.as_str().to_owned()
+        }
         Lie::Raised if is(Class::Block) && parent.is_some() => Class::Boss.as_str().to_owned(),
         Lie::Body if is(Class::Boss) => Class::Block.as_str().to_owned(),
         _ => class,
@@ -261,5 +280,50 @@ fn told(
             let class = classes.get(drawn).cloned();
             (class.unwrap_or_else(|| UNKNOWN.to_owned()), 0.0)
         }
+    }
+}
+
+/// A treated edge as a feature of its own.
+fn edge(sight: &Sight<'_>, treatment: &Treatment, of: &Feature, id: u32) -> Feature {
+    let mut dimensions = Vec::new();
+    let mut add = |name, value_mm, sigma_mm| {
+        dimensions.push(Dimension {
+            name,
+            value_mm,
+            sigma_mm,
+        });
+    };
+    match (treatment.kind, of.outline) {
+        (Kind::Countersink, Shape::Circle(circle)) => {
+            let own = of.dimension("diameter").map_or(0.0, |d| d.sigma_mm);
+            let sigma = (own * own + 4.0 * treatment.sigma_mm * treatment.sigma_mm).sqrt();
+            add(
+                "diameter",
+                2.0 * (circle.radius_mm + treatment.size_mm),
+                sigma,
+            );
+            add("depth", treatment.rise_mm, treatment.sigma_mm);
+        }
+        (Kind::Fillet | Kind::Round, _) => add("radius", treatment.size_mm, treatment.sigma_mm),
+        (Kind::Chamfer | Kind::Countersink, _) => {
+            add("width", treatment.size_mm, treatment.sigma_mm);
+        }
+    }
+    let local = sight.frame.local(of.centre_mm);
+    Feature {
+        id,
+        parent: Some(of.id),
+        class: treatment.kind.as_str().to_owned(),
+        score: treatment.score,
+        code: String::new(),
+        centre_mm: sight.frame.world([local[0], local[1], treatment.level_mm]),
+        centre_sigma_mm: of.centre_sigma_mm,
+        axis: of.axis,
+        direction: of.direction,
+        dimensions,
+        outline: of.outline,
+        heights_mm: (treatment.level_mm, None),
+        through: false,
+        warnings: Vec::new(),
     }
 }

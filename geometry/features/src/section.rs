@@ -135,9 +135,7 @@ fn floor(sight: &Sight<'_>, candidate: &Candidate, x_mm: f64, y_mm: f64) -> Opti
     let level = candidate.levels.first()?;
     if let Some(tip) = candidate.tip {
         // What a drill leaves at the bottom is no floor to be told by.
-        let [u, v, _] = sight
-            .frame
-            .local(nalgebra::Vector3::new(x_mm, y_mm, 0.0));
+        let [u, v, _] = sight.frame.local(nalgebra::Vector3::new(x_mm, y_mm, 0.0));
         return Some(sight.frame.world([u, v, tip.shoulder_mm]).z);
     }
     match sight.levels.levels[usize::from(*level)].plane.as_ref() {

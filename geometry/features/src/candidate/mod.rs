@@ -201,7 +201,9 @@ fn host(levels: &Levels, own: &Border, lie: Lie) -> Option<u16> {
     let all: usize = counts.iter().sum();
     let height = |index: usize| {
         let plane = levels.levels[index].plane.as_ref();
-        plane.map_or(f64::NEG_INFINITY, |p| p.z_mm(p.middle_mm[0], p.middle_mm[1]))
+        plane.map_or(f64::NEG_INFINITY, |p| {
+            p.z_mm(p.middle_mm[0], p.middle_mm[1])
+        })
     };
     let found = (0..counts.len()).filter(|k| counts[*k] > 0);
     let index = match lie {

@@ -33,7 +33,13 @@ pub(super) fn tip(sight: &Sight<'_>, level: u16, shape: &Shape) -> Option<Tip> {
     let image = &sight.field.image;
     let rows = sight.levels.rows;
     let mut places = Vec::new();
-    for (node, _) in sight.levels.labels.iter().enumerate().filter(|(_, l)| **l == level) {
+    for (node, _) in sight
+        .levels
+        .labels
+        .iter()
+        .enumerate()
+        .filter(|(_, l)| **l == level)
+    {
         let (column, row) = (node / rows, node % rows);
         if let Some(z_mm) = image.z_mm(column, row) {
             let point = nalgebra::Vector3::new(image.x_mm(column), image.y_mm(row), z_mm);
@@ -76,7 +82,11 @@ pub(crate) fn line(places: &[(f64, f64)], noise_mm: f64) -> Option<([f64; 2], f6
         found = Some((line, rms, kept.len()));
         let mut sizes: Vec<f64> = places.iter().map(|p| off(p).abs()).collect();
         let within = 3.5 * (crate::field::median(&mut sizes)? / 0.6745).max(0.3 * noise_mm);
-        kept = places.iter().copied().filter(|p| off(p).abs() <= within).collect();
+        kept = places
+            .iter()
+            .copied()
+            .filter(|p| off(p).abs() <= within)
+            .collect();
     }
     found
 }

@@ -105,7 +105,10 @@ fn sides(along: &[[f64; 2]], axis: usize) -> [f64; 2] {
         let best = near.max_by_key(|v| {
             let inside = own.iter().filter(|o| (*o - *v).abs() <= window).count();
             // Of equally dense places the outermost.
-            (inside, std::cmp::Reverse((outward(**v) / window * 16.0) as i64))
+            (
+                inside,
+                std::cmp::Reverse((outward(**v) / window * 16.0) as i64),
+            )
         });
         let Some(best) = best else { return own[0] };
         let mut around: Vec<f64> = own

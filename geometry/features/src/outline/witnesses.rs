@@ -63,7 +63,8 @@ pub fn witnesses(sight: &Sight<'_>, pairs: &[Pair]) -> Vec<Witness> {
         Column::new(x_mm.unwrap_or(0.0) + step, Vec::new())
     };
     // Beyond its last columns and rays, too, the scan has none.
-    let before = (1..=BEYOND).map(|k| empty(sight.columns.first().map(Column::x_mm), -f64::from(k)));
+    let before =
+        (1..=BEYOND).map(|k| empty(sight.columns.first().map(Column::x_mm), -f64::from(k)));
     let behind = (1..=BEYOND).map(|k| empty(sight.columns.last().map(Column::x_mm), f64::from(k)));
     let beyond: Vec<Column> = before.chain(behind).collect();
     for column in sight.columns.iter().chain(&beyond) {

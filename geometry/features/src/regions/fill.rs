@@ -132,7 +132,9 @@ fn spread(divided: &mut Regions, piece: &[usize], may: &dyn Fn(u16) -> bool) {
             .iter()
             .filter_map(|&node| {
                 let near = divided.neighbours(node).map(|o| divided.labels[o]);
-                near.filter(|l| *l != NONE && may(*l)).min().map(|label| (node, label))
+                near.filter(|l| *l != NONE && may(*l))
+                    .min()
+                    .map(|label| (node, label))
             })
             .collect();
         if given.is_empty() {

@@ -27,7 +27,8 @@ pub(super) fn unlabel(
         let Some(surface) = (*label != NONE && index > 0).then(|| surfaces.get(index - 1)) else {
             continue;
         };
-        let Some(surface) = surface.filter(|s| s.plane.share >= PLANE_SHARE && s.lies_flat(noise_mm))
+        let Some(surface) =
+            surface.filter(|s| s.plane.share >= PLANE_SHARE && s.lies_flat(noise_mm))
         else {
             continue;
         };
