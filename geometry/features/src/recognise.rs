@@ -96,9 +96,9 @@ pub fn recognise(
     settings: &Settings<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Recognition, RecogniseError> {
-    let field = field(columns, camera_mm, monitor)?;
+    let mut field = field(columns, camera_mm, monitor)?;
     let step_mm = least_step_mm(&field);
-    let regions = regions(&field, columns, monitor)?;
+    let regions = regions(&mut field, columns, monitor)?;
     let levels = levels(&field.image, &regions, step_mm);
     let top = top(&regions, &levels, step_mm).ok_or(RecogniseError::NoTop)?;
     let frame = frame_of(&top);

@@ -111,6 +111,7 @@ fn cut(sight: &Sight<'_>, candidate: &Candidate, across: &Across, beside_mm: f64
         ];
         let point = sight.frame.world([place[0], place[1], 0.0]);
         let Some(node) = sight.regions.node(image, point.x, point.y) else {
+            points.extend(unseen(sight, candidate).map(|z_mm| [s, z_mm]));
             continue;
         };
         let level = sight.levels.labels[node];
@@ -120,7 +121,9 @@ fn cut(sight: &Sight<'_>, candidate: &Candidate, across: &Across, beside_mm: f64
         let height = if is_inside && (!is_own || candidate.tip.is_some()) {
             floor(sight, candidate, point.x, point.y)
         } else {
-            crate::levels::height(image, sight.regions, node).or_else(|| unseen(sight, candidate))
+            face(sight, node, point.x, point.y)
+                .or_else(|| crate::levels::height(image, sight.regions, node))
+                .or_else(|| unseen(sight, candidate))
         };
         if let Some(z_mm) = height {
             points.push([s, z_mm]);
@@ -128,6 +131,16 @@ fn cut(sight: &Sight<'_>, candidate: &Candidate, across: &Across, beside_mm: f64
     }
     let ends = across.ends;
     (own, Cut { points, ends })
+}
+
+/// Chamfers and fillets are features of their own: their strips are put back to the faces and
+/// floors that they are cut from.
+fn face(sight: &Sight<'_>, node: usize, x_mm: f64, y_mm: f64) -> Option<f64> {
+    let region = sight.regions.labels[node];
+    let mut strips = sight.levels.strips.iter();
+    let strip = strips.find(|strip| strip.region == region)?;
+    let plane = sight.levels.levels[usize::from(strip.level)].plane?;
+    Some(plane.z_mm(x_mm, y_mm))
 }
 
 /// The candidate's own floor at a place.

@@ -121,31 +121,27 @@ fn treatment(
     strips: &[Strip],
 ) -> Option<Treatment> {
     let candidate = &found[of];
-    let image = &sight.field.image;
-    let rows = sight.regions.rows;
     let level = sight
         .levels
         .levels
         .get(usize::from(strips.first()?.level))?;
     let plane = level.plane?;
-    // Distance beyond the outline, and height off the face or floor that it runs out in.
-    let mut places = Vec::new();
-    for (node, region) in sight.regions.labels.iter().enumerate() {
-        if !strips.iter().any(|strip| strip.region == *region) {
-            continue;
-        }
-        let (column, row) = (node / rows, node % rows);
-        if let Some(z_mm) = image.z_mm(column, row) {
-            let (x, y) = (image.x_mm(column), image.y_mm(row));
-            let [u, v, _] = sight.frame.local(nalgebra::Vector3::new(x, y, z_mm));
-            let off = (z_mm - plane.z_mm(x, y)) * sight.frame.axes[2].z;
-            places.push((candidate.outline.shape.distance_mm([u, v]).abs(), off.abs()));
-        }
-    }
+    // Distance from the outline, and height off the face or floor that it runs out in.
+    let is_strip = |region: u16| strips.iter().any(|strip| strip.region == region);
+    let places: Vec<(f64, f64)> = sight
+        .samples(&is_strip)
+        .into_iter()
+        .map(|[u, v, w]| {
+            let at = sight.frame.world([u, v, w]);
+            let off = (at.z - plane.z_mm(at.x, at.y)) * sight.frame.axes[2].z;
+            (candidate.outline.shape.distance_mm([u, v]).abs(), off.abs())
+        })
+        .collect();
     if places.len() < FEWEST {
         return None;
     }
-    let ([at_outline, slope], rms, count) = line(&places, sight.field.noise_mm)?;
+    let fitted = line(&places, sight.field.noise_mm)?;
+    let (at_outline, slope) = (fitted.at_zero, fitted.slope);
     if slope >= -0.1 {
         return None;
     }
@@ -166,8 +162,7 @@ fn treatment(
     };
     let at = sight.frame.world([middle[0], middle[1], 0.0]);
     let level_mm = (plane.z_mm(at.x, at.y) - at.z) * sight.frame.axes[2].z;
-    let score = count as f64 / places.len() as f64;
-    let spread = rms / (count as f64).sqrt();
+    let score = fitted.count as f64 / places.len() as f64;
     match kind {
         Kind::Fillet | Kind::Round => {
             let (radius, sigma_mm) = radius(&places)?;
@@ -185,8 +180,7 @@ fn treatment(
             kind,
             of,
             size_mm: width,
-            // Of the line at its middle, carried on to where it ends.
-            sigma_mm: 4.0 * spread / slope.abs(),
+            sigma_mm: fitted.sigma_mm(width) / slope.abs(),
             rise_mm: at_outline,
             level_mm,
             score,
