@@ -133,8 +133,14 @@ pub fn recognise(
         let Some(parent) = ids[treatment.of] else {
             continue;
         };
-        let of = features.iter().find(|f| f.id == parent).cloned();
-        features.extend(of.map(|of| edge(&sight, &treatment, &of, id)));
+        let Some(of) = features.iter_mut().find(|f| f.id == parent) else {
+            continue;
+        };
+        if treatment.kind == Kind::Round {
+            widen(of, found[treatment.of].lie, &treatment);
+        }
+        let own = edge(&sight, &treatment, of, id);
+        features.push(own);
     }
     let patterns = patterns(&features);
     Ok(Recognition {
@@ -325,5 +331,27 @@ fn edge(sight: &Sight<'_>, treatment: &Treatment, of: &Feature, id: u32) -> Feat
         heights_mm: (treatment.level_mm, None),
         through: false,
         warnings: Vec::new(),
+    }
+}
+
+/// Moves the outline of a feature with a rounded edge to where that is steep.
+fn widen(of: &mut Feature, lie: Lie, round: &Treatment) {
+    let outwards = match lie {
+        Lie::Hollow => -round.beyond_mm,
+        Lie::Body | Lie::Raised => round.beyond_mm,
+    };
+    for dimension in &mut of.dimensions {
+        if ["diameter", "length", "width"].contains(&dimension.name) {
+            dimension.value_mm += 2.0 * outwards;
+            let own = dimension.sigma_mm;
+            dimension.sigma_mm = (own * own + 4.0 * round.sigma_mm * round.sigma_mm).sqrt();
+        }
+    }
+    match &mut of.outline {
+        Shape::Circle(circle) => circle.radius_mm += outwards,
+        Shape::Rectangle(own) => {
+            own.first_mm = [own.first_mm[0] - outwards, own.first_mm[1] + outwards];
+            own.second_mm = [own.second_mm[0] - outwards, own.second_mm[1] + outwards];
+        }
     }
 }

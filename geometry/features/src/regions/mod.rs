@@ -4,6 +4,7 @@
 //! are what its walls hide from laser or sensor. Where nothing lower does, they are a hollow whose
 //! floor is not seen.
 
+mod bottoms;
 mod crumbs;
 mod fill;
 mod hidden;
@@ -130,6 +131,7 @@ pub fn regions(
     };
     hidden::hidden(&padded, &mut divided, step_mm);
     fill::fill(&padded, &mut divided, step_mm);
+    bottoms::bottoms(&mut divided, field.noise_mm);
     field.image = padded;
     Ok(divided)
 }
