@@ -85,7 +85,7 @@ def add(plan, made, state):
 def some_ground(plan, state, deepest=2):
     """Any ground that is not too deep in the tree; those on features as often as the block's top."""
     fit = [ground for ground in state.grounds if ground.level <= deepest]
-    if len(fit) > 1 and plan.dice.random() < 0.6:
+    if len(fit) > 1 and plan.dice.random() < 0.7:
         return plan.dice.choice(fit[1:])
     return fit[0]
 
@@ -125,7 +125,7 @@ def finish(plan, made, feature, footprint, z, foot_z, width, kind=None):
         made.tell("fillet", feature, footprint, foot_z, foot_z + width, {"radius": width})
 
 
-def finishing(plan, height, share=0.25):
+def finishing(plan, height, share=0.35):
     """What is done to a feature's edges, and how wide: nothing mostly."""
     if plan.dice.random() >= share or height < 5.0 * plan.pitch + 1.0:
         return None, 0.0
@@ -481,5 +481,5 @@ def channel(plan, made, state):
     ground.take(own)
 
 
-KINDS = ((pocket, 4.0), (boss, 3.5), (hole, 4.0), (pattern, 1.0), (slot, 2.5), (step, 2.5),
-         (channel, 1.2))
+KINDS = ((pocket, 4.0), (boss, 3.5), (hole, 4.0), (pattern, 1.6), (slot, 2.5), (step, 2.5),
+         (channel, 2.5))
