@@ -43,7 +43,7 @@ SECOND, SECOND_AT, SECOND_CORNER = (50.0, 8.5), (46.8, 16.75), 4.0
 FREE_POINT = (25.12, 17.97, -14.87)
 # Of columns and samples: about 33,000 samples of the part come back.
 PITCH_MM = 0.3795
-MARGIN_MM = 8.0
+MARGIN_MM = 4.0
 
 
 def free_form():

@@ -3,6 +3,8 @@
 
 use std::fs;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+use std::thread;
 
 use anyhow::{Context, Result};
 use range_image::{Calibration, calibration::Head};
@@ -147,4 +149,33 @@ fn header(scanner: &Scanner, sweep: &Sweep) -> Result<Header> {
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// Scans those parts of a folder that have no scan yet, on all processors.
+pub(crate) fn all(folder: &Path, names: &[String]) -> Result<()> {
+    let open = Mutex::new(names.iter());
+    let next = || open.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let work = || -> Result<()> {
+        while let Some(name) = next() {
+            // Written last: where it is, the scan is whole.
+            if folder.join(format!("{name}.seen.json")).exists() {
+                continue;
+            }
+            let seen = scan(folder, name).with_context(|| format!("part {name}"))?;
+            eprintln!(
+                "{name}: {} samples, {} of the part, {} of the table",
+                seen.samples, seen.on_part, seen.on_table
+            );
+        }
+        Ok(())
+    };
+    let threads = thread::available_parallelism().map_or(1, usize::from);
+    thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        workers.into_iter().try_for_each(|worker| {
+            worker
+                .join()
+                .map_err(|_| anyhow::anyhow!("a scan was lost to a panic"))?
+        })
+    })
 }
