@@ -14,6 +14,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 
 import solids
 import truth
+from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_Transform
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepTools import BRepTools
@@ -22,6 +23,7 @@ from OCP.IFSelect import IFSelect_RetDone
 from OCP.Interface import Interface_Static
 from OCP.Message import Message
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
+from OCP.TCollection import TCollection_HAsciiString
 from OCP.collections import Array2_double
 from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 
@@ -314,6 +316,11 @@ def write_step(path, solid):
     # Curves on surfaces can be computed from the edges and would be most of the file.
     Interface_Static.SetIVal_s("write.surfacecurve.mode", 0)
     writer.Transfer(solid, STEPControl_AsIs)
+    # The same part gives the same file.
+    header = APIHeaderSection_MakeHeader(writer.Model())
+    header.SetTimeStamp(TCollection_HAsciiString("1970-01-01T00:00:00"))
+    header.SetName(TCollection_HAsciiString("part"))
+    header.SetAuthorValue(1, TCollection_HAsciiString(""))
     if writer.Write(path) != IFSelect_RetDone:
         raise solids.Failed(f"cannot write {path}")
 

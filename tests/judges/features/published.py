@@ -11,12 +11,12 @@ lie, nor how high the boss and how deep the hole are, and its picture shows no n
 - The first pocket lies in the middle of the block, its corners of radius 3; its floor at -7.85, its
   depth in the table. The centres of boss and hole were measured, at -7.60 and -7.58; here they lie
   on the floor.
-- The boss is 6 high, the hole 10 deep with a flat bottom.
+- The boss is 4 high, the hole 10 deep with a flat bottom.
 - The slot comes in from the block's side at y = 0, through the wall of the first pocket, over its
   floor and into the floor of the second: so it lies on the floors of both, and its three sizes are
   those of the table, its depth from the block's top, where it is open to. Its length is along its
   run, shorter than it is wide.
-- The second pocket is 50 by 8.5 with corners of radius 4, below the boss, under whose foot 1.6 mm
+- The second pocket is 50 by 8.5 with corners of radius 4, below the boss, beside whose foot 2 mm
   of floor are left, and about the point (25.12, 17.97, -14.87), which lies on its bottom. The slot
   crosses it in the middle: its ends, and a ledge behind the slot's end, remain.
 """
@@ -36,10 +36,10 @@ from parts import ABOVE, Circle, Part, Rectangle
 LENGTH, WIDTH, HEIGHT = 100.871, 50.160, 23.762
 FLOOR = -7.85
 POCKET = (79.811, 28.557)
-BOSS, BOSS_AT, BOSS_HIGH = 8.026, (20.29, 24.95), 6.0
+BOSS, BOSS_AT, BOSS_HIGH = 8.026, (20.29, 24.95), 4.0
 HOLE, HOLE_AT, HOLE_DEEP = 8.019, (79.99, 25.25), 10.0
 SLOT_LENGTH, SLOT_WIDTH, SLOT_DEEP, SLOT_X = 18.36, 20.211, 14.436, 48.0
-SECOND, SECOND_AT, SECOND_CORNER = (50.0, 8.5), (46.8, 16.75), 4.0
+SECOND, SECOND_AT, SECOND_CORNER = (50.0, 8.5), (47.4, 16.75), 4.0
 FREE_POINT = (25.12, 17.97, -14.87)
 # Of columns and samples: about 33,000 samples of the part come back.
 PITCH_MM = 0.3795
