@@ -399,6 +399,10 @@ def slot(plan, made, state):
     made.solid = solids.cut(made.solid, tool.prism(-depth, ABOVE))
     made.tell("slot", 0, own, 0.0, -depth, {"length": length, "width": width, "depth": depth},
               open_ends=2 if is_through else 1, round_end=corner > 0.0)
+    if corner:
+        made.features[-1]["outline_mm"] = [(min(max(x, 0.0), made.size[0]),
+                                            min(max(y, 0.0), made.size[1]))
+                                           for x, y in tool.outline()]
     ground.take(own)
 
 

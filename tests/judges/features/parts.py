@@ -8,10 +8,12 @@ block's top at z = 0, the part below. `placed` turns it about z and moves it int
 import json
 import math
 import os
+import random
 import sys
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "parts"))
 
+import numpy
 import solids
 import truth
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
@@ -28,6 +30,8 @@ from OCP.collections import Array2_double
 from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 
 UP = [0.0, 0.0, 1.0]
+# What is done to the edges of others.
+EDGES = ("chamfer", "round", "fillet")
 # Height of tools above what they cut.
 ABOVE = 40.0
 
@@ -227,29 +231,90 @@ class Part:
         return number
 
 
-def faces_below(faces, triangles, places):
-    """For each place (x, y) the face that is seen there from above; None for none."""
+def from_above(triangles, places):
+    """For each place (x, y) the height there as seen from above, and which triangle is seen; minus
+    infinity and -1 where there is none."""
+    corners = numpy.asarray(triangles, dtype=float)
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    det = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
+    level = numpy.abs(det) > 1e-12
+    which = numpy.flatnonzero(level)
+    a, b, c, det = a[level], b[level], c[level], det[level]
     found = []
     for x, y in places:
-        best, which = -math.inf, None
-        for number, face in enumerate(faces):
-            first = face["first_triangle"]
-            for a, b, c in triangles[first:first + face["triangles"]]:
-                if not (min(a[0], b[0], c[0]) <= x <= max(a[0], b[0], c[0])
-                        and min(a[1], b[1], c[1]) <= y <= max(a[1], b[1], c[1])):
-                    continue
-                det = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
-                if abs(det) < 1e-12:
-                    continue
-                s = ((x - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (y - a[1])) / det
-                t = ((b[0] - a[0]) * (y - a[1]) - (x - a[0]) * (b[1] - a[1])) / det
-                if s < -1e-9 or t < -1e-9 or s + t > 1.0 + 1e-9:
-                    continue
-                z = a[2] + s * (b[2] - a[2]) + t * (c[2] - a[2])
-                if z > best:
-                    best, which = z, number
-        found.append(which)
+        s = ((x - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (y - a[:, 1])) / det
+        t = ((b[:, 0] - a[:, 0]) * (y - a[:, 1]) - (x - a[:, 0]) * (b[:, 1] - a[:, 1])) / det
+        met = (s > -1e-9) & (t > -1e-9) & (s + t < 1.0 + 1e-9)
+        z = numpy.where(met, a[:, 2] + s * (b[:, 2] - a[:, 2]) + t * (c[:, 2] - a[:, 2]), -math.inf)
+        best = int(numpy.argmax(z))
+        found.append((float(z[best]), int(which[best]) if met.any() else -1))
     return found
+
+
+def faces_below(faces, triangles, places):
+    """For each place (x, y) the face that is seen there from above; `None` for none."""
+    of = {}
+    for number, face in enumerate(faces):
+        for k in range(face["triangles"]):
+            of[face["first_triangle"] + k] = number
+    return [of.get(triangle) for _, triangle in from_above(triangles, places)]
+
+
+# Places of a part at which what is told of its features is held against its triangles.
+CHECKED = 150
+
+
+def told_height(features, place):
+    """How high the part is at a place by what is told of its features: least and greatest; `None`
+    near a border, on a broken edge, and on a cone."""
+    low = high = None
+    for told in features:
+        if told["type"] in EDGES:
+            continue
+        outline = told["outline_mm"]
+        border = 0.4 + max((e["dimensions_mm"].get("width", e["dimensions_mm"].get("radius"))
+                            for e in features
+                            if e["parent"] == told["id"] and e["type"] in EDGES), default=0.0)
+        if min(to_segment(place, p, q) for p, q in zip(outline, outline[1:] + outline[:1])) < border:
+            return None
+        if not is_inside(place, outline):
+            continue
+        if told["type"] == "countersink":
+            # Its hole, which comes before it, is seen through it.
+            if not is_inside(place, features[told["parent"]]["outline_mm"]):
+                return None
+            continue
+        low = high = told["floor_z_mm"]
+        if "depth_mm" in told:
+            # The greatest depths are sampled ones.
+            low = told["center_mm"][2] - told["depth_mm"][1] - 0.2
+            high = told["center_mm"][2] - told["depth_mm"][0] + 0.2
+        elif told.get("through"):
+            low = high = -math.inf
+        elif told.get("tip"):
+            r = told["dimensions_mm"]["diameter"] / 2
+            off = math.dist(place, told["center_mm"][:2])
+            low = high = low - (r - off) / math.tan(math.radians(59.0))
+        elif told.get("free_form"):
+            return None
+    return None if low is None else (low, high)
+
+
+def check(features, triangles):
+    """Whether the part is what is told of it: its height at places all over it."""
+    dice = random.Random(len(triangles))
+    outline = features[0]["outline_mm"]
+    low = [min(p[k] for p in outline) for k in range(2)]
+    high = [max(p[k] for p in outline) for k in range(2)]
+    places = [(dice.uniform(low[0], high[0]), dice.uniform(low[1], high[1]))
+              for _ in range(CHECKED)]
+    for told in features:
+        places += [tuple(p) for p in told["probes_mm"]]
+    for place, (height, _) in zip(places, from_above(triangles, places)):
+        expected = told_height(features, place)
+        if expected and not expected[0] - 0.01 <= height <= expected[1] + 0.01:
+            raise ValueError(f"at {place} the part is {height:.3f} high and is told to be "
+                             f"{expected[0]:.3f} to {expected[1]:.3f}")
 
 
 def pose(turn_rad, about, to):
@@ -328,6 +393,7 @@ def write_step(path, solid):
 def write(folder, stem, solid, features, scan, **more):
     """NAME.stl, NAME.step and NAME.json, which is written last: where it is, the rest is whole."""
     own_faces, triangles = faces(solid)
+    check(features, triangles)
     for told in features:
         told["floor_faces"] = faces_below(own_faces, triangles, told["probes_mm"])
         told.pop("probes_mm")

@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
@@ -35,6 +35,8 @@ struct Set {
     parts: Vec<String>,
     /// What the command is told besides.
     words: Vec<OsString>,
+    /// Whether the solids are made and judged, too.
+    with_solids: bool,
 }
 
 struct Study<'a> {
@@ -84,6 +86,11 @@ fn names(seeds: impl Iterator<Item = u64>, name: impl Fn(u64) -> String) -> Vec<
     seeds.map(name).collect()
 }
 
+/// Where the rebuilt solid goes.
+fn step_of(found: &Path, part: &str) -> [OsString; 2] {
+    ["--step".into(), found.join(format!("{part}.step")).into()]
+}
+
 impl Study<'_> {
     fn published(&self) -> impl Iterator<Item = u64> {
         let most = if self.options.short {
@@ -108,6 +115,7 @@ impl Study<'_> {
             name,
             parts,
             words: words.to_vec(),
+            with_solids: words.is_empty(),
         };
         let turned = names(self.published(), |seed| format!("published-5deg-{seed}"));
         let straight = names(self.published(), |seed| format!("published-0deg-{seed}"));
@@ -158,6 +166,16 @@ impl Study<'_> {
 
     /// Runs a script of the judges'; gives what it prints.
     fn python(&self, script: &str, words: &[OsString]) -> Result<Vec<u8>> {
+        let output = self.run_python(script, words)?;
+        ensure!(
+            output.status.success(),
+            "{script} ended with {}",
+            output.status
+        );
+        Ok(output.stdout)
+    }
+
+    fn run_python(&self, script: &str, words: &[OsString]) -> Result<Output> {
         let output = Command::new(&self.options.python)
             .arg("-B")
             .arg(format!("{JUDGES}/{script}"))
@@ -166,12 +184,7 @@ impl Study<'_> {
             .stderr(Stdio::inherit())
             .output()
             .with_context(|| format!("cannot start {}", self.options.python.display()))?;
-        ensure!(
-            output.status.success(),
-            "{script} ended with {}",
-            output.status
-        );
-        Ok(output.stdout)
+        Ok(output)
     }
 
     /// Has the command recognise a scan, and keeps how long it took. Without an answer there is no
@@ -190,8 +203,6 @@ impl Study<'_> {
             .arg(self.parts.join(format!("{part}.scan")))
             .arg("-o")
             .arg(file("features.json"))
-            .arg("--step")
-            .arg(file("step"))
             .args(words)
             .output()
             .with_context(|| format!("cannot start {}", self.relief.display()))?;
@@ -212,7 +223,11 @@ impl Study<'_> {
         fs::create_dir_all(&found).with_context(|| found.display().to_string())?;
         let found = fs::canonicalize(found)?;
         for part in &set.parts {
-            self.recognise(&found, part, &set.words)?;
+            let mut words = set.words.clone();
+            if set.with_solids {
+                words.extend(step_of(&found, part));
+            }
+            self.recognise(&found, part, &words)?;
         }
         let mut words: Vec<OsString> = vec!["--truth".into(), self.parts.clone().into()];
         words.extend(["--found".into(), found.clone().into()]);
@@ -230,7 +245,7 @@ impl Study<'_> {
         let found = fs::canonicalize(found)?;
         let mut fastest = f64::INFINITY;
         for _ in 0..RUNS {
-            let seconds = self.recognise(&found, MILLION, &[])?;
+            let seconds = self.recognise(&found, MILLION, &step_of(&found, MILLION))?;
             fastest = fastest.min(seconds.context("no answer to the scan of a million samples")?);
         }
         let seen = fs::read(self.parts.join(format!("{MILLION}.seen.json")))?;
@@ -277,8 +292,13 @@ impl Study<'_> {
         if self.options.check {
             words.push("--check".into());
         }
-        let said = self.python("report.py", &words)?;
-        print!("{}", String::from_utf8(said)?);
+        let said = self.run_python("report.py", &words)?;
+        print!("{}", String::from_utf8_lossy(&said.stdout));
+        ensure!(
+            said.status.success(),
+            "report.py ended with {}",
+            said.status
+        );
         if let Some((seconds, _)) = million.filter(|_| self.options.check) {
             ensure!(
                 seconds <= MILLION_MOST_S,
