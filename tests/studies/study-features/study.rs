@@ -68,6 +68,10 @@ pub(crate) fn run(options: &JudgeOptions) -> Result<()> {
         parts: fs::canonicalize(parts)?,
         relief: fs::canonicalize(relief)?,
     };
+    eprint!(
+        "{}",
+        String::from_utf8(study.python("judge_check.py", &[])?)?
+    );
     study.make()?;
     let mut verdicts = Vec::new();
     for set in study.sets() {
