@@ -88,14 +88,8 @@ def judged(step, stl, truth, seen):
     BRepGProp.VolumeProperties_s(shape, found)
     deviations = {}
     for point, face in visible_points(stl, truth, seen):
-        vertex = BRepBuilderAPI_MakeVertex(gp_Pnt(*map(float, point))).Vertex()
-        # From the shells: within a solid every point is at no distance.
-        least = math.inf
-        for shell in shells:
-            distance = BRepExtrema_DistShapeShape(vertex, shell)
-            if distance.IsDone():
-                least = min(least, distance.Value())
-        deviations.setdefault(face, []).append(least)
+        deviations.setdefault(face, []).append(distance_to(shells, point))
+    free = [distance_to(shells, p) for f in truth["features"] for p in f.get("points_mm", [])]
     everything = [d for own in deviations.values() for d in own]
     return {
         "is_read": True,
@@ -109,7 +103,19 @@ def judged(step, stl, truth, seen):
         "most_mm": max(everything, default=0.0),
         "faces_off": sum(rms(own) > 0.1 for own in deviations.values()),
         "faces_judged": len(deviations),
+        "free_points_mm": free,
     }
+
+
+def distance_to(shells, point):
+    """From the shells, not the solid: within that every point is at no distance."""
+    vertex = BRepBuilderAPI_MakeVertex(gp_Pnt(*map(float, point))).Vertex()
+    least = math.inf
+    for shell in shells:
+        distance = BRepExtrema_DistShapeShape(vertex, shell)
+        if distance.IsDone():
+            least = min(least, distance.Value())
+    return least
 
 
 def rms(values):
