@@ -38,8 +38,8 @@ measured again; ours are of what is recognised alone, on simulated scans whose t
 part is the paper's completed where its text leaves it open; `tests/judges/features/published.py`
 says how, and `docs/pictures/features/published.step` is the part. The centres of boss and hole lie
 on the pocket's floor here, at -7.85; the paper's -7.60 and -7.58 are measured. The paper states
-1.470 mm for the error of row 8, where its numbers differ by 0.530, and the mean of its errors as
-0.8 mm."""
+1.470 mm for the error of row 8, where its numbers differ by 0.530, and 0.8 mm for the mean of its
+errors, where the printed ones come to 0.61."""
 
 
 TEXT = """\
