@@ -126,6 +126,7 @@ fn full() -> anyhow::Result<()> {
         gmsh: true,
         within_s: Some(SLOWEST_S),
         no_recorded: false,
+        features: false,
         out: None,
     })?;
     peers::run(&peers::Peers::Skin(peers::Options { short: false }))?;
