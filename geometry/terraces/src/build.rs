@@ -6,7 +6,7 @@ use crate::emit::{Emit, cell_volume};
 use crate::error::{BuildError, Warning};
 use crate::field::{Field, settle};
 use crate::outline::Outline;
-use crate::part::Part;
+use crate::part::{Operation, Part};
 use crate::plan::P2;
 use crate::regions::Scene;
 use crate::shell::Shell;
@@ -155,21 +155,12 @@ impl Part {
         };
         let mut scene = plain(self)?;
         let mut warnings = Vec::new();
-        let settled = settle(&mut scene).and_then(|field| {
-            let treated = self
-                .operations
-                .iter()
-                .any(|o| o.upper.is_some() || o.lower.is_some());
-            if !treated && self.upper.is_none() {
-                return Ok((field, None));
-            }
-            Ok((field, Some(())))
-        });
-        let (mut field, is_treated) = match settled {
-            Ok(settled) => settled,
+        let mut field = match settle(&mut scene) {
+            Ok(field) => field,
             Err(torn) => return Ok(Err(failed(torn.at, "its outline meets others ambiguously"))),
         };
-        if is_treated.is_some() {
+        let has_edges = |o: &Operation| o.upper.is_some() || o.lower.is_some();
+        if self.upper.is_some() || self.operations.iter().any(has_edges) {
             let mut target = Scene::new(self);
             for (index, outline) in outlines.iter().enumerate() {
                 target.add_operation(self, index, outline)?;
@@ -344,9 +335,9 @@ fn largest(field: &mut Field, scene: &Scene) -> usize {
         .iter()
         .copied()
         .max_by(|&a, &b| volumes[a].total_cmp(&volumes[b]));
-    for cell in 1..count {
-        if Some(roots[cell]) != kept {
-            field.surface[cell] = 0;
+    for (surface, root) in field.surface.iter_mut().zip(&roots) {
+        if Some(*root) != kept {
+            *surface = 0;
         }
     }
     parts.len()

@@ -56,7 +56,7 @@ fn evaluate(plan: Arrangement, scene: &mut Scene) -> Field {
         .collect();
     for index in 0..scene.regions.len() {
         let region = scene.regions[index].clone();
-        for cell in 1..plan.cells.len() {
+        for (cell, samples) in samples.iter().enumerate().skip(1) {
             if !plan.cells[cell].within[index] || !is_block[cell] {
                 continue;
             }
@@ -67,18 +67,18 @@ fn evaluate(plan: Arrangement, scene: &mut Scene) -> Field {
                     continue;
                 }
                 Rule::Lower { ceiling } => {
-                    let top = extreme(&scene.heights[old], &samples[cell], 1.0);
+                    let top = extreme(&scene.heights[old], samples, 1.0);
                     (1.0, top > ceiling + LEVEL_MM)
                 }
                 Rule::Lift { floor } => {
-                    let low = -extreme(&scene.heights[old], &samples[cell], -1.0);
+                    let low = -extreme(&scene.heights[old], samples, -1.0);
                     (-1.0, low < floor - LEVEL_MM)
                 }
             };
             if is_kept || old == region.height {
                 continue;
             }
-            let change = compare(scene, region.height, old, sign, &samples[cell]);
+            let change = compare(scene, region.height, old, sign, samples);
             let is_new = match change {
                 Change::None => false,
                 Change::All => true,
@@ -96,10 +96,10 @@ fn evaluate(plan: Arrangement, scene: &mut Scene) -> Field {
         }
         field.after.push(field.surface.clone());
     }
-    for cell in 1..plan.cells.len() {
+    for (cell, samples) in samples.iter().enumerate().skip(1) {
         let old = field.surface[cell];
         let is_void = old != 0
-            && match compare(scene, 0, old, -1.0, &samples[cell]) {
+            && match compare(scene, 0, old, -1.0, samples) {
                 Change::None => false,
                 Change::All => true,
                 Change::Some { most } => {

@@ -118,7 +118,7 @@ impl Outline {
                 [center[0] + sx * r, center[1]],
             );
             // Corners are entered along x at the first and third, along y at the others.
-            let (enter, leave) = if k % 2 == 0 {
+            let (enter, leave) = if k == 0 || k == 2 {
                 (on_x, on_y)
             } else {
                 (on_y, on_x)

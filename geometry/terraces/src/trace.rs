@@ -27,7 +27,6 @@ pub(crate) enum Exact {
 
 /// The curve, if it has a closed form.
 pub(crate) fn exact(on: &Support, from: f64, to: f64, height: &Height) -> Option<Exact> {
-    let flat = |p: P2| [p[0], p[1], 0.0];
     let up = [0.0, 0.0, 1.0];
     match (*on, height) {
         (Support::Line { .. }, Height::Level { .. } | Height::Plane { .. }) => Some(Exact::Line),
@@ -122,7 +121,6 @@ pub(crate) fn exact(on: &Support, from: f64, to: f64, height: &Height) -> Option
             Some(upright([center[0], center[1], *z], d, long, *r, *side))
         }
         (_, Height::Bar { .. } | Height::Cone { .. } | Height::Ring { .. } | Height::Spline(_)) => {
-            let _ = flat;
             None
         }
     }
@@ -268,17 +266,15 @@ fn slopes(points: &[[f64; 3]], h: &[f64]) -> Vec<[f64; 3]> {
         let ([_, diagonal, above], right) = rows[k - 1];
         let by = rows[k].0[0] / diagonal;
         rows[k].0[1] -= by * above;
-        for d in 0..3 {
-            rows[k].1[d] -= by * right[d];
+        for (own, right) in rows[k].1.iter_mut().zip(right) {
+            *own -= by * right;
         }
     }
     let mut slopes = vec![[0.0; 3]; n + 1];
     for k in (0..=n).rev() {
         let ([_, diagonal, above], right) = rows[k];
-        for d in 0..3 {
-            let next = if k < n { above * slopes[k + 1][d] } else { 0.0 };
-            slopes[k][d] = (right[d] - next) / diagonal;
-        }
+        let next = if k < n { slopes[k + 1] } else { [0.0; 3] };
+        slopes[k] = core::array::from_fn(|d| (right[d] - above * next[d]) / diagonal);
     }
     slopes
 }

@@ -159,9 +159,8 @@ fn add(
     for band in made {
         let height = target.height(band.height, 1e-9);
         let mut bounds = outline.bounds();
-        for k in 0..2 {
-            bounds[0][k] -= treatment.width_mm();
-            bounds[1][k] += treatment.width_mm();
+        for (bound, by) in bounds.iter_mut().zip([-1.0, 1.0]) {
+            *bound = bound.map(|c| c + by * treatment.width_mm());
         }
         let region = Region {
             operation: index,
