@@ -3,6 +3,8 @@
 
 #![allow(clippy::disallowed_types)]
 
+// Terraces' own tests build these parts, too.
+#[path = "../../terraces/tests/random/mod.rs"]
 mod random;
 
 use std::collections::BTreeMap;
