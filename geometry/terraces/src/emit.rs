@@ -1,6 +1,6 @@
 //! From joined faces and edges to curves and surfaces in space.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nurbs::BSplineSurface;
@@ -9,12 +9,16 @@ use crate::field::Field;
 use crate::height::Height;
 use crate::part::{Frame, Part};
 use crate::plan::{
-    P2, Piece, Support, add, angle, area, distance, dot, left, norm, polar, scale, sub,
+    P2, Piece, Support, add, angle, area, distance, dot, left, norm, polar, positive, scale, sub,
 };
 use crate::regions::{Region, Role};
 use crate::shell::{Key, Path, Shell};
 use crate::solid::{EdgeUse, Placement, Solid, SolidCurve, SolidEdge, SolidFace, SolidSurface};
 use crate::trace;
+
+/// A cap of a sphere that reaches no further than this part of its radius keeps clear of the poles
+/// of an axis to its side.
+pub(crate) const FLAT_PART: f64 = 0.98;
 
 /// All that a solid is made of.
 pub(crate) struct Emit<'a> {
@@ -347,8 +351,15 @@ impl Emit<'_> {
                 r,
                 side,
             } => {
-                let x = flat(self.begin(c, runs));
-                let place = self.placed([c[0], c[1], z], up, x);
+                let is_flat = ring == 0.0 && !self.is_steep(c, r, runs);
+                let (axis, x) = if is_flat {
+                    // Poles to the sides and the seam over the half that the face does not have:
+                    // it needs none of them.
+                    ([1.0, 0.0, 0.0], [0.0, 0.0, -side])
+                } else {
+                    (up, flat(self.begin(c, runs)))
+                };
+                let place = self.placed([c[0], c[1], z], axis, x);
                 let surface = if ring == 0.0 {
                     SolidSurface::Sphere {
                         place,
@@ -393,6 +404,23 @@ impl Emit<'_> {
         }
     }
 
+    /// A face on a sphere reaches near its equator, or is cut open towards its pole.
+    fn is_steep(&self, c: P2, r: f64, runs: &[Vec<usize>]) -> bool {
+        let mut is_used = BTreeSet::new();
+        runs.iter().flatten().any(|&of| {
+            let edge = self.shell.uses[of].edge;
+            let Path::Over {
+                support, from, to, ..
+            } = self.shell.edges[edge].path
+            else {
+                return false;
+            };
+            let on = self.field.plan.supports[support];
+            let at = |k: i32| on.at(from + (to - from) * f64::from(k) / 8.0);
+            !is_used.insert(edge) || (0..=8).any(|k| distance(at(k), c) > FLAT_PART * r)
+        })
+    }
+
     /// What the flux of each cell's height brings, less the bottom.
     fn volume(&self) -> f64 {
         (1..self.field.plan.cells.len())
@@ -410,17 +438,11 @@ pub(crate) fn cell_volume(field: &Field, heights: &[Height], cell: usize) -> f64
     for half in field.plan.cells[cell].loops.iter().flatten() {
         let edge = &field.plan.edges[half.edge];
         let on = field.plan.supports[edge.support];
-        let span = edge.to - edge.from;
-        let parts = match on {
-            Support::Line { .. } => 8.0,
-            Support::Circle { .. } => (span / FRAC_PI_2 * 8.0).ceil().max(1.0),
-        };
         let sign = if half.forward { 1.0 } else { -1.0 };
-        let step = 0.5 * span / parts;
-        for k in 0..parts as usize {
-            let middle = edge.from + step * (2 * k + 1) as f64;
+        for pair in stops(&on, edge.from, edge.to, height.axis()).windows(2) {
+            let step = 0.5 * (pair[1] - pair[0]);
             for (x, weight) in crate::height::GAUSS {
-                let t = middle + step * x;
+                let t = pair[0] + step * (1.0 + x);
                 let q = on.at(t);
                 let [p, r] = height.flux(q);
                 let flow = sub([p, r], scale(q, 0.5 * bottom));
@@ -430,4 +452,26 @@ pub(crate) fn cell_volume(field: &Field, heights: &[Height], cell: usize) -> f64
         }
     }
     sum
+}
+
+/// Parts of an edge over which a rule is accurate: shorter and shorter towards where it is nearest
+/// to an axis, on which heights have a kink.
+fn stops(on: &Support, from: f64, to: f64, axis: Option<P2>) -> Vec<f64> {
+    let parts = match on {
+        Support::Line { .. } => 8.0,
+        Support::Circle { .. } => ((to - from) / FRAC_PI_2 * 8.0).ceil().max(1.0),
+    };
+    let even = (0..=parts as usize).map(|k| from + (to - from) * k as f64 / parts);
+    let mut stops: Vec<f64> = even.collect();
+    if let Some(axis) = axis {
+        let foot = match on {
+            Support::Line { .. } => on.parameter(axis),
+            Support::Circle { .. } => from + positive(on.parameter(axis) - from),
+        };
+        let near = (0..24).map(|k| libm::pow(0.5, f64::from(k)));
+        let near = near.flat_map(|by| [-1.0, 1.0].map(|side| foot + side * by * (to - from)));
+        stops.extend(near.chain([foot]).filter(|&t| t > from && t < to));
+        stops.sort_by(f64::total_cmp);
+    }
+    stops
 }

@@ -4,6 +4,7 @@
 use std::collections::BTreeSet;
 
 use crate::arrange::Drawing;
+use crate::emit::FLAT_PART;
 use crate::error::BuildError;
 use crate::height::Height;
 use crate::outline::Outline;
@@ -107,6 +108,7 @@ impl Scene {
             (height, rule)
         };
         let center = match (&height, outline.as_circle()) {
+            (Height::Ring { c, r, .. }, _) if farthest(outline, *c) <= FLAT_PART * r => None,
             (_, Some((c, _))) if height.axis().is_some_and(|axis| distance(axis, c) < 1e-9) => {
                 Some((c, outline.pieces()[0].from()))
             }
@@ -172,11 +174,7 @@ fn floor(part: &Part, index: usize, outline: &Outline) -> Result<Height, BuildEr
             center_mm: [x, y, z],
             radius_mm,
         } => {
-            let far = outline
-                .pieces()
-                .iter()
-                .flat_map(|piece| (0..8).map(|k| distance(piece.at(f64::from(k) / 8.0), [x, y])));
-            if far.fold(0.0, f64::max) > radius_mm + 1e-6 {
+            if farthest(outline, [x, y]) > radius_mm + 1e-6 {
                 return wrong("its outline reaches beyond its sphere");
             }
             Height::Ring {
@@ -208,4 +206,11 @@ fn floor(part: &Part, index: usize, outline: &Outline) -> Result<Height, BuildEr
         return wrong("a height is not finite or beyond 1e6 mm");
     }
     Ok(height)
+}
+
+/// Distance of the farthest place of an outline.
+fn farthest(outline: &Outline, from: P2) -> f64 {
+    let pieces = outline.pieces().iter();
+    let places = pieces.flat_map(|piece| (0..16).map(|k| piece.at(f64::from(k) / 16.0)));
+    places.map(|at| distance(at, from)).fold(0.0, f64::max)
 }

@@ -9,9 +9,21 @@ mod walls;
 use crate::arrange::Torn;
 use crate::field::Field;
 use crate::height::Height;
+use crate::plan::{P2, Support, distance, positive};
 
 /// Heights at a place, or along an edge, that are nearer than this are one, millimetres.
 pub(crate) const MEET_MM: f64 = 1e-5;
+
+/// Edges keep as far from tips within a face, millimetres.
+const TIP_MM: f64 = 0.04;
+
+/// The parameter of a support nearest to a place, from a first one on.
+fn foot(on: &Support, from: f64, at: P2) -> f64 {
+    match on {
+        Support::Line { .. } => on.parameter(at),
+        Support::Circle { .. } => from + positive(on.parameter(at) - from),
+    }
+}
 
 /// What a face lies on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -86,7 +98,37 @@ impl Shell {
     pub(crate) fn new(field: &Field, heights: &[Height]) -> Result<Self, Torn> {
         let mut shell = walls::raise(field, heights)?;
         merge::join(&mut shell, field, heights);
+        shell.tips(field)?;
         Ok(shell)
+    }
+
+    /// Fails where an edge passes so near to a tip, which a face has within it, that readers take
+    /// the edge for crossing itself.
+    fn tips(&self, field: &Field) -> Result<(), Torn> {
+        let mut ends = vec![0; self.vertices.len()];
+        for edge in self.edges.iter().filter(|edge| edge.is_alive) {
+            edge.ends.iter().for_each(|&end| ends[end] += 1);
+        }
+        for (vertex, _) in ends.iter().enumerate().filter(|(_, count)| **count == 1) {
+            let plan = &field.plan;
+            let tip = plan.vertices[self.vertices[vertex].plan];
+            for edge in self.edges.iter().filter(|edge| edge.is_alive) {
+                let Path::Over {
+                    support, from, to, ..
+                } = edge.path
+                else {
+                    continue;
+                };
+                let on = plan.supports[support];
+                let near = [from, to, foot(&on, from, tip)].map(|t| t.clamp(from, to));
+                let near = near.map(|t| on.at(t)).into_iter();
+                let mut near = near.filter(|_| !edge.ends.contains(&vertex));
+                if let Some(at) = near.find(|&at| distance(at, tip) < TIP_MM) {
+                    return Err(Torn { at });
+                }
+            }
+        }
+        Ok(())
     }
 
     pub(crate) fn root(&self, face: usize) -> usize {

@@ -423,8 +423,10 @@ impl Random {
                 self.draws.real(from[0], to[0]),
                 self.draws.real(from[1], to[1]),
             ];
+            // Where next to nothing is left, there is no room for looking above and below.
+            let is_clear = |z: &f64| *z <= self.part.bottom_mm || *z > self.part.bottom_mm + 0.01;
             if places.len() < count
-                && let Some(z) = self.height(p)
+                && let Some(z) = self.height(p).filter(is_clear)
             {
                 places.push([p[0], p[1], z]);
             }
