@@ -424,7 +424,7 @@ impl Random {
                 self.draws.real(from[1], to[1]),
             ];
             // Where next to nothing is left, there is no room for looking above and below.
-            let is_clear = |z: &f64| *z <= self.part.bottom_mm || *z > self.part.bottom_mm + 0.01;
+            let is_clear = |z: &f64| *z <= self.part.bottom_mm || *z > self.part.bottom_mm + 0.05;
             if places.len() < count
                 && let Some(z) = self.height(p).filter(is_clear)
             {
