@@ -1,12 +1,13 @@
 //! The surface of each cell, after all that was done.
 
 use crate::arrange::{Arrangement, Cell, POINT_MM, Torn};
+use crate::contour::contour;
 use crate::height::Height;
 use crate::plan::{P2, add, distance, encloses, scale};
 use crate::regions::{Rule, Scene};
 
 /// Heights nearer to each other are one, millimetres.
-pub(crate) const LEVEL_MM: f64 = 1e-6;
+pub(crate) const LEVEL_MM: f64 = 5e-6;
 /// Places along an edge at which two heights are compared.
 const ALONG: usize = 32;
 /// Rounds of drawing where surfaces cross.
@@ -156,12 +157,26 @@ fn draw(scene: &mut Scene, key: (Option<usize>, usize, usize), bounds: [P2; 2]) 
     if !scene.crossed.insert(key) {
         return false;
     }
-    let crossing = scene.heights[key.1].crossing(&scene.heights[key.2]);
-    let is_known = crossing.is_some();
-    for support in crossing.into_iter().flatten() {
-        scene.drawing.add_across(support, bounds);
+    let (a, b) = (&scene.heights[key.1], &scene.heights[key.2]);
+    if let Some(supports) = a.crossing(b) {
+        for support in supports {
+            scene.drawing.add_across(support, bounds);
+        }
+        return true;
     }
-    is_known
+    // Nothing is done beyond the block.
+    let block = scene.regions[0].bounds;
+    let bounds = [
+        [0, 1].map(|k| bounds[0][k].max(block[0][k])),
+        [0, 1].map(|k| bounds[1][k].min(block[1][k])),
+    ];
+    let Some(pieces) = contour(a, b, bounds) else {
+        return false;
+    };
+    for piece in &pieces {
+        scene.drawing.add(piece, None, false);
+    }
+    true
 }
 
 /// Places of a cell: along its border and within.

@@ -9,6 +9,7 @@
 mod arrange;
 mod bands;
 mod build;
+mod contour;
 mod emit;
 mod error;
 mod field;
