@@ -331,11 +331,10 @@ impl Piece {
             return straight;
         };
         let in_circle = distance(seen_from, center) < distance(from, center);
-        // Between chord and arc the arc leads around the other side of the point.
-        let side = cross(sub(self.to(), self.from()), sub(seen_from, self.from()));
+        // From within its circle an arc is always seen to turn in its own sense.
         match (in_circle, ccw) {
-            (true, true) if side < 0.0 => straight + TAU,
-            (true, false) if side > 0.0 => straight - TAU,
+            (true, true) if straight < 0.0 => straight + TAU,
+            (true, false) if straight > 0.0 => straight - TAU,
             _ => straight,
         }
     }
@@ -404,9 +403,34 @@ mod tests {
             ([1.0, 0.1], true),
             ([0.0, -0.1], false),
             ([1.9, 1.9], false),
+            ([0.0, 2.1], false),
         ] {
             assert_eq!(encloses(&half, at), inside, "{at:?}");
         }
+        // A place on the chord of an arc, of a ring's half.
+        let ring = [
+            Piece::Line {
+                from: [-2.0, 0.0],
+                to: [-3.0, 0.0],
+            },
+            Piece::Arc {
+                from: [-3.0, 0.0],
+                to: [3.0, 0.0],
+                center: [0.0; 2],
+                ccw: true,
+            },
+            Piece::Line {
+                from: [3.0, 0.0],
+                to: [2.0, 0.0],
+            },
+            Piece::Arc {
+                from: [2.0, 0.0],
+                to: [-2.0, 0.0],
+                center: [0.0; 2],
+                ccw: false,
+            },
+        ];
+        assert!(!encloses(&ring, [0.5, 0.0]) && encloses(&ring, [0.5, -2.5]));
         let back: Vec<Piece> = half.iter().rev().map(Piece::reversed).collect();
         assert!((area(&back) + 2.0 * PI).abs() < 1e-12);
         assert!(encloses(&back, [0.0, 1.9]) && !encloses(&back, [0.0, 2.1]));

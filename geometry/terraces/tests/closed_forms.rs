@@ -361,3 +361,57 @@ fn what_cannot_be_is_left_out_and_told() {
     assert_eq!(built.warnings, [Warning::Parted { parts: 2 }]);
     assert!((built.solid.volume_mm3 - 55_000.0).abs() < 1e-6);
 }
+
+#[test]
+fn a_level_and_a_sloping_slot_across_the_tip_of_a_hole() {
+    let mut part = block();
+    let tip = Floor::Tip {
+        rim_mm: 15.0,
+        angle_rad: 2.06,
+    };
+    let floors = [
+        level(14.0),
+        Floor::Plane {
+            z_mm: 5.0,
+            slope: [0.2, 0.0],
+        },
+    ];
+    for (floor, spans) in floors.into_iter().zip([1, 1]) {
+        part.operations = vec![
+            Operation::cut("tip", circle(40.0, 25.0, 5.0), tip.clone()),
+            Operation::cut("slot", rectangle(44.0, 25.0, 10.0, 4.0, 0.0), floor.clone()),
+        ];
+        let built = part.build().unwrap();
+        assert_eq!(built.warnings, []);
+        // The cone goes on below the slot's floor, which is one face around it.
+        let floors = built
+            .solid
+            .faces
+            .iter()
+            .filter(|f| f.name.starts_with("slot floor"));
+        assert_eq!(floors.count(), spans);
+        let (mut sum, n) = (0.0, 500);
+        for i in 0..n {
+            for j in 0..n {
+                let place = |k: i32, from: f64| from + 20.0 * (f64::from(k) + 0.5) / f64::from(n);
+                let (x, y) = (place(i, 30.0), place(j, 15.0));
+                let rho = libm::hypot(x - 40.0, y - 25.0);
+                let mut z: f64 = if rho < 5.0 {
+                    15.0 - (5.0 - rho) / libm::tan(1.03)
+                } else {
+                    20.0
+                };
+                if (x - 44.0).abs() < 5.0 && (y - 25.0).abs() < 2.0 {
+                    z = z.min(if let Floor::Plane { z_mm, slope } = floor {
+                        z_mm + slope[0] * x
+                    } else {
+                        14.0
+                    });
+                }
+                sum += (20.0 - z) * 400.0 / f64::from(n * n);
+            }
+        }
+        let cut = 100_000.0 - built.solid.volume_mm3;
+        assert!((cut / sum - 1.0).abs() < 2e-3, "{cut} {sum}");
+    }
+}

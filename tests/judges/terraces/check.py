@@ -139,7 +139,7 @@ def judge(step, told, has_tree):
         wrong.append("the solid has another name")
     if has_tree:
         found = step_check.tree(step_check.document(str(step)))
-        found = sorted((face["name"], tuple(face["rgb"] or ())) for face in found)
+        found = sorted((face["name"] or "", tuple(face["rgb"] or ())) for face in found)
         if found != sorted((name, tuple(rgb)) for name, rgb in told["faces"]):
             wrong.append("names or colours of faces differ")
     return wrong
