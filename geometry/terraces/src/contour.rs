@@ -15,6 +15,9 @@ const SQUARES: usize = 96;
 /// Most pieces of a crossing that is worth being followed.
 const MOST: usize = 1500;
 
+/// A side of a square, by its first node and whether it runs along x.
+type Side = (usize, usize, bool);
+
 /// The chains within a rectangle; `None` where they are too many or cannot be followed.
 pub(crate) fn contour(a: &Height, b: &Height, [low, high]: [P2; 2]) -> Option<Vec<Piece>> {
     let by = |q: P2| a.at(q) - b.at(q);
@@ -31,8 +34,7 @@ pub(crate) fn contour(a: &Height, b: &Height, [low, high]: [P2; 2]) -> Option<Ve
         .map(|(i, j)| by(node(i, j)))
         .collect();
     let value = |i: usize, j: usize| values[i * (count[1] + 1) + j];
-    // Sides of squares by their first node and whether they run along x.
-    let mut links: BTreeMap<(usize, usize, bool), Vec<(usize, usize, bool)>> = BTreeMap::new();
+    let mut links: BTreeMap<Side, Vec<Side>> = BTreeMap::new();
     for i in 0..count[0] {
         for j in 0..count[1] {
             let sides = [
@@ -63,7 +65,7 @@ pub(crate) fn contour(a: &Height, b: &Height, [low, high]: [P2; 2]) -> Option<Ve
             }
         }
     }
-    let point = |(i, j, along_x): (usize, usize, bool)| {
+    let point = |(i, j, along_x): Side| {
         let far = if along_x {
             node(i + 1, j)
         } else {
