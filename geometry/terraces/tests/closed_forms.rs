@@ -232,6 +232,32 @@ fn a_sloping_floor_that_runs_out_at_the_top() {
 }
 
 #[test]
+fn floors_that_reach_below_the_bottom_leave_holes() {
+    let mut part = block();
+    // From -5 at x = 20 up to 10 at x = 80: a hole up to x = 40.
+    let floor = Floor::Plane {
+        z_mm: -10.0,
+        slope: [0.25, 0.0],
+    };
+    part.operations = vec![Operation::cut(
+        "ramp",
+        rectangle(50.0, 25.0, 60.0, 10.0, 0.0),
+        floor,
+    )];
+    check(&part, 100_000.0 - 10.0 * (400.0 + 600.0), 6 + 5);
+    // A drill whose tip comes out: the rest of its cone around a round hole.
+    let angle_rad = 118.0_f64.to_radians();
+    let tip = Floor::Tip {
+        rim_mm: 1.0,
+        angle_rad,
+    };
+    part.operations = vec![Operation::cut("drilled", circle(50.0, 25.0, 4.0), tip)];
+    let narrow = 4.0 - libm::tan(0.5 * angle_rad);
+    let frustum = PI / 3.0 * (16.0 + 4.0 * narrow + narrow * narrow);
+    check(&part, 100_000.0 - PI * 16.0 * 19.0 - frustum, 6 + 2);
+}
+
+#[test]
 fn a_free_form_floor_with_a_hole_through_it() {
     let knots = |last: f64| KnotVector::uniform(3, 5, 0.0, last).unwrap();
     let (u, v) = (knots(100.0), knots(50.0));
