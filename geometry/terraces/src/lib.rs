@@ -5,6 +5,14 @@
 //! cell has one surface after all operations. Cells that share a surface are one face, different
 //! heights on both sides of an edge make a wall, and all share their edges and vertices
 //! ([`Part::build`]).
+//!
+//! The solid is always closed and in one piece, or there is an error that names the operation. What
+//! had to be done otherwise than asked for is told as a [`Warning`]: a treated edge left as it is
+//! (it meets several surfaces, or walls that are too low, or a line and an arc at an angle), an
+//! outline moved by some hundredths of a millimetre where the solid would have touched itself, a
+//! step where two floors cross and the crossing could not be followed, the largest of several parts
+//! kept. Lines of outlines and levels within [`Part::snap_mm`] of earlier ones become those; so do
+//! whole circles; arcs follow the lines that they touch.
 
 mod arrange;
 mod bands;
