@@ -31,7 +31,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("solids", &["nurbs"]),
     (
         "cad-exchange",
-        &["nurbs", "reconstruct", "shapes", "solids"],
+        &["nurbs", "reconstruct", "shapes", "solids", "terraces"],
     ),
     (
         "tessellate",
