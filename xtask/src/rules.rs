@@ -42,10 +42,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("surfacing", &["nurbs", "range-image"]),
     ("toolpath", &["range-image"]),
     ("terraces", &["nurbs"]),
-    (
-        "features",
-        &["range-image", "regrid", "segment", "shapes", "terraces"],
-    ),
+    ("features", &["nurbs", "range-image", "segment", "terraces"]),
     (
         "pipeline",
         &[

@@ -8,8 +8,9 @@ use crate::candidate::{Candidate, Lie, candidates, frame_of, top};
 use crate::chance::Chance;
 use crate::class::Class;
 use crate::code::{Attributes, Form, Sense, code, written};
-use crate::feature::{Dimension, Feature};
+use crate::feature::{Bottom, Dimension, Feature};
 use crate::field::{FieldError, field};
+use crate::floor::free_form;
 use crate::frame::Frame;
 use crate::levels::levels;
 use crate::measure::measured;
@@ -230,6 +231,8 @@ fn feature(
         dimensions: own.dimensions,
         outline: candidate.outline.shape,
         heights_mm: own.heights_mm,
+        lie: Some(candidate.lie),
+        bottom: bottom(sight, candidate, own.heights_mm.1),
         through: own.through,
         warnings,
     }
@@ -316,6 +319,10 @@ fn edge(sight: &Sight<'_>, treatment: &Treatment, of: &Feature, id: u32) -> Feat
         }
     }
     let local = sight.frame.local(of.centre_mm);
+    let end = match treatment.kind {
+        Kind::Fillet => treatment.level_mm + treatment.rise_mm,
+        _ => treatment.level_mm - treatment.rise_mm,
+    };
     Feature {
         id,
         parent: Some(of.id),
@@ -328,7 +335,9 @@ fn edge(sight: &Sight<'_>, treatment: &Treatment, of: &Feature, id: u32) -> Feat
         direction: of.direction,
         dimensions,
         outline: of.outline,
-        heights_mm: (treatment.level_mm, None),
+        heights_mm: (treatment.level_mm, Some(end)),
+        lie: None,
+        bottom: Bottom::Level,
         through: false,
         warnings: Vec::new(),
     }
@@ -353,5 +362,19 @@ fn widen(of: &mut Feature, lie: Lie, round: &Treatment) {
             own.first_mm = [own.first_mm[0] - outwards, own.first_mm[1] + outwards];
             own.second_mm = [own.second_mm[0] - outwards, own.second_mm[1] + outwards];
         }
+    }
+}
+
+/// What a candidate ends in.
+fn bottom(sight: &Sight<'_>, candidate: &Candidate, end_mm: Option<f64>) -> Bottom {
+    let is_plane = candidate
+        .levels
+        .first()
+        .is_some_and(|level| sight.levels.levels[usize::from(*level)].is_plane);
+    match (candidate.tip, end_mm) {
+        (Some(tip), _) => Bottom::Tip(tip.slope),
+        (None, None) => Bottom::Unseen,
+        (None, Some(_)) if is_plane || candidate.lie == Lie::Body => Bottom::Level,
+        (None, Some(_)) => free_form(sight, candidate).map_or(Bottom::Level, Bottom::FreeForm),
     }
 }
