@@ -112,7 +112,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-const DELIVERABLES: [&str; 17] = [
+const DELIVERABLES: [&str; 18] = [
     "cad-exchange",
     "compare",
     "features",
@@ -128,6 +128,7 @@ const DELIVERABLES: [&str; 17] = [
     "skin",
     "storage",
     "surfacing",
+    "terraces",
     "tessellate",
     "toolpath",
 ];

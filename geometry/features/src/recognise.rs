@@ -45,6 +45,11 @@ pub struct Settings<'a> {
     pub fewest_pitches: f64,
 }
 
+impl Settings<'_> {
+    /// Usual least size of features, pitches across.
+    pub const USUAL_PITCHES: f64 = 6.0;
+}
+
 /// What was recognised.
 #[derive(Debug, Clone)]
 pub struct Recognition {

@@ -57,6 +57,8 @@ pub struct Treatment {
 
 /// A strip is round where places lie nearer to an arc than this times their distance from a line.
 const ROUND: f64 = 0.95;
+/// Holes are countersunk more often than rounded.
+const ROUND_HOLE: f64 = 0.6;
 /// Radii and starts of arcs that are tried.
 const RADII: usize = 60;
 const STARTS: usize = 24;
@@ -153,7 +155,11 @@ fn treatment(
     let width = -at_outline / slope;
     let arc = arc(&places);
     let straight = cost_of(&places, &|distance| (at_outline + slope * distance, slope));
-    let is_round = arc.is_some_and(|arc| arc.cost < ROUND * straight);
+    let share = match candidate.outline.shape {
+        Shape::Circle(_) if candidate.lie == Lie::Hollow => ROUND_HOLE,
+        _ => ROUND,
+    };
+    let is_round = arc.is_some_and(|arc| arc.cost < share * straight);
     let kind = match (falls, is_round) {
         (false, _) => Kind::Fillet,
         (true, true) => Kind::Round,

@@ -20,11 +20,10 @@ pub(super) fn sets(sight: &Sight<'_>, top: &Top, step_mm: f64) -> Vec<Vec<u16>> 
         .collect();
     let mut first = 0;
     while first < sets.len() {
-        let second = (first + 1..sets.len())
-            .find(|&other| {
-                are_one(sight, sets[first][0], sets[other][0], step_mm)
-                    || run_on(sight, &sets[first], &sets[other], step_mm)
-            });
+        let second = (first + 1..sets.len()).find(|&other| {
+            are_one(sight, sets[first][0], sets[other][0], step_mm)
+                || run_on(sight, &sets[first], &sets[other], step_mm)
+        });
         match second {
             Some(other) => {
                 let more = sets.remove(other);
