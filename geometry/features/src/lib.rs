@@ -11,6 +11,7 @@ mod chance;
 pub mod class;
 pub mod code;
 pub mod edges;
+pub mod edit;
 pub mod feature;
 pub mod field;
 mod floor;

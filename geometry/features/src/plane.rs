@@ -52,7 +52,7 @@ impl Plane {
 
 /// Neighbouring samples stray alike (speckle), so that a mean of many is less sure than of as many
 /// that do not: by this factor on scans of parts with known levels, at most of the noises tried.
-const ALIKE: f64 = 1.4;
+const ALIKE: f64 = 1.2;
 /// Rounds of leaving out what strays.
 const ROUNDS: usize = 4;
 /// Samples further off than so many deviations are left out.

@@ -11,8 +11,8 @@ use range_image::{Cancelled, Monitor};
 use crate::border::{Border, border};
 use crate::frame::Frame;
 use crate::levels::{AROUND, Levels, Sense};
-use crate::outline::Outline;
 use crate::outline::witnesses::Sight;
+use crate::outline::{Outline, Shape};
 
 pub use tip::Tip;
 pub use top::{Top, top};
@@ -139,6 +139,21 @@ fn are_one(sight: &Sight<'_>, one: &Candidate, other: &Candidate) -> bool {
     both && (holds(one, other) || holds(other, one))
 }
 
+/// Of the area within its outline a level takes at least this share; less is a rest of an edge.
+const FILLED: f64 = 0.12;
+
+/// Whether an outline is narrower than features are, or hardly filled: the rest of a slanting edge.
+fn is_scrap(sight: &Sight<'_>, outline: &Outline, nodes: usize, fewest: usize) -> bool {
+    let pitch = sight.field.image.pitch_mm();
+    let [a, b] = match outline.shape {
+        Shape::Circle(circle) => [2.0 * circle.radius_mm; 2],
+        Shape::Rectangle(rectangle) => rectangle.sizes_mm(),
+    };
+    // `fewest` is half the square of the least width in nodes.
+    let least = (2.0 * fewest as f64).sqrt() * pitch;
+    a.min(b) < least || (nodes as f64) * pitch * pitch < FILLED * a * b
+}
+
 /// The candidate of a set of levels, if they are one.
 fn candidate(
     sight: &Sight<'_>,
@@ -170,6 +185,9 @@ fn candidate(
     let host = host(sight.levels, &own, lie)?;
     let seed = seed ^ (u64::from(*set.first()?) << 32);
     let outline = outlined::outlined(sight, &own, lie, seed)?;
+    if is_scrap(sight, &outline, own.nodes, fewest) {
+        return None;
+    }
     let tip = (lie == Lie::Hollow)
         .then(|| tip::tip(sight, *set.first()?, &outline.shape))
         .flatten();

@@ -26,6 +26,11 @@ pub(crate) struct Args {
     /// current directory
     #[arg(short, long, value_name = "OUT.json")]
     output: Option<PathBuf>,
+    /// Change types, dimensions and directions that you know better, by a file of tables
+    /// `[[edit]]`: `id`, and any of `type`, `direction` ([x, y, z]) and dimensions in mm such as
+    /// `diameter`; outlines, patterns and the solid follow
+    #[arg(long, value_name = "EDITS.toml")]
+    pub(super) edit: Option<PathBuf>,
     /// Rebuild the part from its features, as one closed solid, too
     #[arg(long, value_name = "OUT.step")]
     pub(super) step: Option<PathBuf>,

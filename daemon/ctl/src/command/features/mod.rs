@@ -1,6 +1,7 @@
 //! `relief features`.
 
 mod args;
+mod edits;
 mod run;
 mod summary;
 mod train;

@@ -12,7 +12,7 @@ use features::network::Classifier;
 use features::recognise::{RecogniseError, Settings, Teller, recognise};
 use serde::Serialize;
 
-use super::{Args, summary};
+use super::{Args, edits, summary};
 use crate::command::shown::{self, Shown};
 use crate::command::{convert, places, timestamp};
 use crate::failure::Failure;
@@ -68,7 +68,8 @@ fn of_file(args: &Args, shown: &Shown) -> Result<Recognised, Failure> {
     };
     shown.begin("features");
     let began = Instant::now();
-    let recognition = regrid::with_threads(args.threads, || {
+    let edits = args.edit.as_deref().map(edits::read).transpose()?;
+    let mut recognition = regrid::with_threads(args.threads, || {
         recognise(&scan.columns, scan.camera_mm, &settings, shown)
     })
     .map_err(|error| Failure::at("cannot recognise features", &error))?
@@ -77,6 +78,10 @@ fn of_file(args: &Args, shown: &Shown) -> Result<Recognised, Failure> {
         other => Failure::at(args.scan().display(), &other),
     })?;
     let seconds = began.elapsed().as_secs_f64();
+    if let (Some(edits), Some(path)) = (&edits, &args.edit) {
+        features::edit::edit(&mut recognition, edits)
+            .map_err(|error| Failure::at(path.display(), &error))?;
+    }
     let file = FeaturesFile::of(&recognition);
     write_atomically::<std::io::Error>(&output, |sink| file.write(sink))
         .map_err(|error| Failure::at(format!("cannot write {}", output.display()), &error))?;
