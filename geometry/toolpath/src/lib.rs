@@ -44,6 +44,7 @@ mod strand;
 mod surface;
 mod time;
 mod trace;
+mod way;
 
 pub use cutter::{Cutter, CutterError, DIAMETERS_MM, Kind};
 pub use drop::drop_cutter;
