@@ -9,7 +9,7 @@ pub(crate) struct Field<'a> {
     pub(crate) surface: &'a Surface,
     pub(crate) cutter: Cutter,
     /// Unit direction of passes.
-    along: [f64; 2],
+    pub(crate) along: [f64; 2],
     /// Limits along and across them, within the cutter's reach of the surface.
     pub(crate) s: [f64; 2],
     pub(crate) t: [f64; 2],

@@ -14,6 +14,8 @@ pub(crate) const STEEP: f64 = 0.258_819;
 /// The step is sought until the highest cusp is this share below what is asked for, at most.
 const NEAR_ENOUGH: f64 = 0.015;
 const ROUNDS: usize = 12;
+/// Share of a pass along which cusps may be higher at first: short passes mend them.
+const EXCEEDED: f64 = 0.25;
 /// Stations within the cutter's radius.
 const STATIONS: f64 = 16.0;
 /// The greatest share of the cutter's diameter that a step may be.
@@ -105,7 +107,7 @@ pub(crate) fn passes(
             // Where nothing can be told, as at the outline, the next pass is near enough anyhow.
             let is_told = tally.all > 0 || reached <= cautious;
             let cusp = if is_told {
-                tally.highest
+                tally.cusp
             } else {
                 f64::INFINITY
             };
@@ -160,12 +162,13 @@ pub(crate) fn passes(
 
 #[derive(Debug, Default)]
 struct Tally {
-    highest: f64,
+    /// The cusp that is exceeded at [`EXCEEDED`] of the stations.
+    cusp: f64,
     steep: u32,
     all: u32,
 }
 
-/// The highest cusp between two lines.
+/// The cusps between two lines.
 fn tally(field: &Field<'_>, stations: &[f64], a: &Line, b: &Line, amid: &Line) -> Tally {
     let near = |line: &Line, k: usize| {
         let [before, tip, behind] =
@@ -179,32 +182,33 @@ fn tally(field: &Field<'_>, stations: &[f64], a: &Line, b: &Line, amid: &Line) -
         Some((near, on_edge))
     };
     let of = |k: usize| {
-        let mut tally = Tally::default();
-        let (Some((a, _)), Some((b, _))) = (near(a, k), near(b, k)) else {
-            return tally;
-        };
+        let ((a, _), (b, _)) = (near(a, k)?, near(b, k)?);
         // Where it rolls around an edge, there is no surface to leave cusps on.
-        let Some((amid, false)) = near(amid, k) else {
-            return tally;
+        let (amid, false) = near(amid, k)? else {
+            return None;
         };
-        tally.all = 1;
-        let (cusp, nz) = cusp::height_mm(&field.cutter, a, b, amid);
-        if nz >= STEEP {
-            tally.highest = cusp;
-        } else {
-            tally.steep = 1;
-        }
-        tally
+        Some(cusp::height_mm(&field.cutter, a, b, amid))
     };
-    let sum = |p: Tally, q: Tally| Tally {
-        highest: p.highest.max(q.highest),
-        steep: p.steep + q.steep,
-        all: p.all + q.all,
+    let told: Vec<(f64, f64)> = (0..stations.len()).into_par_iter().filter_map(of).collect();
+    let mut cusps: Vec<f64> = told
+        .iter()
+        .filter(|(_, nz)| *nz >= STEEP)
+        .map(|(cusp, _)| *cusp)
+        .collect();
+    let steep = told.len() - cusps.len();
+    let exceeded = (EXCEEDED * cusps.len() as f64) as usize;
+    let cusp = if exceeded < cusps.len() {
+        *cusps
+            .select_nth_unstable_by(exceeded, |a, b| b.total_cmp(a))
+            .1
+    } else {
+        0.0
     };
-    (0..stations.len())
-        .into_par_iter()
-        .map(of)
-        .reduce(Tally::default, sum)
+    Tally {
+        cusp,
+        steep: steep as u32,
+        all: told.len() as u32,
+    }
 }
 
 /// The first and the last place across where the cutter mills anything.

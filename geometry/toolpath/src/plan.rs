@@ -8,6 +8,7 @@ use crate::error::ToolpathError;
 use crate::field::Field;
 use crate::link::Links;
 use crate::machine::Machine;
+use crate::mend::Mend;
 use crate::motion::{Move, Operation};
 use crate::parallel::{self, Passes};
 use crate::quantize::quantized;
@@ -161,7 +162,9 @@ fn finishing(
     let tolerance_mm = settings
         .tolerance_mm
         .min(SHARE_OF_CUSP * settings.scallop_mm);
-    let cusp_mm = settings.scallop_mm - tolerance_mm / 2.0;
+    // So is what rounding of heights adds.
+    let unit_mm = 1.0 / crate::post::scale(machine.decimals);
+    let cusp_mm = settings.scallop_mm - (tolerance_mm + unit_mm.min(0.1 * settings.scallop_mm)) / 2.0;
     let drawing = Drawing {
         fineness: Fineness::of(cutter.corner_mm(), WOBBLE_MM, LEAST_MM),
         tolerance_mm,
@@ -176,7 +179,7 @@ fn finishing(
             mend: "choose a larger scallop",
         });
     }
-    let ways = Part::new(monitor, 0.0, 0.6);
+    let ways = Part::new(monitor, 0.0, 0.4);
     let Some((lines, steep_share)) = (match settings.pattern {
         Pattern::Parallel => {
             let found = parallel::passes(&field, cusp_mm, &ways)?;
@@ -196,7 +199,7 @@ fn finishing(
         return Err(ToolpathError::Nowhere(cutter));
     };
     let lines: Vec<Vec<[f64; 2]>> = lines;
-    let ways = Part::new(monitor, 0.6, 1.0);
+    let ways = Part::new(monitor, 0.4, 0.6);
     let tip = |at: [f64; 2]| field.tip(at);
     let drawn: Result<Vec<Vec<Strand>>, ToolpathError> = (0..lines.len())
         .into_par_iter()
@@ -211,18 +214,31 @@ fn finishing(
         .collect();
     let drawn = drawn?;
     let passes = drawn.iter().filter(|strands| !strands.is_empty()).count();
-    let strands: Vec<Strand> = drawn.into_iter().flatten().collect();
+    let mut strands: Vec<Strand> = drawn.into_iter().flatten().collect();
     if strands.is_empty() {
         return Err(ToolpathError::Nowhere(cutter));
     }
     let touching = |at: [f64; 2]| surface.drop_cutter(&cutter, at).map(|contact| contact.z_mm);
+    let level_mm = crate::cusp::level_step_mm(&cutter, cusp_mm).max(1e-3);
+    let mend = Mend {
+        field: &field,
+        drawing,
+        scallop_mm: settings.scallop_mm,
+        level_mm,
+        decimals: machine.decimals,
+        tip: &touching,
+    };
+    let mended = mend.mended(&strands, &Part::new(monitor, 0.6, 1.0))?;
+    if std::env::var("MILL_DEBUG").is_ok() { eprintln!("base strands {} mends {} left {:?}", strands.len(), mended.strands.len(), mended.left); }
     let links = Links {
         safe_z_mm: machine.safe_z_mm,
         feeds_mm_per_min: machine.feeds_mm_per_min(machine.tool(&cutter)?),
-        most_mm: LINKED_STEPS * crate::cusp::level_step_mm(&cutter, cusp_mm).max(0.1),
+        most_mm: LINKED_STEPS * level_mm.max(0.1),
         drawing,
         tip: &touching,
     };
+    let passes = passes + mended.strands.len();
+    strands.extend(mended.strands);
     let mut moves = Vec::new();
     links.add(&mut moves, &strands, machine.stock.z_mm[1], None);
     links.retract(&mut moves);

@@ -15,6 +15,7 @@ use crate::cusp;
 use crate::error::ToolpathError;
 use crate::field::Field;
 use crate::parallel::STEEP;
+use crate::simplify::simplified;
 
 /// Rounds for the way to the next pass.
 const ROUNDS: usize = 10;
@@ -237,29 +238,8 @@ fn filled(steps: &[Option<(f64, bool)>], level: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The corners of a pass, few where it is straight (Ramer 1972, Douglas & Peucker 1973).
+/// The corners of a pass, few where it is straight.
 fn corners(field: &Field<'_>, places: &[Place], level: f64) -> Vec<[f64; 2]> {
-    let mut keep = vec![false; places.len()];
-    let mut open = vec![(0, places.len().saturating_sub(1))];
-    while let Some((from, to)) = open.pop() {
-        if let (Some(a), Some(b)) = (keep.get_mut(from), places.get(to)) {
-            *a = true;
-            let a = places[from];
-            keep[to] = true;
-            let off = |p: &Place| {
-                let share = (p.s - a.s) / (b.s - a.s).max(1e-12);
-                (p.t - a.t - share * (b.t - a.t)).abs()
-            };
-            let inner = from + 1..to;
-            let worst = inner
-                .map(|k| (k, off(&places[k])))
-                .fold((0, 0.0), |m, n| if n.1 > m.1 { n } else { m });
-            if worst.1 > SMOOTH * level {
-                open.push((worst.0, to));
-                open.push((from, worst.0));
-            }
-        }
-    }
-    let kept = places.iter().zip(&keep).filter(|(_, keep)| **keep);
-    kept.map(|(p, _)| field.place(p.s, p.t)).collect()
+    let all: Vec<[f64; 2]> = places.iter().map(|p| field.place(p.s, p.t)).collect();
+    simplified(&all, SMOOTH * level)
 }
