@@ -7,6 +7,8 @@
 //! paths). In a crease that two passes cross, all of the ridge is reached from one place; there the
 //! short pass follows the crease from one to the other. This is repeated until no cusp is too high.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use range_image::Monitor;
 use rayon::prelude::*;
 
@@ -24,16 +26,23 @@ const ROUNDS: usize = 6;
 /// Cusps above this share of what was asked for are mended: between two lines on which they are
 /// measured they may be a little higher.
 const TOO_HIGH: f64 = 1.025;
-/// Lines within the cutter's radius, and places on a line for the step on a level plane.
-const LINES: f64 = 24.0;
-const PLACES: f64 = 16.0;
+/// Lines within the cutter's radius, lines for the step on a slope, and places on a line for that.
+const LINES: f64 = 16.0;
+const LINES_OF_STEP: f64 = 6.0;
+const PLACES: f64 = 8.0;
+/// Tips that are apart by this share of that distance are on different passes.
+const JUMP: f64 = 0.3;
 /// Places that are looked at in each direction, at most; there are fewer lines then.
 const MOST_PLACES: f64 = 4e6;
+/// How often a place is mended; at outlines nothing may come of it.
+const MOST_TRIES: u32 = 2;
+/// Nearer to the outline than this, for the cutter's radius, nothing is told.
+const INNER: f64 = 1.0;
 /// How far chords may lie off arcs.
 const CHORD_MM: f64 = 2e-5;
 /// How far a short pass goes on beyond where it is needed, for the distance of the passes beside it.
 const BEYOND: f64 = 0.5;
-/// How far corners of a short pass may be off it, as a share of the step on a level plane.
+/// How far corners of a short pass may be off it, as a share of the step on a slope.
 const SMOOTH: f64 = 0.02;
 
 /// What is needed to add short passes.
@@ -41,18 +50,23 @@ pub(crate) struct Mend<'a> {
     pub(crate) field: &'a Field<'a>,
     pub(crate) drawing: Drawing,
     pub(crate) scallop_mm: f64,
-    /// The step-over on a level plane.
+    /// The step-over on a level plane, and that on a slope, which the corner alone mills.
     pub(crate) level_mm: f64,
+    pub(crate) slope_mm: f64,
     pub(crate) decimals: u8,
     /// Least height of the tip, for rounding.
     pub(crate) tip: &'a (dyn Fn([f64; 2]) -> Option<f64> + Sync),
 }
 
+/// A cusp, and where.
+pub(crate) type LeftOver = (f64, [f64; 2]);
+
 /// What was added.
 pub(crate) struct Mended {
     pub(crate) strands: Vec<Strand>,
-    /// The highest cusp that is left, and where, if it is higher than asked for.
-    pub(crate) left: Option<(f64, [f64; 2])>,
+    /// The highest cusp that is left, and where, if it is higher than asked for; at the outline passes
+    /// end, and none is told.
+    pub(crate) left_mm: Option<LeftOver>,
 }
 
 impl Mend<'_> {
@@ -72,8 +86,10 @@ impl Mend<'_> {
         let mut ways = Ways::new(field.cutter, grown[0], grown[1]);
         let mut count = 0;
         let mut add = |ways: &mut Ways, strands: &[Strand]| {
-            let written: Vec<Vec<[f64; 3]>> =
-                strands.par_iter().map(|strand| self.written(strand)).collect();
+            let written: Vec<Vec<[f64; 3]>> = strands
+                .par_iter()
+                .map(|strand| self.written(strand))
+                .collect();
             for points in &written {
                 ways.add(points, count);
                 count += 1;
@@ -83,20 +99,22 @@ impl Mend<'_> {
         add(&mut ways, strands);
         let lines = self.lines();
         let mut dirty = Dirty::new(grown, reach / 2.0);
+        let mut tries = BTreeMap::new();
         let mut mended = Mended {
             strands: Vec::new(),
-            left: None,
+            left_mm: None,
         };
         for round in 0..=ROUNDS {
             monitor.check()?;
             monitor.progress(round as f64 / ROUNDS as f64);
             let ridges = lines.ridges(&ways, &|at| dirty.holds(at), monitor)?;
-            let worst = ridges.iter().max_by(|a, b| a.cusp_mm.total_cmp(&b.cusp_mm));
-            mended.left = worst.map(|ridge| (ridge.cusp_mm, ridge.at));
+            let inner = ridges.iter().filter(|ridge| self.is_inner(ridge.at));
+            let worst = inner.max_by(|a, b| a.cusp_mm.total_cmp(&b.cusp_mm));
+            mended.left_mm = worst.map(|ridge| (ridge.cusp_mm, ridge.at));
             if ridges.is_empty() || round == ROUNDS {
                 break;
             }
-            let corners = self.corners(&ridges, lines.apart_mm);
+            let corners = self.corners(&ridges, lines.apart_mm, &mut tries);
             let tip = |at: [f64; 2]| field.tip(at);
             let drawn: Result<Vec<Vec<Strand>>, ToolpathError> = corners
                 .par_iter()
@@ -129,19 +147,31 @@ impl Mend<'_> {
         let field = self.field;
         let [x, y] = field.along;
         let limits = [field.t, field.s];
-        let step_mm = self.level_mm / PLACES;
+        let step_mm = self.slope_mm / PLACES;
         let area = limits.iter().map(|[low, high]| high - low).product::<f64>();
-        let apart_mm = field.cutter.radius_mm() / LINES;
+        let apart_mm = (field.cutter.radius_mm() / LINES).min(self.slope_mm / LINES_OF_STEP);
         Lines {
-            surface: field.surface,
-            cutter: field.cutter,
+            field,
             along: [[-y, x], [x, y]],
             limits,
             apart_mm: apart_mm.max(area / step_mm / MOST_PLACES),
             step_mm,
-            jump_mm: 4.0 * step_mm,
+            jump_mm: JUMP * self.slope_mm,
             limit_mm: TOO_HIGH * self.scallop_mm,
         }
+    }
+
+    /// Whether there is surface all around a place.
+    fn is_inner(&self, at: [f64; 2]) -> bool {
+        let around = INNER * self.field.cutter.radius_mm();
+        [[around, 0.0], [-around, 0.0], [0.0, around], [0.0, -around]]
+            .iter()
+            .all(|[x, y]| {
+                self.field
+                    .surface
+                    .height_mm([at[0] + x, at[1] + y])
+                    .is_some()
+            })
     }
 
     /// The points of a strand as they are written, arcs as chords.
@@ -160,20 +190,31 @@ impl Mend<'_> {
     }
 
     /// Corners of the short passes that these ridges ask for.
-    fn corners(&self, ridges: &[Ridge], apart_mm: f64) -> Vec<Vec<[f64; 2]>> {
+    /// `tries` counts by place how often that was tried.
+    fn corners(
+        &self,
+        ridges: &[Ridge],
+        apart_mm: f64,
+        tries: &mut BTreeMap<(i64, i64), u32>,
+    ) -> Vec<Vec<[f64; 2]>> {
         let mut chains = chained(ridges, apart_mm);
         // Lines in both directions cross most ridges: what is drawn for one is not for the other.
         chains.sort_by_key(|chain| std::cmp::Reverse(chain.len()));
-        let cell = 0.25 * self.level_mm;
-        let mut taken = std::collections::HashSet::new();
+        let cell = 0.25 * self.slope_mm;
+        let mut taken = BTreeSet::new();
+        let mut fresh_places = BTreeSet::new();
         let mut corners = Vec::new();
         for chain in chains {
             let key = |at: [f64; 2], i: i64, j: i64| {
-                ((at[0] / cell).floor() as i64 + i, (at[1] / cell).floor() as i64 + j)
+                (
+                    (at[0] / cell).floor() as i64 + i,
+                    (at[1] / cell).floor() as i64 + j,
+                )
             };
             let is_taken = |ridge: &Ridge| {
-                let (i, j) = key(ridge.wanted, 0, 0);
-                taken.contains(&(i, j))
+                let place = key(ridge.wanted, 0, 0);
+                taken.contains(&place)
+                    || tries.get(&place).is_some_and(|tries| *tries >= MOST_TRIES)
             };
             let fresh: Vec<Vec<Ridge>> = chain
                 .chunk_by(|a, b| is_taken(a) == is_taken(b))
@@ -182,6 +223,7 @@ impl Mend<'_> {
                 .collect();
             for part in fresh {
                 for ridge in &part {
+                    fresh_places.insert(key(ridge.wanted, 0, 0));
                     for i in -1..=1 {
                         for j in -1..=1 {
                             taken.insert(key(ridge.wanted, i, j));
@@ -190,6 +232,9 @@ impl Mend<'_> {
                 }
                 corners.push(self.pass(&part));
             }
+        }
+        for place in fresh_places {
+            *tries.entry(place).or_insert(0) += 1;
         }
         corners
     }
@@ -213,7 +258,7 @@ impl Mend<'_> {
             return vec![a, worst.wanted, b];
         }
         let mut corners: Vec<[f64; 2]> = chain.iter().map(|ridge| ridge.wanted).collect();
-        let least = 0.1 * self.level_mm;
+        let least = 0.1 * self.slope_mm;
         let mut kept = vec![first.wanted];
         for corner in corners.drain(..) {
             if let Some(end) = kept.last()
@@ -222,7 +267,7 @@ impl Mend<'_> {
                 kept.push(corner);
             }
         }
-        let mut kept = simplified(&kept, SMOOTH * self.level_mm);
+        let mut kept = simplified(&kept, SMOOTH * self.slope_mm);
         let beyond = BEYOND * between;
         if let [only] = kept[..] {
             // Along the ridge, that is across what leads from one pass to the other.
@@ -247,8 +292,7 @@ impl Mend<'_> {
 
 /// Ridges between the same passes from line to line.
 fn chained(ridges: &[Ridge], apart_mm: f64) -> Vec<Vec<Ridge>> {
-    let mut by_strands: std::collections::BTreeMap<(usize, [usize; 2]), Vec<Vec<Ridge>>> =
-        std::collections::BTreeMap::new();
+    let mut by_strands: BTreeMap<(usize, [usize; 2]), Vec<Vec<Ridge>>> = BTreeMap::new();
     for ridge in ridges {
         let chains = by_strands.entry((ridge.line.0, ridge.strands)).or_default();
         let goes_on = |chain: &&mut Vec<Ridge>| {
@@ -276,7 +320,8 @@ fn in_order(mut strands: Vec<Strand>, from: Option<[f64; 3]>) -> Vec<Strand> {
     let square = |a: [f64; 3], b: [f64; 3]| (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum();
     while !strands.is_empty() {
         let away = |strand: &Strand| -> f64 { square(strand.start, here) };
-        let nearest = (0..strands.len()).min_by(|a, b| away(&strands[*a]).total_cmp(&away(&strands[*b])));
+        let nearest =
+            (0..strands.len()).min_by(|a, b| away(&strands[*a]).total_cmp(&away(&strands[*b])));
         let strand = strands.swap_remove(nearest.unwrap_or(0));
         here = strand.end();
         ordered.push(strand);

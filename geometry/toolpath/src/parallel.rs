@@ -1,5 +1,5 @@
-//! Parallel finishing passes: each as far from the one before as the demanded cusp allows where
-//! that is highest.
+//! Parallel finishing passes: each as far from the one before as the demanded cusp allows along most of
+//! it. Where cusps would be higher, short passes are added later (see `mend`).
 
 use range_image::{Cancelled, Monitor};
 use rayon::prelude::*;
@@ -40,15 +40,6 @@ pub(crate) fn limit(passes: usize) -> Result<(), ToolpathError> {
     })
 }
 
-/// Where passes run, and how much was too steep for them.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Passes {
-    /// Places across, ascending.
-    pub(crate) across_mm: Vec<f64>,
-    /// Share of the stations that are steeper than passes are drawn for.
-    pub(crate) steep_share: f64,
-}
-
 /// Heights of a pass at the stations.
 struct Line {
     across: f64,
@@ -66,12 +57,12 @@ impl Line {
     }
 }
 
-/// Places the passes.
+/// Places the passes: where they run across, ascending.
 pub(crate) fn passes(
     field: &Field<'_>,
     cusp_mm: f64,
     monitor: &dyn Monitor,
-) -> Result<Option<Passes>, ToolpathError> {
+) -> Result<Option<Vec<f64>>, ToolpathError> {
     let stations = field.stations(STATIONS);
     let line = |across: f64| Line::new(field, &stations, across);
     let level = cusp::level_step_mm(&field.cutter, cusp_mm).max(1e-3);
@@ -90,14 +81,13 @@ pub(crate) fn passes(
     let mut across_mm = vec![first];
     let mut here = line(first);
     let mut step = level;
-    let (mut steep, mut all) = (0, 0);
     limit(((last - first) / (1.5 * level).min(widest)) as usize)?;
     while here.across < last {
         monitor.check()?;
         limit(across_mm.len())?;
         monitor.progress((here.across - first) / (last - first));
         let (mut low, mut high) = (0.0_f64, f64::INFINITY);
-        let mut best: Option<(Line, Tally)> = None;
+        let mut best: Option<Line> = None;
         for _ in 0..ROUNDS {
             let next = line((here.across + step).min(last));
             let amid = line(f64::midpoint(here.across, next.across));
@@ -105,27 +95,23 @@ pub(crate) fn passes(
             let reached = next.across - here.across;
             let is_last = next.across >= last;
             // Where nothing can be told, as at the outline, the next pass is near enough anyhow.
-            let is_told = tally.all > 0 || reached <= cautious;
-            let cusp = if is_told {
-                tally.cusp
-            } else {
-                f64::INFINITY
-            };
+            let is_told = tally.is_told || reached <= cautious;
+            let cusp = if is_told { tally.cusp } else { f64::INFINITY };
             let fits = cusp <= cusp_mm;
             if fits {
                 low = reached;
                 let done = cusp >= (1.0 - NEAR_ENOUGH) * cusp_mm
                     || reached >= widest
                     || is_last
-                    || tally.all == 0;
-                best = Some((next, tally));
+                    || !tally.is_told;
+                best = Some(next);
                 if done {
                     break;
                 }
             } else {
                 high = reached;
                 if reached <= least * 1.0001 {
-                    best = Some((next, tally));
+                    best = Some(next);
                     break;
                 }
             }
@@ -141,31 +127,19 @@ pub(crate) fn passes(
             .max(least)
             .min(widest);
         }
-        let (next, tally) = match best {
-            Some(found) => found,
-            None => {
-                let next = line((here.across + low.max(least)).min(last));
-                (next, Tally::default())
-            }
-        };
+        let next = best.unwrap_or_else(|| line((here.across + low.max(least)).min(last)));
         step = (next.across - here.across).max(least);
-        steep += tally.steep;
-        all += tally.all;
         across_mm.push(next.across);
         here = next;
     }
-    Ok(Some(Passes {
-        across_mm,
-        steep_share: f64::from(steep) / f64::from(all.max(1)),
-    }))
+    Ok(Some(across_mm))
 }
 
-#[derive(Debug, Default)]
 struct Tally {
     /// The cusp that is exceeded at [`EXCEEDED`] of the stations.
     cusp: f64,
-    steep: u32,
-    all: u32,
+    /// Whether anything could be told.
+    is_told: bool,
 }
 
 /// The cusps between two lines.
@@ -195,7 +169,6 @@ fn tally(field: &Field<'_>, stations: &[f64], a: &Line, b: &Line, amid: &Line) -
         .filter(|(_, nz)| *nz >= STEEP)
         .map(|(cusp, _)| *cusp)
         .collect();
-    let steep = told.len() - cusps.len();
     let exceeded = (EXCEEDED * cusps.len() as f64) as usize;
     let cusp = if exceeded < cusps.len() {
         *cusps
@@ -206,8 +179,7 @@ fn tally(field: &Field<'_>, stations: &[f64], a: &Line, b: &Line, amid: &Line) -
     };
     Tally {
         cusp,
-        steep: steep as u32,
-        all: told.len() as u32,
+        is_told: !told.is_empty(),
     }
 }
 

@@ -8,9 +8,9 @@ use crate::error::ToolpathError;
 use crate::field::Field;
 use crate::link::Links;
 use crate::machine::Machine;
-use crate::mend::Mend;
+use crate::mend::{LeftOver, Mend};
 use crate::motion::{Move, Operation};
-use crate::parallel::{self, Passes};
+use crate::parallel;
 use crate::quantize::quantized;
 use crate::rough::Rough;
 use crate::scallop;
@@ -72,12 +72,11 @@ pub fn plan(
     }
     let from = if settings.rough.is_some() { 0.3 } else { 0.0 };
     let part = Part::new(monitor, from, 1.0);
-    let (finish, steep_share) = finishing(surface, machine, settings, &part)?;
-    if steep_share > 0.0 {
+    let (finish, left) = finishing(surface, machine, settings, &part)?;
+    if let Some((cusp_mm, [x, y])) = left {
         notes.push(format!(
-            "{:.2} % of the passes' places are steeper than 75 degrees or at a wall: there passes \
-             lie farther apart than the scallop asks for",
-            100.0 * steep_share
+            "a cusp of {cusp_mm:.4} mm is left near x {x:.2}, y {y:.2} mm, more than the scallop asks \
+             for: no pass reaches it"
         ));
     }
     operations.push(finish);
@@ -155,7 +154,7 @@ fn finishing(
     machine: &Machine,
     settings: &Settings,
     monitor: &dyn Monitor,
-) -> Result<(Operation, f64), ToolpathError> {
+) -> Result<(Operation, Option<LeftOver>), ToolpathError> {
     let cutter = settings.finish;
     let field = Field::new(surface, cutter, settings.angle_deg);
     // What the corridor adds to cusps is taken from them, half of it: it adds all or nothing.
@@ -164,7 +163,8 @@ fn finishing(
         .min(SHARE_OF_CUSP * settings.scallop_mm);
     // So is what rounding of heights adds.
     let unit_mm = 1.0 / crate::post::scale(machine.decimals);
-    let cusp_mm = settings.scallop_mm - (tolerance_mm + unit_mm.min(0.1 * settings.scallop_mm)) / 2.0;
+    let cusp_mm =
+        settings.scallop_mm - (tolerance_mm + unit_mm.min(0.1 * settings.scallop_mm)) / 2.0;
     let drawing = Drawing {
         fineness: Fineness::of(cutter.corner_mm(), WOBBLE_MM, LEAST_MM),
         tolerance_mm,
@@ -180,25 +180,16 @@ fn finishing(
         });
     }
     let ways = Part::new(monitor, 0.0, 0.4);
-    let Some((lines, steep_share)) = (match settings.pattern {
+    let found = match settings.pattern {
         Pattern::Parallel => {
-            let found = parallel::passes(&field, cusp_mm, &ways)?;
-            found.map(
-                |Passes {
-                     across_mm,
-                     steep_share,
-                 }| {
-                    let [from, to] = field.s;
-                    let line = |t: &f64| vec![field.place(from, *t), field.place(to, *t)];
-                    (across_mm.iter().map(line).collect(), steep_share)
-                },
-            )
+            let [from, to] = field.s;
+            let line = |t: &f64| vec![field.place(from, *t), field.place(to, *t)];
+            let across_mm = parallel::passes(&field, cusp_mm, &ways)?;
+            across_mm.map(|across_mm| across_mm.iter().map(line).collect())
         }
         Pattern::Scallop => scallop::passes(&field, cusp_mm, &ways)?,
-    }) else {
-        return Err(ToolpathError::Nowhere(cutter));
     };
-    let lines: Vec<Vec<[f64; 2]>> = lines;
+    let lines: Vec<Vec<[f64; 2]>> = found.ok_or(ToolpathError::Nowhere(cutter))?;
     let ways = Part::new(monitor, 0.4, 0.6);
     let tip = |at: [f64; 2]| field.tip(at);
     let drawn: Result<Vec<Vec<Strand>>, ToolpathError> = (0..lines.len())
@@ -225,11 +216,11 @@ fn finishing(
         drawing,
         scallop_mm: settings.scallop_mm,
         level_mm,
+        slope_mm: crate::cusp::slope_step_mm(&cutter, cusp_mm),
         decimals: machine.decimals,
         tip: &touching,
     };
     let mended = mend.mended(&strands, &Part::new(monitor, 0.6, 1.0))?;
-    if std::env::var("MILL_DEBUG").is_ok() { eprintln!("base strands {} mends {} left {:?}", strands.len(), mended.strands.len(), mended.left); }
     let links = Links {
         safe_z_mm: machine.safe_z_mm,
         feeds_mm_per_min: machine.feeds_mm_per_min(machine.tool(&cutter)?),
@@ -243,7 +234,7 @@ fn finishing(
     links.add(&mut moves, &strands, machine.stock.z_mm[1], None);
     links.retract(&mut moves);
     let finish = operation(machine, cutter, "finishing", passes, &moves, &touching)?;
-    Ok((finish, steep_share))
+    Ok((finish, mended.left_mm))
 }
 
 /// A part of the whole, whose progress is a part of that of the whole.

@@ -2,13 +2,10 @@
 //! does not fit all of its creases.
 
 use crate::cutter::Cutter;
-use crate::surface::Surface;
 
 /// Directions in which a better place is sought, turned by a part of a circle after each round.
 const DIRECTIONS: u32 = 8;
 const TURN: f64 = 0.3;
-/// Least step of the search, as a share of the cutter's radius.
-const LEAST_STEP: f64 = 3e-5;
 
 /// The least height that is left at a place, and the tip that leaves it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,29 +14,31 @@ pub(crate) struct Reach {
     pub(crate) tip_mm: [f64; 2],
 }
 
-/// Searches from a tip on, by steps that begin with `step_mm`. What it finds is no lower than what
-/// there is; in a bent groove it may be higher.
+/// Searches from a tip on, by steps that begin with `step_mm` and end with `shortest_mm`, or when what
+/// was found and the step are `enough`.
+/// What it finds is no lower than what there is; in a groove it may be a little higher. `height` is that of
+/// the tip where it may stand and is below some height.
 pub(crate) fn least(
-    surface: &Surface,
+    height: &dyn Fn([f64; 2], f64) -> Option<f64>,
     cutter: &Cutter,
     at: [f64; 2],
     from: [f64; 2],
-    step_mm: f64,
+    [step_mm, shortest_mm]: [f64; 2],
+    enough: &dyn Fn(&Reach, f64) -> bool,
 ) -> Option<Reach> {
-    let leaves = |tip: [f64; 2]| {
+    let leaves = |tip: [f64; 2], below_mm: f64| {
         let rho = libm::hypot(tip[0] - at[0], tip[1] - at[1]);
         let above = cutter.height_mm(rho)?;
-        Some(surface.drop_cutter(cutter, tip)?.z_mm + above)
+        Some(height(tip, below_mm - above)? + above)
     };
     let mut best = Reach {
-        height_mm: leaves(from)?,
+        height_mm: leaves(from, f64::INFINITY)?,
         tip_mm: from,
     };
-    let shortest = LEAST_STEP * cutter.radius_mm();
-    let mut step = step_mm.max(shortest);
+    let mut step = step_mm.max(shortest_mm);
     let mut turned = 0.0;
     let mut first = 0;
-    while step >= shortest {
+    while step >= shortest_mm && !enough(&best, step) {
         let mut has_moved = false;
         for k in 0..DIRECTIONS {
             // Where it went on before it goes on best.
@@ -47,7 +46,7 @@ pub(crate) fn least(
             let angle = turned + core::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS);
             let (sine, cosine) = libm::sincos(angle);
             let tip = [best.tip_mm[0] + step * cosine, best.tip_mm[1] + step * sine];
-            if let Some(height_mm) = leaves(tip)
+            if let Some(height_mm) = leaves(tip, best.height_mm)
                 && height_mm < best.height_mm
             {
                 best = Reach {
@@ -69,6 +68,7 @@ pub(crate) fn least(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::surface::Surface;
 
     /// A groove along x with sides that rise by 1 in 1.
     fn groove() -> Surface {
@@ -88,11 +88,21 @@ mod tests {
     fn a_ball_in_a_groove_leaves_what_it_does_not_fit() {
         let cutter = Cutter::ball(4.0).unwrap();
         let surface = groove();
+        let height = |at: [f64; 2], below: f64| {
+            let contact = surface.drop_below(&cutter, at, below)?;
+            Some(contact.z_mm)
+        };
         // Its centre is over the groove at 2 sqrt(2).
         let centre = 2.0 * core::f64::consts::SQRT_2;
-        for (y, least_mm) in [(0.0, centre - 2.0), (1.0, centre - 3.0_f64.sqrt()), (3.0, 3.0)] {
-            let found = least(&surface, &cutter, [0.3, y], [0.1, y + 0.4], 0.2).unwrap();
-            assert!((found.height_mm - least_mm).abs() < 1e-6, "{y}: {found:?}");
+        for (y, least_mm) in [
+            (0.0, centre - 2.0),
+            (1.0, centre - 3.0_f64.sqrt()),
+            (3.0, 3.0),
+        ] {
+            let steps = [0.2, 1e-5];
+            let never = |_: &Reach, _| false;
+            let found = least(&height, &cutter, [0.3, y], [0.1, y + 0.4], steps, &never).unwrap();
+            assert!((found.height_mm - least_mm).abs() < 1e-4, "{y}: {found:?}");
         }
     }
 }

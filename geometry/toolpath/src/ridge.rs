@@ -7,14 +7,19 @@
 use range_image::Monitor;
 use rayon::prelude::*;
 
-use crate::cutter::Cutter;
 use crate::error::ToolpathError;
+use crate::field::Field;
 use crate::reach;
-use crate::surface::Surface;
 use crate::ways::{Left, Ways};
 
 /// Rounds of halving for the place of a ridge.
 const ROUNDS: usize = 14;
+/// The cutter reaches the surface where it leaves no more than this share of what is asked for.
+const REACHED: f64 = 0.003;
+/// Last step of the search for what the cutter could leave, as a share of what is asked for, and how
+/// much a search that has come to a step may still gain, for that step.
+const SHORTEST: f64 = 0.02;
+const GAIN: f64 = 2.0;
 /// Steeper than this, z of the normal, cusps are not counted: 85 degrees.
 const WALL: f64 = 0.087_156;
 
@@ -36,8 +41,7 @@ pub(crate) struct Ridge {
 
 /// Lines over a surface on which cusps are sought.
 pub(crate) struct Lines<'a> {
-    pub(crate) surface: &'a Surface,
-    pub(crate) cutter: Cutter,
+    pub(crate) field: &'a Field<'a>,
     /// Unit directions, across and along the passes, and where lines in them begin and end.
     pub(crate) along: [[f64; 2]; 2],
     pub(crate) limits: [[f64; 2]; 2],
@@ -129,9 +133,9 @@ impl Lines<'_> {
         }
         let at = place(f64::midpoint(low, high));
         let height_mm = a.height_mm.max(b.height_mm);
-        let surface_mm = self.surface.height_mm(at)?;
+        let surface_mm = self.field.surface.height_mm(at)?;
         let tips = [a.tip_mm, b.tip_mm].map(|[x, y, _]| [x, y]);
-        let is_flat = self.cutter.corner_mm() == 0.0;
+        let is_flat = self.field.cutter.corner_mm() == 0.0;
         let flatness = |tip: [f64; 2]| {
             if is_flat {
                 self.flatness(at)
@@ -145,8 +149,21 @@ impl Lines<'_> {
             return None;
         }
         let amid = [0, 1].map(|k| f64::midpoint(tips[0][k], tips[1][k]));
-        let step_mm = apart(a.tip_mm, b.tip_mm) / 4.0;
-        let reach = reach::least(self.surface, &self.cutter, at, amid, step_mm)?;
+        let steps_mm = [apart(a.tip_mm, b.tip_mm) / 4.0, SHORTEST * self.limit_mm];
+        let reached_mm = surface_mm + REACHED * self.limit_mm;
+        // Either there is no less, or what may still be found cannot make a cusp too high.
+        let enough = |reach: &reach::Reach, step_mm: f64| {
+            let above = (height_mm - reach.height_mm) * nz;
+            reach.height_mm <= reached_mm || above + GAIN * step_mm <= self.limit_mm
+        };
+        let reach = reach::least(
+            &|tip, below_mm| self.field.tip_below(tip, below_mm),
+            &self.field.cutter,
+            at,
+            amid,
+            steps_mm,
+            &enough,
+        )?;
         let nz = flatness(reach.tip_mm)?;
         let cusp_mm = (height_mm - reach.height_mm) * nz;
         let order = usize::from(a.strand > b.strand);
@@ -156,7 +173,7 @@ impl Lines<'_> {
             tips: [tips[order], tips[1 - order]],
             strands: [a.strand.min(b.strand), a.strand.max(b.strand)],
             wanted: reach.tip_mm,
-            is_reached: (reach.height_mm - surface_mm) * nz <= 0.05 * self.limit_mm,
+            is_reached: (reach.height_mm - surface_mm) * nz <= 2.0 * REACHED * self.limit_mm,
             cusp_mm,
         })
     }
@@ -164,7 +181,7 @@ impl Lines<'_> {
     /// z of the normal of the cutter's end at a place.
     fn end_flatness(&self, tip: [f64; 2], at: [f64; 2]) -> f64 {
         let rho = libm::hypot(tip[0] - at[0], tip[1] - at[1]);
-        let lean = (rho - self.cutter.disc_mm()).max(0.0) / self.cutter.corner_mm();
+        let lean = (rho - self.field.cutter.disc_mm()).max(0.0) / self.field.cutter.corner_mm();
         ((1.0 - lean) * (1.0 + lean)).max(0.0).sqrt()
     }
 
@@ -175,7 +192,7 @@ impl Lines<'_> {
             let beside = |sign: f64| {
                 let mut place = at;
                 place[axis] += sign * probe;
-                self.surface.height_mm(place)
+                self.field.surface.height_mm(place)
             };
             Some((beside(1.0)? - beside(-1.0)?) / (2.0 * probe))
         };

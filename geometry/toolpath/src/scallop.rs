@@ -39,7 +39,7 @@ pub(crate) struct Place {
     pub(crate) tip: Option<f64>,
 }
 
-type Lines = (Vec<Vec<[f64; 2]>>, f64);
+type Lines = Vec<Vec<[f64; 2]>>;
 
 /// Places the passes: for each the corners of its way as seen from above.
 pub(crate) fn passes(
@@ -59,7 +59,6 @@ pub(crate) fn passes(
     };
     let mut here: Vec<Place> = stations.par_iter().map(|s| at(*s, first)).collect();
     let mut lines = vec![corners(field, &here, level)];
-    let (mut steep, mut all) = (0_usize, 0_usize);
     let most = ((last - first) / (level * STEEP * 0.25)).ceil() as usize + 2;
     crate::parallel::limit(((last - first) / (1.5 * level)) as usize)?;
     for _ in 0..most {
@@ -71,7 +70,7 @@ pub(crate) fn passes(
         }
         monitor.progress((done - first) / (last - first));
         let window = (2.0 * level / (stations[1] - stations[0])).ceil() as usize + 2;
-        let steps: Vec<Option<(f64, bool)>> = (0..here.len())
+        let steps: Vec<Option<f64>> = (0..here.len())
             .into_par_iter()
             .map(|k| {
                 let from = k.saturating_sub(window);
@@ -79,8 +78,6 @@ pub(crate) fn passes(
                 step(field, here[k], near, cusp_mm, level, last)
             })
             .collect();
-        all += steps.iter().flatten().count();
-        steep += steps.iter().flatten().filter(|(_, steep)| *steep).count();
         // Where the cutter mills nothing a pass keeps to its neighbours.
         let across = filled(&steps, level);
         let mut next: Vec<Place> = here
@@ -113,10 +110,10 @@ pub(crate) fn passes(
         here = next;
         lines.push(corners(field, &here, level));
     }
-    Ok(Some((lines, steep as f64 / all.max(1) as f64)))
+    Ok(Some(lines))
 }
 
-/// How far the next pass is across, and whether it is too steep there to be told.
+/// How far the next pass is across; no less than what suits 75 degrees.
 fn step(
     field: &Field<'_>,
     here: Place,
@@ -124,7 +121,7 @@ fn step(
     cusp_mm: f64,
     level: f64,
     last: f64,
-) -> Option<(f64, bool)> {
+) -> Option<f64> {
     here.tip?;
     let least = level * STEEP;
     let most = 3.0 * level;
@@ -143,14 +140,14 @@ fn step(
         };
         let is_last = here.t + step >= last;
         if (cusp - cusp_mm).abs() <= NEAR_ENOUGH * cusp_mm || (is_last && cusp <= cusp_mm) {
-            return Some((step, false));
+            return Some(step);
         }
         if cusp < cusp_mm {
             low = step;
         } else {
             high = step;
             if step <= least {
-                return Some((least, true));
+                return Some(least);
             }
         }
         told = Some(step);
@@ -163,14 +160,14 @@ fn step(
             2.0 * step
         };
         if low >= most {
-            return Some((most, false));
+            return Some(most);
         }
         step = next.clamp(least, most);
     }
     if low > 0.0 {
-        Some((low, false))
+        Some(low)
     } else {
-        told.map(|_| (least, true))
+        told.map(|_| least)
     }
 }
 
@@ -221,11 +218,11 @@ pub(crate) fn nearest(near: &[Place], [s, t, tip]: [f64; 3]) -> Option<(f64, [f6
 }
 
 /// Steps where there are none, from the nearest stations that have one.
-fn filled(steps: &[Option<(f64, bool)>], level: f64) -> Vec<f64> {
+fn filled(steps: &[Option<f64>], level: f64) -> Vec<f64> {
     let known: Vec<(usize, f64)> = steps
         .iter()
         .enumerate()
-        .filter_map(|(k, step)| step.map(|(step, _)| (k, step)))
+        .filter_map(|(k, step)| step.map(|step| (k, step)))
         .collect();
     (0..steps.len())
         .map(|k| {

@@ -126,20 +126,36 @@ impl HeightField {
             }
         }
         let (origin, pitch, columns) = (self.origin_mm, self.pitch_mm, self.columns);
+        // Fine paths have millions of strokes: each band looks at those that come near it.
+        let mut near: Vec<Vec<u32>> = vec![Vec::new(); self.rows.div_ceil(BAND)];
+        for (index, stroke) in (0..).zip(&strokes) {
+            let radius = cutters.get(stroke.cutter).map_or(0.0, Cutter::radius_mm);
+            let (a, b) = (stroke.from[1], stroke.to[1]);
+            let band = |y: f64| ((y - origin[1]) / (BAND as f64 * pitch)).max(0.0) as usize;
+            let last = band(a.max(b) + radius + pitch);
+            for list in near
+                .iter_mut()
+                .take(last + 1)
+                .skip(band(a.min(b) - radius - pitch))
+            {
+                list.push(index);
+            }
+        }
         let bands: Result<Vec<(f64, [f64; 2])>, Cancelled> = self
             .heights_mm
             .par_chunks_mut(BAND * columns.max(1))
             .enumerate()
-            .map(|(band, heights)| {
+            .map(|(band_number, heights)| {
                 monitor.check()?;
                 let mut band = Band {
-                    origin: [origin[0], origin[1] + (band * BAND) as f64 * pitch],
+                    origin: [origin[0], origin[1] + (band_number * BAND) as f64 * pitch],
                     pitch,
                     columns,
                     heights,
                     worst: (0.0, [0.0; 2]),
                 };
-                for stroke in &strokes {
+                for index in &near[band_number] {
+                    let stroke = &strokes[*index as usize];
                     if let Some(cutter) = cutters.get(stroke.cutter) {
                         band.cut(cutter, stroke);
                     }

@@ -167,14 +167,25 @@ mod tests {
         let mut all = Vec::new();
         for k in 0..40_u32 {
             let t = f64::from(k);
-            let a = [10.0 + 9.0 * libm::sin(t), 5.0 + 5.0 * libm::cos(1.7 * t), 0.1 * libm::sin(5.0 * t)];
-            let b = [10.0 + 9.0 * libm::sin(t + 0.4), 5.0 + 4.0 * libm::cos(1.7 * t + 0.3), 0.0];
+            let a = [
+                10.0 + 9.0 * libm::sin(t),
+                5.0 + 5.0 * libm::cos(1.7 * t),
+                0.1 * libm::sin(5.0 * t),
+            ];
+            let b = [
+                10.0 + 9.0 * libm::sin(t + 0.4),
+                5.0 + 4.0 * libm::cos(1.7 * t + 0.3),
+                0.0,
+            ];
             ways.add(&[a, b], k as usize);
             all.push(Way::new(a, b));
         }
         let mut guess = None;
         for k in 0..2000_u32 {
-            let at = [0.01 * f64::from(k), 5.0 + 4.9 * libm::sin(0.37 * f64::from(k))];
+            let at = [
+                0.01 * f64::from(k),
+                5.0 + 4.9 * libm::sin(0.37 * f64::from(k)),
+            ];
             let forced = all
                 .iter()
                 .enumerate()
