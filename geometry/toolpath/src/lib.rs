@@ -4,7 +4,8 @@
 //! triangles --> Surface --> cutter dropped onto it: heights of the tip
 //!                             |
 //!                             +--> roughing in levels, around the surface and an allowance
-//!                             +--> finishing passes, as far apart as their cusps allow
+//!                             +--> finishing passes, as far apart as their cusps allow; short ones
+//!                                    |   where these are still too high
 //!                                    |
 //!                                    v
 //!               samples --> lines and arcs above them --> links, retracts --> Operation

@@ -25,7 +25,7 @@ use crate::ways::Ways;
 const ROUNDS: usize = 6;
 /// Cusps above this share of what was asked for are mended: between two lines on which they are
 /// measured they may be a little higher.
-const TOO_HIGH: f64 = 1.025;
+const TOO_HIGH: f64 = 1.01;
 /// Lines within the cutter's radius, lines for the step on a slope, and places on a line for that.
 const LINES: f64 = 16.0;
 const LINES_OF_STEP: f64 = 6.0;

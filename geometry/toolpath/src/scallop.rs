@@ -24,7 +24,7 @@ const STATIONS: f64 = 24.0;
 /// How near to the cusp's height that is, as a share of it.
 const NEAR_ENOUGH: f64 = 0.004;
 /// How far corners of a pass may be off it, as a share of the step on a level plane.
-const SMOOTH: f64 = 0.005;
+const SMOOTH: f64 = 0.003;
 
 /// Rounds in which places of a new pass are drawn nearer, and the share of the wanted cusp from which
 /// that is done.

@@ -170,6 +170,30 @@ fn constant_scallop_passes_leave_no_notches_where_they_bend() {
 }
 
 #[test]
+fn in_a_crease_no_more_is_left_than_on_its_sides() {
+    // A groove that passes cross at 45 degrees, its sides sloping by the root of a half.
+    let facets = graph([20.0, 16.0], 0.25, |x, y| 0.5 * (x - y).abs());
+    let surface = surface(&facets);
+    let machine = machine(&surface, &["ball:6"]);
+    let fits_mm = 3.0 * (1.5_f64.sqrt() - 1.0);
+    for pattern in [Pattern::Parallel, Pattern::Scallop] {
+        let settings = Settings {
+            pattern,
+            ..settings("ball:6", 0.02)
+        };
+        let plan = planned(&surface, &machine, &settings);
+        let field = HeightField::of_stock(&machine.stock, [[6.0, 11.0]; 2], 0.01).unwrap();
+        let left = field.remove(&plan.operations, &Unmonitored).unwrap().field;
+        let highest = (0..left.rows)
+            .map(|k| left.heights_mm[k * left.columns + k] - fits_mm)
+            .fold(0.0, f64::max);
+        assert!(highest < 1.05 * 0.02, "{pattern:?}: {highest}");
+        let (gouge, _, _) = simulated(&surface, &machine, &plan, 0.11);
+        assert!(gouge < 6e-4, "{pattern:?}: {gouge}");
+    }
+}
+
+#[test]
 fn roughing_leaves_the_allowance_and_clears_for_finishing() {
     let surface = surface(&relief(6, [40.0, 30.0], 0.4));
     let machine = machine(&surface, &["ball:6", "flat:8"]);
