@@ -23,16 +23,17 @@ use crate::ways::Ways;
 
 /// Rounds in which short passes are added.
 const ROUNDS: usize = 6;
-/// Cusps above this share of what was asked for are mended: between two lines on which they are
-/// measured they may be a little higher.
-const TOO_HIGH: f64 = 1.01;
+/// Cusps above this share of what was asked for are mended. Passes are planned for a little less than
+/// was asked for, and a mend takes three quarters of a cusp away: those that are nearly right are left.
+const TOO_HIGH: f64 = 1.03;
 /// Lines within the cutter's radius, lines for the step on a slope, and places on a line for that.
 const LINES: f64 = 16.0;
 const LINES_OF_STEP: f64 = 6.0;
 const PLACES: f64 = 8.0;
 /// Tips that are apart by this share of that distance are on different passes.
 const JUMP: f64 = 0.3;
-/// Places that are looked at in each direction, at most; there are fewer lines then.
+/// Places that are looked at in each direction, at most: it takes minutes. There are fewer lines then,
+/// and that is told.
 const MOST_PLACES: f64 = 4e6;
 /// How often a place is mended; at outlines nothing may come of it.
 const MOST_TRIES: u32 = 2;
@@ -67,6 +68,8 @@ pub(crate) struct Mended {
     /// The highest cusp that is left, and where, if it is higher than asked for; at the outline passes
     /// end, and none is told.
     pub(crate) left_mm: Option<LeftOver>,
+    /// The distance of the lines on which cusps were sought, and the one wanted, if it is smaller.
+    pub(crate) coarse_mm: Option<[f64; 2]>,
 }
 
 impl Mend<'_> {
@@ -97,12 +100,13 @@ impl Mend<'_> {
             written
         };
         add(&mut ways, strands);
-        let lines = self.lines();
+        let (lines, wanted_mm) = self.lines();
         let mut dirty = Dirty::new(grown, reach / 2.0);
         let mut tries = BTreeMap::new();
         let mut mended = Mended {
             strands: Vec::new(),
             left_mm: None,
+            coarse_mm: (lines.apart_mm > wanted_mm).then_some([lines.apart_mm, wanted_mm]),
         };
         for round in 0..=ROUNDS {
             monitor.check()?;
@@ -143,14 +147,15 @@ impl Mend<'_> {
         Ok(mended)
     }
 
-    fn lines(&self) -> Lines<'_> {
+    /// The lines on which cusps are sought, and their distance if there could be any number of them.
+    fn lines(&self) -> (Lines<'_>, f64) {
         let field = self.field;
         let [x, y] = field.along;
         let limits = [field.t, field.s];
         let step_mm = self.slope_mm / PLACES;
         let area = limits.iter().map(|[low, high]| high - low).product::<f64>();
         let apart_mm = (field.cutter.radius_mm() / LINES).min(self.slope_mm / LINES_OF_STEP);
-        Lines {
+        let lines = Lines {
             field,
             along: [[-y, x], [x, y]],
             limits,
@@ -158,7 +163,8 @@ impl Mend<'_> {
             step_mm,
             jump_mm: JUMP * self.slope_mm,
             limit_mm: TOO_HIGH * self.scallop_mm,
-        }
+        };
+        (lines, apart_mm)
     }
 
     /// Whether there is surface all around a place.
@@ -370,5 +376,45 @@ impl Dirty {
 
     fn holds(&self, at: [f64; 2]) -> bool {
         self.cells[self.cell(0, at[0]) * self.shape[1] + self.cell(1, at[1])]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cutter::Cutter;
+    use crate::surface::Surface;
+    use crate::trace::Fineness;
+
+    #[test]
+    fn lines_that_would_be_too_many_are_fewer_and_that_is_known() {
+        let corners = [[0.0; 3], [400.0, 0.0, 0.0], [0.0, 300.0, 0.0]];
+        let surface = Surface::new(&corners, &[[0, 1, 2]]).unwrap();
+        let cutter = Cutter::ball(6.0).unwrap();
+        let field = Field::new(&surface, cutter, 0.0);
+        let apart = |scallop_mm: f64| {
+            let step_mm = crate::cusp::slope_step_mm(&cutter, scallop_mm);
+            let mend = Mend {
+                field: &field,
+                drawing: Drawing {
+                    fineness: Fineness::of(3.0, 2e-4, 1e-4),
+                    tolerance_mm: 0.005,
+                    arcs: true,
+                },
+                scallop_mm,
+                level_mm: step_mm,
+                slope_mm: step_mm,
+                decimals: 4,
+                tip: &|_| None,
+            };
+            let (lines, wanted_mm) = mend.lines();
+            let [places, beside] = lines.limits.map(|[low, high]| high - low);
+            assert!(places / lines.step_mm * beside / lines.apart_mm <= 1.01 * MOST_PLACES);
+            (lines.apart_mm, wanted_mm)
+        };
+        let (coarse, wanted) = apart(0.001);
+        assert!(coarse > 2.0 * wanted, "{coarse} {wanted}");
+        let (fine, wanted) = apart(0.2);
+        assert_eq!(fine, wanted);
     }
 }

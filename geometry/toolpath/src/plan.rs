@@ -8,7 +8,7 @@ use crate::error::ToolpathError;
 use crate::field::Field;
 use crate::link::Links;
 use crate::machine::Machine;
-use crate::mend::{LeftOver, Mend};
+use crate::mend::{Mend, Mended};
 use crate::motion::{Move, Operation};
 use crate::parallel;
 use crate::quantize::quantized;
@@ -72,13 +72,8 @@ pub fn plan(
     }
     let from = if settings.rough.is_some() { 0.3 } else { 0.0 };
     let part = Part::new(monitor, from, 1.0);
-    let (finish, left) = finishing(surface, machine, settings, &part)?;
-    if let Some((cusp_mm, [x, y])) = left {
-        notes.push(format!(
-            "a cusp of {cusp_mm:.4} mm is left near x {x:.2}, y {y:.2} mm, more than the scallop asks \
-             for: no pass reaches it"
-        ));
-    }
+    let (finish, told) = finishing(surface, machine, settings, &part)?;
+    notes.extend(told);
     operations.push(finish);
     for operation in &operations {
         check::after(machine, operation)?;
@@ -154,7 +149,7 @@ fn finishing(
     machine: &Machine,
     settings: &Settings,
     monitor: &dyn Monitor,
-) -> Result<(Operation, Option<LeftOver>), ToolpathError> {
+) -> Result<(Operation, Vec<String>), ToolpathError> {
     let cutter = settings.finish;
     let field = Field::new(surface, cutter, settings.angle_deg);
     // What the corridor adds to cusps is taken from them, half of it: it adds all or nothing.
@@ -228,13 +223,32 @@ fn finishing(
         drawing,
         tip: &touching,
     };
+    let notes = told(&mended);
     let passes = passes + mended.strands.len();
     strands.extend(mended.strands);
     let mut moves = Vec::new();
     links.add(&mut moves, &strands, machine.stock.z_mm[1], None);
     links.retract(&mut moves);
     let finish = operation(machine, cutter, "finishing", passes, &moves, &touching)?;
-    Ok((finish, mended.left_mm))
+    Ok((finish, notes))
+}
+
+/// What is worth knowing of cusps, in words.
+fn told(mended: &Mended) -> Vec<String> {
+    let left = mended.left_mm.map(|(cusp_mm, [x, y])| {
+        format!(
+            "a cusp of {cusp_mm:.4} mm is left near x {x:.2}, y {y:.2} mm, more than the scallop asks \
+             for: no pass reaches it"
+        )
+    });
+    let coarse = mended.coarse_mm.map(|[apart_mm, wanted_mm]| {
+        format!(
+            "cusps were measured on lines {apart_mm:.3} mm apart, not {wanted_mm:.3} mm: there are too \
+             many for so small a scallop, and between them cusps may be higher; choose a larger \
+             scallop, or mill the model in parts"
+        )
+    });
+    left.into_iter().chain(coarse).collect()
 }
 
 /// A part of the whole, whose progress is a part of that of the whole.
