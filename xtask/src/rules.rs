@@ -41,6 +41,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("skin", &["nurbs", "range-image"]),
     ("surfacing", &["nurbs", "range-image"]),
     ("toolpath", &["range-image"]),
+    ("terraces", &["nurbs"]),
+    (
+        "features",
+        &["range-image", "regrid", "segment", "shapes", "terraces"],
+    ),
     (
         "pipeline",
         &[
@@ -110,9 +115,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-const DELIVERABLES: [&str; 16] = [
+const DELIVERABLES: [&str; 17] = [
     "cad-exchange",
     "compare",
+    "features",
     "mesh-files",
     "nurbs",
     "page",
@@ -150,10 +156,11 @@ const DAEMON: [&str; 18] = [
     "toolpath",
 ];
 
-const COMMAND_LINE: [&str; 21] = [
+const COMMAND_LINE: [&str; 22] = [
     "cad-exchange",
     "compare",
     "deliverables",
+    "features",
     "nurbs",
     "pipeline",
     "range-image",

@@ -1,0 +1,1 @@
+//! One closed solid of a block with outlines cut into it and raised on it.
