@@ -25,7 +25,7 @@ use crate::ways::Ways;
 const ROUNDS: usize = 6;
 /// Cusps above this share of what was asked for are mended. Passes are planned for a little less than
 /// was asked for, and a mend takes three quarters of a cusp away: those that are nearly right are left.
-const TOO_HIGH: f64 = 1.03;
+const TOO_HIGH: f64 = 1.04;
 /// Lines within the cutter's radius, lines for the step on a slope, and places on a line for that.
 const LINES: f64 = 16.0;
 const LINES_OF_STEP: f64 = 6.0;
