@@ -31,7 +31,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("solids", &["nurbs"]),
     (
         "cad-exchange",
-        &["nurbs", "reconstruct", "shapes", "solids"],
+        &["nurbs", "reconstruct", "shapes", "solids", "terraces"],
     ),
     (
         "tessellate",
@@ -42,10 +42,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("surfacing", &["nurbs", "range-image"]),
     ("toolpath", &["range-image"]),
     ("terraces", &["nurbs"]),
-    (
-        "features",
-        &["range-image", "regrid", "segment", "shapes", "terraces"],
-    ),
+    ("features", &["nurbs", "range-image", "segment", "terraces"]),
     (
         "pipeline",
         &[
@@ -115,7 +112,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-const DELIVERABLES: [&str; 17] = [
+const DELIVERABLES: [&str; 18] = [
     "cad-exchange",
     "compare",
     "features",
@@ -131,6 +128,7 @@ const DELIVERABLES: [&str; 17] = [
     "skin",
     "storage",
     "surfacing",
+    "terraces",
     "tessellate",
     "toolpath",
 ];

@@ -66,12 +66,37 @@ pub fn border(
                 inner: node,
                 outer: other,
                 beyond: levels.labels[other],
-                sense: crate::levels::sense(image, regions, (node, other), step_mm),
+                sense: sense(image, regions, levels, (node, other), step_mm),
                 outermost: reached[other],
             });
         }
     }
     found
+}
+
+/// Planes this many steps apart are so however softly the edge between them is seen.
+const APART: f64 = 3.0;
+
+/// Which way z goes over a border: by the nodes beside it, or else by the floors of both levels.
+fn sense(
+    image: &RangeImage,
+    regions: &Regions,
+    levels: &Levels,
+    (node, other): (usize, usize),
+    step_mm: f64,
+) -> Sense {
+    let near = crate::levels::sense(image, regions, (node, other), step_mm);
+    let floor = |node: usize| {
+        let level = levels.levels.get(usize::from(levels.labels[node]))?;
+        let plane = level.plane.filter(|_| level.is_plane)?;
+        let (column, row) = (node / regions.rows, node % regions.rows);
+        Some(plane.z_mm(image.x_mm(column), image.y_mm(row)))
+    };
+    match (near, floor(node), floor(other)) {
+        (Sense::Level, Some(here), Some(there)) if there - here > APART * step_mm => Sense::Rises,
+        (Sense::Level, Some(here), Some(there)) if here - there > APART * step_mm => Sense::Falls,
+        _ => near,
+    }
 }
 
 /// Nodes that can be reached from the frame of what is within without entering it.

@@ -1,7 +1,11 @@
 //! Features, as they are told.
 
-use nalgebra::Vector3;
+use std::sync::Arc;
 
+use nalgebra::Vector3;
+use nurbs::BSplineSurface;
+
+use crate::candidate::Lie;
 use crate::outline::Shape;
 
 /// A length with its standard uncertainty, millimetres.
@@ -13,6 +17,19 @@ pub struct Dimension {
     pub value_mm: f64,
     /// Its standard uncertainty.
     pub sigma_mm: f64,
+}
+
+/// What a feature ends in, besides a plane at its height.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Bottom {
+    /// A plane.
+    Level,
+    /// Not seen.
+    Unseen,
+    /// A cone, as a drill leaves it: rise over run of its side. The height is that of its edge.
+    Tip(f64),
+    /// A free form: heights over u and v of the plan.
+    FreeForm(Arc<BSplineSurface<1>>),
 }
 
 /// One feature.
@@ -43,6 +60,10 @@ pub struct Feature {
     /// Heights above the plan of the face it goes into or stands on, and of its floor or top;
     /// the second is `None` where that was not seen.
     pub heights_mm: (f64, Option<f64>),
+    /// How it lies in what is around it; `None` of treated edges.
+    pub lie: Option<Lie>,
+    /// What it ends in.
+    pub bottom: Bottom,
     /// Whether it goes through the part.
     pub through: bool,
     /// What the user should know.

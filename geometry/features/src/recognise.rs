@@ -8,8 +8,9 @@ use crate::candidate::{Candidate, Lie, candidates, frame_of, top};
 use crate::chance::Chance;
 use crate::class::Class;
 use crate::code::{Attributes, Form, Sense, code, written};
-use crate::feature::{Dimension, Feature};
+use crate::feature::{Bottom, Dimension, Feature};
 use crate::field::{FieldError, field};
+use crate::floor::free_form;
 use crate::frame::Frame;
 use crate::levels::levels;
 use crate::measure::measured;
@@ -42,6 +43,11 @@ pub struct Settings<'a> {
     pub seed: u64,
     /// Smaller features than this, in pitches across, are left out; at least 3.
     pub fewest_pitches: f64,
+}
+
+impl Settings<'_> {
+    /// Usual least size of features, pitches across.
+    pub const USUAL_PITCHES: f64 = 6.0;
 }
 
 /// What was recognised.
@@ -96,9 +102,9 @@ pub fn recognise(
     settings: &Settings<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Recognition, RecogniseError> {
-    let field = field(columns, camera_mm, monitor)?;
+    let mut field = field(columns, camera_mm, monitor)?;
     let step_mm = least_step_mm(&field);
-    let regions = regions(&field, columns, monitor)?;
+    let regions = regions(&mut field, columns, monitor)?;
     let levels = levels(&field.image, &regions, step_mm);
     let top = top(&regions, &levels, step_mm).ok_or(RecogniseError::NoTop)?;
     let frame = frame_of(&top);
@@ -133,8 +139,14 @@ pub fn recognise(
         let Some(parent) = ids[treatment.of] else {
             continue;
         };
-        let of = features.iter().find(|f| f.id == parent).cloned();
-        features.extend(of.map(|of| edge(&sight, &treatment, &of, id)));
+        let Some(of) = features.iter_mut().find(|f| f.id == parent) else {
+            continue;
+        };
+        if treatment.kind == Kind::Round {
+            widen(of, found[treatment.of].lie, &treatment);
+        }
+        let own = edge(&sight, &treatment, of, id);
+        features.push(own);
     }
     let patterns = patterns(&features);
     Ok(Recognition {
@@ -224,6 +236,8 @@ fn feature(
         dimensions: own.dimensions,
         outline: candidate.outline.shape,
         heights_mm: own.heights_mm,
+        lie: Some(candidate.lie),
+        bottom: bottom(sight, candidate, own.heights_mm.1),
         through: own.through,
         warnings,
     }
@@ -310,6 +324,10 @@ fn edge(sight: &Sight<'_>, treatment: &Treatment, of: &Feature, id: u32) -> Feat
         }
     }
     let local = sight.frame.local(of.centre_mm);
+    let end = match treatment.kind {
+        Kind::Fillet => treatment.level_mm + treatment.rise_mm,
+        _ => treatment.level_mm - treatment.rise_mm,
+    };
     Feature {
         id,
         parent: Some(of.id),
@@ -322,8 +340,46 @@ fn edge(sight: &Sight<'_>, treatment: &Treatment, of: &Feature, id: u32) -> Feat
         direction: of.direction,
         dimensions,
         outline: of.outline,
-        heights_mm: (treatment.level_mm, None),
+        heights_mm: (treatment.level_mm, Some(end)),
+        lie: None,
+        bottom: Bottom::Level,
         through: false,
         warnings: Vec::new(),
+    }
+}
+
+/// Moves the outline of a feature with a rounded edge to where that is steep.
+fn widen(of: &mut Feature, lie: Lie, round: &Treatment) {
+    let outwards = match lie {
+        Lie::Hollow => -round.beyond_mm,
+        Lie::Body | Lie::Raised => round.beyond_mm,
+    };
+    for dimension in &mut of.dimensions {
+        if ["diameter", "length", "width"].contains(&dimension.name) {
+            dimension.value_mm += 2.0 * outwards;
+            let own = dimension.sigma_mm;
+            dimension.sigma_mm = (own * own + 4.0 * round.sigma_mm * round.sigma_mm).sqrt();
+        }
+    }
+    match &mut of.outline {
+        Shape::Circle(circle) => circle.radius_mm += outwards,
+        Shape::Rectangle(own) => {
+            own.first_mm = [own.first_mm[0] - outwards, own.first_mm[1] + outwards];
+            own.second_mm = [own.second_mm[0] - outwards, own.second_mm[1] + outwards];
+        }
+    }
+}
+
+/// What a candidate ends in.
+fn bottom(sight: &Sight<'_>, candidate: &Candidate, end_mm: Option<f64>) -> Bottom {
+    let is_plane = candidate
+        .levels
+        .first()
+        .is_some_and(|level| sight.levels.levels[usize::from(*level)].is_plane);
+    match (candidate.tip, end_mm) {
+        (Some(tip), _) => Bottom::Tip(tip.slope),
+        (None, None) => Bottom::Unseen,
+        (None, Some(_)) if is_plane || candidate.lie == Lie::Body => Bottom::Level,
+        (None, Some(_)) => free_form(sight, candidate).map_or(Bottom::Level, Bottom::FreeForm),
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::candidate::{Candidate, Lie};
 use crate::code::{End, Section};
+use crate::levels::AROUND;
 use crate::outline::Shape;
 use crate::outline::witnesses::Sight;
 
@@ -101,7 +102,7 @@ fn cut(sight: &Sight<'_>, candidate: &Candidate, across: &Across, beside_mm: f64
         (BEYOND_SHARE * across.length_mm).clamp(BEYOND_PITCHES.0 * pitch, BEYOND_PITCHES.1 * pitch);
     let half = 0.5 * across.length_mm + beyond;
     let count = (2.0 * half / pitch).ceil() as usize;
-    let mut points = Vec::with_capacity(count);
+    let mut places: Vec<Place> = Vec::with_capacity(count + 1);
     let mut own = 0;
     for k in 0..=count {
         let s = -half + 2.0 * half * k as f64 / count as f64;
@@ -110,24 +111,68 @@ fn cut(sight: &Sight<'_>, candidate: &Candidate, across: &Across, beside_mm: f64
             across.middle_mm[1] + across.along[1] * s + across.along[0] * beside_mm,
         ];
         let point = sight.frame.world([place[0], place[1], 0.0]);
-        let Some(node) = sight.regions.node(image, point.x, point.y) else {
-            continue;
-        };
-        let level = sight.levels.labels[node];
-        let is_inside = candidate.outline.shape.distance_mm(place) < -0.5 * pitch;
+        let beyond_mm = candidate.outline.shape.distance_mm(place);
+        let node = sight.regions.node(image, point.x, point.y);
+        let level = node.map_or(AROUND, |node| sight.levels.labels[node]);
+        let is_inside = beyond_mm < -0.5 * pitch;
         let is_own = candidate.levels.contains(&level);
         own += usize::from(is_own);
-        let height = if is_inside && (!is_own || candidate.tip.is_some()) {
-            floor(sight, candidate, point.x, point.y)
-        } else {
-            crate::levels::height(image, sight.regions, node).or_else(|| unseen(sight, candidate))
+        let height = match node {
+            _ if is_inside && (!is_own || candidate.tip.is_some()) => {
+                floor(sight, candidate, point.x, point.y)
+            }
+            Some(node) => face(sight, node, point.x, point.y)
+                .or_else(|| crate::levels::height(image, sight.regions, node))
+                .or_else(|| unseen(sight, candidate)),
+            None => unseen(sight, candidate),
         };
         if let Some(z_mm) = height {
-            points.push([s, z_mm]);
+            places.push(Place {
+                point: [s, z_mm],
+                level,
+                is_rim: beyond_mm > RIM_PITCHES * pitch,
+            });
         }
     }
+    let middle = places.partition_point(|place| place.point[0] < 0.0);
+    let (before, behind) = places.split_at_mut(middle);
+    only_first_rim(before.iter_mut().rev());
+    only_first_rim(behind.iter_mut());
+    let points = places.iter().map(|place| place.point).collect();
     let ends = across.ends;
     (own, Cut { points, ends })
+}
+
+/// A place of a section.
+struct Place {
+    point: [f64; 2],
+    level: u16,
+    is_rim: bool,
+}
+
+/// So far beyond the outline a place is of the rim and not of the wall, pitches.
+const RIM_PITCHES: f64 = 1.5;
+
+/// Going outwards, what lies beyond the first level of the rim is another feature: that level goes
+/// on in its place.
+fn only_first_rim<'a>(outwards: impl Iterator<Item = &'a mut Place>) {
+    let mut first: Option<(u16, f64)> = None;
+    for place in outwards.filter(|place| place.is_rim) {
+        let (level, z_mm) = *first.get_or_insert((place.level, place.point[1]));
+        if place.level != level {
+            place.point[1] = z_mm;
+        }
+    }
+}
+
+/// Chamfers and fillets are features of their own: their strips are put back to the faces and
+/// floors that they are cut from.
+fn face(sight: &Sight<'_>, node: usize, x_mm: f64, y_mm: f64) -> Option<f64> {
+    let region = sight.regions.labels[node];
+    let mut strips = sight.levels.strips.iter();
+    let strip = strips.find(|strip| strip.region == region)?;
+    let plane = sight.levels.levels[usize::from(strip.level)].plane?;
+    Some(plane.z_mm(x_mm, y_mm))
 }
 
 /// The candidate's own floor at a place.

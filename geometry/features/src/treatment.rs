@@ -48,13 +48,20 @@ pub struct Treatment {
     pub rise_mm: f64,
     /// Height of the face or floor that it runs out in, above the plan, millimetres.
     pub level_mm: f64,
-    /// Share of its nodes that it explains.
+    /// Share of its samples that it explains.
     pub score: f64,
+    /// How far the edge lies beyond the outline as measured, away from the strip, millimetres: what
+    /// is steep is hardly seen.
+    pub beyond_mm: f64,
 }
 
-/// A strip that is flatter at one end than at the other by more than this is round, as a share of
-/// its rise: how far its middle lies off the chord.
-const ROUND: f64 = 0.1;
+/// A strip is round where places lie nearer to an arc than this times their distance from a line.
+const ROUND: f64 = 0.95;
+/// Holes are countersunk more often than rounded.
+const ROUND_HOLE: f64 = 0.6;
+/// Radii and starts of arcs that are tried.
+const RADII: usize = 60;
+const STARTS: usize = 24;
 /// Fewest nodes that make a treatment.
 const FEWEST: usize = 24;
 
@@ -121,37 +128,38 @@ fn treatment(
     strips: &[Strip],
 ) -> Option<Treatment> {
     let candidate = &found[of];
-    let image = &sight.field.image;
-    let rows = sight.regions.rows;
     let level = sight
         .levels
         .levels
         .get(usize::from(strips.first()?.level))?;
     let plane = level.plane?;
-    // Distance beyond the outline, and height off the face or floor that it runs out in.
-    let mut places = Vec::new();
-    for (node, region) in sight.regions.labels.iter().enumerate() {
-        if !strips.iter().any(|strip| strip.region == *region) {
-            continue;
-        }
-        let (column, row) = (node / rows, node % rows);
-        if let Some(z_mm) = image.z_mm(column, row) {
-            let (x, y) = (image.x_mm(column), image.y_mm(row));
-            let [u, v, _] = sight.frame.local(nalgebra::Vector3::new(x, y, z_mm));
-            let off = (z_mm - plane.z_mm(x, y)) * sight.frame.axes[2].z;
-            places.push((candidate.outline.shape.distance_mm([u, v]).abs(), off.abs()));
-        }
-    }
+    // Distance from the outline, and height off the face or floor that it runs out in.
+    let is_strip = |region: u16| strips.iter().any(|strip| strip.region == region);
+    let places: Vec<(f64, f64)> = sight
+        .samples(&is_strip)
+        .into_iter()
+        .map(|[u, v, w]| {
+            let at = sight.frame.world([u, v, w]);
+            let off = (at.z - plane.z_mm(at.x, at.y)) * sight.frame.axes[2].z;
+            (candidate.outline.shape.distance_mm([u, v]).abs(), off.abs())
+        })
+        .collect();
     if places.len() < FEWEST {
         return None;
     }
-    let ([at_outline, slope], rms, count) = line(&places, sight.field.noise_mm)?;
+    let fitted = line(&places, sight.field.noise_mm)?;
+    let (at_outline, slope) = (fitted.at_zero, fitted.slope);
     if slope >= -0.1 {
         return None;
     }
     let width = -at_outline / slope;
-    let bow = bow(&places, at_outline, slope);
-    let is_round = bow > ROUND;
+    let arc = arc(&places);
+    let straight = cost_of(&places, &|distance| (at_outline + slope * distance, slope));
+    let share = match candidate.outline.shape {
+        Shape::Circle(_) if candidate.lie == Lie::Hollow => ROUND_HOLE,
+        _ => ROUND,
+    };
+    let is_round = arc.is_some_and(|arc| arc.cost < share * straight);
     let kind = match (falls, is_round) {
         (false, _) => Kind::Fillet,
         (true, true) => Kind::Round,
@@ -166,75 +174,78 @@ fn treatment(
     };
     let at = sight.frame.world([middle[0], middle[1], 0.0]);
     let level_mm = (plane.z_mm(at.x, at.y) - at.z) * sight.frame.axes[2].z;
-    let score = count as f64 / places.len() as f64;
-    let spread = rms / (count as f64).sqrt();
+    let score = fitted.count as f64 / places.len() as f64;
     match kind {
         Kind::Fillet | Kind::Round => {
-            let (radius, sigma_mm) = radius(&places)?;
+            let arc = arc?;
+            let step = 1.5 * arc.radius_mm / RADII as f64;
+            let spread = 4.0 * arc.cost / (places.len() as f64).sqrt();
             Some(Treatment {
                 kind,
                 of,
-                size_mm: radius,
-                sigma_mm,
-                rise_mm: radius,
+                size_mm: arc.radius_mm,
+                sigma_mm: (spread * spread + step * step).sqrt(),
+                rise_mm: arc.radius_mm,
                 level_mm,
                 score,
+                beyond_mm: -arc.start_mm,
             })
         }
         Kind::Chamfer | Kind::Countersink => Some(Treatment {
             kind,
             of,
             size_mm: width,
-            // Of the line at its middle, carried on to where it ends.
-            sigma_mm: 4.0 * spread / slope.abs(),
+            sigma_mm: fitted.sigma_mm(width) / slope.abs(),
             rise_mm: at_outline,
             level_mm,
             score,
+            beyond_mm: 0.0,
         }),
     }
 }
 
-/// How far the middle third of the places lies off the line through all, as a share of the rise:
-/// positive where the strip is steeper at the outline.
-fn bow(places: &[(f64, f64)], at_outline: f64, slope: f64) -> f64 {
-    let width = -at_outline / slope;
-    let mut off = [Vec::new(), Vec::new()];
-    for (distance, height) in places {
-        let share = distance / width;
-        let residual = height - at_outline - slope * distance;
-        if (0.33..0.67).contains(&share) {
-            off[0].push(residual);
-        } else if (0.0..1.2).contains(&share) {
-            off[1].push(residual);
-        }
-    }
-    let [Some(middle), Some(ends)] = off.map(|mut own| median(&mut own)) else {
-        return 0.0;
-    };
-    (ends - middle) / at_outline.abs().max(1e-9)
+/// An arc that is steep at the outline, and runs out in the face a radius away.
+#[derive(Debug, Clone, Copy)]
+struct Arc {
+    radius_mm: f64,
+    /// Where it is steep, millimetres beyond the outline as measured: what is steep is hardly seen.
+    start_mm: f64,
+    cost: f64,
 }
 
-/// Radius of the quarter circle that places lie on, and its uncertainty: at the outline it is
-/// steep, and it runs out in the face a radius away.
-fn radius(places: &[(f64, f64)]) -> Option<(f64, f64)> {
-    let cost = |radius: f64| {
-        let mut sizes: Vec<f64> = places
-            .iter()
-            .map(|(distance, height)| {
-                let along = (radius - distance).clamp(0.0, radius);
-                let expected = radius - (radius * radius - along * along).max(0.0).sqrt();
-                // Off along the normal of the arc, nearly.
-                let steep = along / (radius * radius - along * along).max(1e-6).sqrt();
-                (height - expected).abs() / (1.0 + steep * steep).sqrt()
-            })
-            .collect();
-        median(&mut sizes).unwrap_or(f64::INFINITY)
-    };
+/// Median distance of places from a curve, along its normal; told by height and slope.
+fn cost_of(places: &[(f64, f64)], curve: &dyn Fn(f64) -> (f64, f64)) -> f64 {
+    let mut sizes: Vec<f64> = places
+        .iter()
+        .map(|(distance, height)| {
+            let (expected, slope) = curve(*distance);
+            (height - expected).abs() / (1.0 + slope * slope).sqrt()
+        })
+        .collect();
+    median(&mut sizes).unwrap_or(f64::INFINITY)
+}
+
+/// The quarter circle that places lie on, by the least median of their distances.
+fn arc(places: &[(f64, f64)]) -> Option<Arc> {
     let widest = places.iter().map(|p| p.0).fold(0.0, f64::max);
-    let steps = 200;
-    let at = |k: usize| widest * (0.3 + 1.7 * k as f64 / steps as f64);
-    let best = (0..=steps).min_by(|a, b| cost(at(*a)).total_cmp(&cost(at(*b))))?;
-    let radius = at(best);
-    let sigma = cost(radius) * 4.0 / (places.len() as f64).sqrt() + widest * 1.7 / steps as f64;
-    (radius > 0.0).then_some((radius, sigma))
+    let mut best: Option<Arc> = None;
+    for k in 0..=RADII {
+        let radius_mm = widest * (0.5 + 1.5 * k as f64 / RADII as f64);
+        for s in 0..=STARTS {
+            let start_mm = radius_mm * (-0.3 + 0.4 * s as f64 / STARTS as f64);
+            let cost = cost_of(places, &|distance| {
+                let along = (radius_mm - (distance - start_mm)).clamp(0.0, radius_mm);
+                let root = (radius_mm * radius_mm - along * along).max(1e-6).sqrt();
+                (radius_mm - root, along / root)
+            });
+            if best.is_none_or(|best| cost < best.cost) {
+                best = Some(Arc {
+                    radius_mm,
+                    start_mm,
+                    cost,
+                });
+            }
+        }
+    }
+    best
 }

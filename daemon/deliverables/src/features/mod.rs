@@ -1,15 +1,18 @@
 //! Recognised features as a file.
 
 mod picture;
+mod step;
 
 use std::collections::BTreeMap;
 use std::io::Write;
 
+use features::arrangement::{Along, Pattern};
 use features::feature::Feature;
 use features::recognise::Recognition;
 use serde::Serialize;
 
 pub use picture::write_features_picture;
+pub use step::{FeaturesStepError, features_solid, write_features_step};
 
 /// Name of the file in the spool.
 pub const FEATURES_NAME: &str = "features.json";
@@ -24,6 +27,8 @@ pub struct FeaturesFile {
     pitch_mm: f64,
     /// The features, the block first, parents before what they hold.
     pub features: Vec<FeatureEntry>,
+    /// Equal holes in rows and on circles.
+    patterns: Vec<PatternEntry>,
     notes: Vec<String>,
 }
 
@@ -33,6 +38,16 @@ struct FrameEntry {
     x_axis: [f64; 3],
     y_axis: [f64; 3],
     z_axis: [f64; 3],
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct PatternEntry {
+    kind: &'static str,
+    members: Vec<u32>,
+    /// Distance of neighbours.
+    step_mm: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    diameter_mm: Option<f64>,
 }
 
 /// One feature of the file.
@@ -52,8 +67,6 @@ pub struct FeatureEntry {
     /// The middle of its outline, on the face that it goes into or stands on; of the block, on its
     /// top.
     pub center_mm: [f64; 3],
-    /// Standard uncertainties of that, along the axes of `frame`.
-    pub center_sigma_mm: [f64; 3],
     /// Unit vector out of the material.
     pub axis: [f64; 3],
     /// Unit vector along its length.
@@ -61,13 +74,23 @@ pub struct FeatureEntry {
     pub direction: Option<[f64; 3]>,
     /// Its dimensions by their names.
     pub dimensions_mm: BTreeMap<&'static str, f64>,
-    /// Their standard uncertainties.
-    pub sigma_mm: BTreeMap<&'static str, f64>,
+    /// Their standard uncertainties, and those of the centre along the axes of `frame`.
+    pub sigma_mm: SigmaEntry,
     /// Whether it goes through the part.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub through: bool,
     /// What the user should know.
     pub warnings: Vec<String>,
+}
+
+/// Standard uncertainties, millimetres.
+#[derive(Debug, Clone, Serialize)]
+pub struct SigmaEntry {
+    /// Of the dimensions, by their names.
+    #[serde(flatten)]
+    pub dimensions: BTreeMap<&'static str, f64>,
+    /// Of the centre, along the axes of the plan.
+    pub center: [f64; 3],
 }
 
 impl FeaturesFile {
@@ -87,6 +110,7 @@ impl FeaturesFile {
             noise_mm: round(recognition.noise_mm, LEAST_MM),
             pitch_mm: round(recognition.pitch_mm, LEAST_MM),
             features: recognition.features.iter().map(FeatureEntry::of).collect(),
+            patterns: recognition.patterns.iter().map(PatternEntry::of).collect(),
             notes: recognition.notes.clone(),
         }
     }
@@ -101,6 +125,20 @@ impl FeaturesFile {
     }
 }
 
+impl PatternEntry {
+    fn of(pattern: &Pattern) -> Self {
+        Self {
+            kind: match pattern.along {
+                Along::Line => "line",
+                Along::Circle => "circle",
+            },
+            members: pattern.members.clone(),
+            step_mm: round(pattern.step_mm, LEAST_MM),
+            diameter_mm: pattern.diameter_mm.map(|d| round(d, LEAST_MM)),
+        }
+    }
+}
+
 impl FeatureEntry {
     fn of(feature: &Feature) -> Self {
         let values = feature.dimensions.iter();
@@ -111,16 +149,18 @@ impl FeatureEntry {
             score: round(feature.score, 1e-4),
             code: feature.code.clone(),
             center_mm: rounded(feature.centre_mm.into(), LEAST_MM),
-            center_sigma_mm: rounded(feature.centre_sigma_mm, LEAST_MM),
             axis: rounded(feature.axis.into(), 1e-9),
             direction: feature.direction.map(|d| rounded(d.into(), 1e-9)),
             dimensions_mm: values
                 .clone()
                 .map(|d| (d.name, round(d.value_mm, LEAST_MM)))
                 .collect(),
-            sigma_mm: values
-                .map(|d| (d.name, round(d.sigma_mm, LEAST_MM)))
-                .collect(),
+            sigma_mm: SigmaEntry {
+                dimensions: values
+                    .map(|d| (d.name, round(d.sigma_mm, LEAST_MM)))
+                    .collect(),
+                center: rounded(feature.centre_sigma_mm, LEAST_MM),
+            },
             through: feature.through,
             warnings: feature.warnings.clone(),
         }

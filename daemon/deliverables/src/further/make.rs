@@ -2,10 +2,13 @@
 //! the model.
 
 use cad_exchange::iges::NamedSurface;
+use features::field::FieldError;
+use features::recognise::RecogniseError;
 use nurbs::BSplineSurface;
 use pipeline::{Observer, Stage};
 use range_image::Cancelled;
 use reconstruct::Model;
+use segment::SegmentError;
 use skin::SkinError;
 use surfacing::{HeightGrid, Made, SurfaceError};
 use tessellate::{MeshFace, TessellateError};
@@ -13,6 +16,7 @@ use toolpath::{Surface, ToolpathError};
 
 use super::milled::{MillError, mill};
 use super::options::{MillOf, SkinOptions, ToolpathOptions};
+use super::recognised::{recognised, write_recognised};
 use super::report::{SkinReport, SurfaceReport, ToolpathReport};
 use super::skinned::{SkinFigures, cut_remark, rows_of, skin_pictures};
 use super::surface_file::{HeightSurface, surface_model};
@@ -22,6 +26,7 @@ use super::surfaced::{
 };
 use crate::export::{file_stem, write_surfaces};
 use crate::extras::Extras;
+use crate::features::FEATURES_NAME;
 use crate::meshes::{TrianglesError, triangles};
 use crate::write::{DeliverError, Inputs};
 
@@ -34,7 +39,7 @@ pub(crate) struct FurtherReports {
 }
 
 /// Why one is left out; a wish to end is none.
-enum Stop {
+pub(super) enum Stop {
     Cancelled(Cancelled),
     Refused(String),
 }
@@ -49,6 +54,19 @@ impl From<SurfaceError> for Stop {
     fn from(error: SurfaceError) -> Self {
         match error {
             SurfaceError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Refused(other.to_string()),
+        }
+    }
+}
+
+impl From<RecogniseError> for Stop {
+    fn from(error: RecogniseError) -> Self {
+        match error {
+            RecogniseError::Cancelled(cancelled)
+            | RecogniseError::Field(FieldError::Cancelled(cancelled))
+            | RecogniseError::Segment(SegmentError::Cancelled(cancelled)) => {
+                Self::Cancelled(cancelled)
+            }
             other => Self::Refused(other.to_string()),
         }
     }
@@ -84,7 +102,7 @@ impl From<TrianglesError> for Stop {
 }
 
 /// Work by as many threads as the settings have.
-fn threaded<T: Send>(
+pub(super) fn threaded<T: Send>(
     inputs: &Inputs<'_>,
     work: impl FnOnce() -> Result<T, Stop> + Send,
 ) -> Result<T, Stop> {
@@ -135,6 +153,16 @@ pub(crate) fn write_further(
             match milled(extras, inputs, options, (&name, &parts), watch)? {
                 Ok(report) => reports.toolpath = report,
                 Err(stop) => left_out(extras, &name, stop)?,
+            }
+        }
+        watch.progress(1.0);
+    }
+    if wanted.features {
+        watch.stage(Stage::Features);
+        if !extras.lacks_room_for(FEATURES_NAME) {
+            match recognised(inputs, watch) {
+                Ok(found) => write_recognised(extras, inputs, &found)?,
+                Err(stop) => left_out(extras, FEATURES_NAME, stop)?,
             }
         }
         watch.progress(1.0);

@@ -8,6 +8,9 @@ use crate::outline::Rectangle;
 /// runs through it.
 const WALL: f64 = 0.35;
 
+/// And that rises along at least this share of its length.
+const COVERED: f64 = 0.25;
+
 /// The side nearest to a place, by the index in [`Rectangle::walls`].
 pub(super) fn side_of(rectangle: &Rectangle, place: [f64; 2]) -> usize {
     let [a, b] = rectangle.along(place);
@@ -23,7 +26,7 @@ pub(super) fn side_of(rectangle: &Rectangle, place: [f64; 2]) -> usize {
 }
 
 /// Which sides are walls, by the pairs nearest to each.
-pub(super) fn walls(rectangle: &Rectangle, pairs: &[(Pair, [f64; 2])]) -> [bool; 4] {
+pub(super) fn walls(rectangle: &Rectangle, pairs: &[(Pair, [f64; 2])], pitch_mm: f64) -> [bool; 4] {
     let mut counts = [[0_usize; 2]; 4];
     for (pair, place) in pairs {
         let side = side_of(rectangle, *place);
@@ -33,5 +36,10 @@ pub(super) fn walls(rectangle: &Rectangle, pairs: &[(Pair, [f64; 2])]) -> [bool;
             Sense::Level => {}
         }
     }
-    counts.map(|[rises, falls]| rises > 0 && rises as f64 >= WALL * (rises + falls) as f64)
+    let [first, second] = rectangle.sizes_mm();
+    core::array::from_fn(|side| {
+        let [rises, falls] = counts[side].map(|count| count as f64);
+        let length_mm = if side < 2 { second } else { first };
+        rises >= WALL * (rises + falls) && rises * pitch_mm >= COVERED * length_mm
+    })
 }

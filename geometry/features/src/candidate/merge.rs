@@ -20,8 +20,10 @@ pub(super) fn sets(sight: &Sight<'_>, top: &Top, step_mm: f64) -> Vec<Vec<u16>> 
         .collect();
     let mut first = 0;
     while first < sets.len() {
-        let second = (first + 1..sets.len())
-            .find(|&other| are_one(sight, sets[first][0], sets[other][0], step_mm));
+        let second = (first + 1..sets.len()).find(|&other| {
+            are_one(sight, sets[first][0], sets[other][0], step_mm)
+                || run_on(sight, &sets[first], &sets[other], step_mm)
+        });
         match second {
             Some(other) => {
                 let more = sets.remove(other);
@@ -90,4 +92,34 @@ fn are_one(sight: &Sight<'_>, one: u16, other: u16, step_mm: f64) -> bool {
                     theirs == level && runs_across(*their_count, other_widths)
                 })
         })
+}
+
+/// Of the border of two pieces of one free form this share has no step, of at least so many pairs.
+const SMOOTH: f64 = 0.6;
+const FEWEST_SMOOTH: usize = 3;
+
+/// Whether two sets run on in each other, and are no two planes that meet.
+fn run_on(sight: &Sight<'_>, one: &[u16], other: &[u16], step_mm: f64) -> bool {
+    let is_plane = |set: &[u16]| {
+        let mut levels = set.iter();
+        levels.all(|level| sight.levels.levels[usize::from(*level)].is_plane)
+    };
+    if is_plane(one) && is_plane(other) {
+        return false;
+    }
+    let own = border(
+        &sight.field.image,
+        sight.regions,
+        sight.levels,
+        step_mm,
+        &|level| one.contains(&level),
+    );
+    let common: Vec<Sense> = own
+        .pairs
+        .iter()
+        .filter(|pair| other.contains(&pair.beyond))
+        .map(|pair| pair.sense)
+        .collect();
+    let smooth = common.iter().filter(|s| **s == Sense::Level).count();
+    smooth >= FEWEST_SMOOTH && smooth as f64 >= SMOOTH * common.len() as f64
 }

@@ -115,27 +115,28 @@ pub fn candidates(
     Ok(found)
 }
 
-/// Whether two hollows go into the same, and each has the middle of the other inside.
+/// A piece is part of another whose outline holds this share of its nodes.
+const HELD: f64 = 0.95;
+
+/// Whether two hollows go into the same, and one lies within the outline of the other.
 fn are_one(sight: &Sight<'_>, one: &Candidate, other: &Candidate) -> bool {
-    let middle = |candidate: &Candidate| {
-        let level = candidate.levels.first()?;
-        let nodes = sight.levels.labels.iter().enumerate();
-        let (mut sum, mut count) = ([0.0; 2], 0.0);
-        for (node, _) in nodes.filter(|(_, label)| *label == level) {
-            let (column, row) = (node / sight.levels.rows, node % sight.levels.rows);
-            let image = &sight.field.image;
-            sum = [sum[0] + image.x_mm(column), sum[1] + image.y_mm(row)];
-            count += 1.0;
+    let image = &sight.field.image;
+    let rows = sight.levels.rows;
+    let holds = |outer: &Candidate, inner: &Candidate| {
+        let (mut inside, mut all) = (0, 0);
+        for (node, level) in sight.levels.labels.iter().enumerate() {
+            if inner.levels.contains(level) {
+                let (x, y) = (image.x_mm(node / rows), image.y_mm(node % rows));
+                let [u, v, _] = sight.frame.local(nalgebra::Vector3::new(x, y, 0.0));
+                let off = outer.outline.shape.distance_mm([u, v]);
+                inside += usize::from(off < 0.5 * image.pitch_mm());
+                all += 1;
+            }
         }
-        let point = nalgebra::Vector3::new(sum[0] / count, sum[1] / count, 0.0);
-        let [u, v, _] = sight.frame.local(point);
-        Some([u, v])
-    };
-    let holds = |a: &Candidate, b: &Candidate| {
-        middle(b).is_some_and(|place| a.outline.shape.distance_mm(place) < 0.0)
+        f64::from(all) * HELD <= inside as f64
     };
     let both = one.lie == Lie::Hollow && other.lie == Lie::Hollow && one.host == other.host;
-    both && holds(one, other) && holds(other, one)
+    both && (holds(one, other) || holds(other, one))
 }
 
 /// The candidate of a set of levels, if they are one.

@@ -51,7 +51,7 @@ pub(super) fn outlined(sight: &Sight<'_>, border: &Border, lie: Lie, seed: u64) 
     };
     if let Some(start) = rectangle(&all) {
         let (start, own) = match lie {
-            Lie::Hollow => sided(start, &pairs),
+            Lie::Hollow => sided(start, &pairs, sight.field.image.pitch_mm()),
             Lie::Raised | Lie::Body => (start, main.iter().map(|(pair, _)| *pair).collect()),
         };
         let told = witnesses(sight, &own);
@@ -68,8 +68,12 @@ pub(super) fn outlined(sight: &Sight<'_>, border: &Border, lie: Lie, seed: u64) 
 }
 
 /// Of walls the pairs that rise count, at open sides those that fall.
-fn sided(mut start: Rectangle, pairs: &[(Pair, [f64; 2])]) -> (Rectangle, Vec<Pair>) {
-    start.walls = walls(&start, pairs);
+fn sided(
+    mut start: Rectangle,
+    pairs: &[(Pair, [f64; 2])],
+    pitch_mm: f64,
+) -> (Rectangle, Vec<Pair>) {
+    start.walls = walls(&start, pairs, pitch_mm);
     let own = pairs.iter().filter(|(pair, place)| {
         let is_wall = start.walls[side_of(&start, *place)];
         is_wall == (pair.sense == Sense::Rises)

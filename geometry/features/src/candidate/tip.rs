@@ -30,37 +30,59 @@ pub(super) fn tip(sight: &Sight<'_>, level: u16, shape: &Shape) -> Option<Tip> {
     if own.is_plane || !own.is_seen() {
         return None;
     }
-    let image = &sight.field.image;
-    let rows = sight.levels.rows;
-    let mut places = Vec::new();
-    for (node, _) in sight
-        .levels
-        .labels
+    let region = *own.regions.first()?;
+    let places: Vec<(f64, f64)> = sight
+        .samples(&|other| other == region)
         .iter()
-        .enumerate()
-        .filter(|(_, l)| **l == level)
-    {
-        let (column, row) = (node / rows, node % rows);
-        if let Some(z_mm) = image.z_mm(column, row) {
-            let point = nalgebra::Vector3::new(image.x_mm(column), image.y_mm(row), z_mm);
-            let [u, v, w] = sight.frame.local(point);
+        .map(|[u, v, w]| {
             let [du, dv] = [u - circle.centre_mm[0], v - circle.centre_mm[1]];
-            places.push(((du * du + dv * dv).sqrt(), w));
-        }
-    }
-    let (line, rms, count) = line(&places, sight.field.noise_mm)?;
-    let [at_middle, slope] = line;
+            ((du * du + dv * dv).sqrt(), *w)
+        })
+        .collect();
+    let Line {
+        at_zero,
+        slope,
+        rms_mm,
+        count,
+        ..
+    } = line(&places, sight.field.noise_mm)?;
     let height = slope * circle.radius_mm;
-    let is_cone = SLOPES.contains(&slope) && count >= FEWEST && rms <= STRAYS * height;
+    let is_cone = SLOPES.contains(&slope)
+        && count >= FEWEST
+        && rms_mm <= STRAYS * height + 1.5 * sight.field.noise_mm;
     is_cone.then(|| Tip {
-        shoulder_mm: at_middle + height,
-        sigma_mm: 2.0 * rms / (count as f64).sqrt(),
+        shoulder_mm: at_zero + height,
+        sigma_mm: line(&places, sight.field.noise_mm)
+            .map_or(0.0, |line| line.sigma_mm(circle.radius_mm)),
         slope,
     })
 }
 
-/// Line through places without those that stray, its root mean square, and how many it is of.
-pub(crate) fn line(places: &[(f64, f64)], noise_mm: f64) -> Option<([f64; 2], f64, usize)> {
+/// A line of heights over a distance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Line {
+    /// Height at distance zero, millimetres.
+    pub(crate) at_zero: f64,
+    /// Rise over run.
+    pub(crate) slope: f64,
+    /// Root mean square of the places about it, millimetres.
+    pub(crate) rms_mm: f64,
+    /// How many places it is of.
+    pub(crate) count: usize,
+    middle: f64,
+    spread: f64,
+}
+
+impl Line {
+    /// Standard uncertainty of the height at a distance, millimetres.
+    pub(crate) fn sigma_mm(&self, distance_mm: f64) -> f64 {
+        let off = distance_mm - self.middle;
+        self.rms_mm * ((1.0 + off * off / self.spread) / self.count as f64).sqrt()
+    }
+}
+
+/// Line through places without those that stray.
+pub(crate) fn line(places: &[(f64, f64)], noise_mm: f64) -> Option<Line> {
     let mut kept: Vec<(f64, f64)> = places.to_vec();
     let mut found = None;
     for _ in 0..5 {
@@ -69,17 +91,23 @@ pub(crate) fn line(places: &[(f64, f64)], noise_mm: f64) -> Option<([f64; 2], f6
             return None;
         }
         let mean = |f: &dyn Fn(&(f64, f64)) -> f64| kept.iter().map(f).sum::<f64>() / count;
-        let (mx, my) = (mean(&|p| p.0), mean(&|p| p.1));
-        let xx = mean(&|p| (p.0 - mx) * (p.0 - mx));
-        let xy = mean(&|p| (p.0 - mx) * (p.1 - my));
-        if xx <= 0.0 {
+        let (middle, level) = (mean(&|p| p.0), mean(&|p| p.1));
+        let spread = mean(&|p| (p.0 - middle) * (p.0 - middle));
+        let both = mean(&|p| (p.0 - middle) * (p.1 - level));
+        if spread <= 0.0 {
             return None;
         }
-        let slope = xy / xx;
-        let line = [my - slope * mx, slope];
-        let off = |p: &(f64, f64)| p.1 - line[0] - line[1] * p.0;
-        let rms = mean(&|p| off(p) * off(p)).sqrt();
-        found = Some((line, rms, kept.len()));
+        let slope = both / spread;
+        let at_zero = level - slope * middle;
+        let off = |p: &(f64, f64)| p.1 - at_zero - slope * p.0;
+        found = Some(Line {
+            at_zero,
+            slope,
+            rms_mm: mean(&|p| off(p) * off(p)).sqrt(),
+            count: kept.len(),
+            middle,
+            spread,
+        });
         let mut sizes: Vec<f64> = places.iter().map(|p| off(p).abs()).collect();
         let within = 3.5 * (crate::field::median(&mut sizes)? / 0.6745).max(0.3 * noise_mm);
         kept = places

@@ -51,6 +51,32 @@ pub struct Sight<'a> {
     pub frame: &'a Frame,
 }
 
+impl Sight<'_> {
+    /// The samples that are borne out, in the plan, of the nodes whose region is asked for and that
+    /// have none of another beside them.
+    pub(crate) fn samples(&self, is_wanted: &dyn Fn(u16) -> bool) -> Vec<[f64; 3]> {
+        let image = &self.field.image;
+        let labels = &self.regions.labels;
+        let is_inner: Vec<bool> = (0..labels.len())
+            .map(|node| {
+                let mut beside = self.regions.neighbours(node);
+                is_wanted(labels[node]) && beside.all(|other| is_wanted(labels[other]))
+            })
+            .collect();
+        let mut found = Vec::new();
+        for (column, kept) in self.columns.iter().zip(&self.field.supported) {
+            for (sample, _) in column.samples().iter().zip(kept).filter(|(_, k)| **k) {
+                let node = self.regions.node(image, column.x_mm(), sample.y_mm);
+                if node.is_some_and(|node| is_inner[node]) {
+                    let point = nalgebra::Vector3::new(column.x_mm(), sample.y_mm, sample.z_mm);
+                    found.push(self.frame.local(point));
+                }
+            }
+        }
+        found
+    }
+}
+
 /// Witnesses beside these pairs. Inside is where the pairs' inner nodes are.
 #[must_use]
 pub fn witnesses(sight: &Sight<'_>, pairs: &[Pair]) -> Vec<Witness> {
@@ -69,13 +95,11 @@ pub fn witnesses(sight: &Sight<'_>, pairs: &[Pair]) -> Vec<Witness> {
     let beyond: Vec<Column> = before.chain(behind).collect();
     for column in sight.columns.iter().chain(&beyond) {
         let at = (column.x_mm() / image.pitch_mm()).round() as i64 - first;
-        // The image has no nodes beyond its frame: those at the frame speak for what is there.
-        let at = at.clamp(0, sight.regions.columns as i64 - 1);
         if !usize::try_from(at).is_ok_and(|at| columns.contains(&at)) {
             continue;
         }
         let pair_at = |y_mm: f64| {
-            let at = sight.regions.nearest(image, column.x_mm(), y_mm)?;
+            let at = sight.regions.node(image, column.x_mm(), y_mm)?;
             let pair = *node.get(&at)?;
             pairs.get(pair)
         };

@@ -4,9 +4,11 @@
 //! are what its walls hide from laser or sensor. Where nothing lower does, they are a hollow whose
 //! floor is not seen.
 
+mod bottoms;
 mod crumbs;
 mod fill;
 mod hidden;
+mod margin;
 mod strays;
 mod surface;
 mod table;
@@ -46,8 +48,8 @@ pub struct Regions {
 
 /// The index of the outside.
 pub const OUTSIDE: u16 = 0;
-/// Nodes beyond the frame that are taken for those at it.
-const BESIDE: f64 = 6.0;
+/// Nodes of the margin, on each side.
+pub(crate) const MARGIN: usize = 6;
 /// No label yet.
 const NONE: u16 = u16::MAX;
 /// A step of z between regions is at least so many deviations of single samples ...
@@ -61,15 +63,17 @@ pub fn least_step_mm(field: &Field) -> f64 {
     (STEP_DEVIATIONS * field.noise_mm).max(STEP_PITCHES * field.image.pitch_mm())
 }
 
-/// Divides the image and gives every node a region. The columns are those of the field.
+/// Divides the image and gives every node a region. The columns are those of the field, whose image
+/// gets a margin of a few nodes.
 ///
 /// # Errors
 /// The segmentation's.
 pub fn regions(
-    field: &Field,
+    field: &mut Field,
     columns: &[Column],
     monitor: &dyn Monitor,
 ) -> Result<Regions, SegmentError> {
+    let step_mm = least_step_mm(field);
     let image = &field.image;
     let settings = SegmentSettings::default();
     let map = segment::segment(image, &settings, monitor)?;
@@ -107,25 +111,28 @@ pub fn regions(
         .map(|label| renamed[usize::from(*label)])
         .collect();
     scraps_outside(image, &background, &mut labels, field.noise_mm);
-    crumbs::kept(image, &mut labels, &mut next, least_step_mm(field));
+    crumbs::kept(image, &mut labels, &mut next, step_mm);
     monitor.check()?;
     let (mut surfaces, mut table) = surface::surfaces(field, columns, &labels, usize::from(next));
     if strays::unlabel(image, &mut labels, &surfaces, field.noise_mm) {
-        crumbs::kept(image, &mut labels, &mut next, least_step_mm(field));
+        crumbs::kept(image, &mut labels, &mut next, step_mm);
         (surfaces, table) = surface::surfaces(field, columns, &labels, usize::from(next));
     }
     monitor.check()?;
     let mut regions = vec![Region::Outside(table)];
     regions.extend(surfaces.into_iter().map(Region::Part));
+    let (padded, labels) = margin::with_margin(image, &labels);
     let mut divided = Regions {
-        columns: image.columns(),
-        rows: image.rows(),
+        columns: padded.columns(),
+        rows: padded.rows(),
         labels,
         regions,
         notes: background.notes,
     };
-    hidden::hidden(image, &mut divided, least_step_mm(field));
-    fill::fill(image, &mut divided, least_step_mm(field));
+    hidden::hidden(&padded, &mut divided, step_mm);
+    fill::fill(&padded, &mut divided, step_mm);
+    bottoms::bottoms(&mut divided, field.noise_mm);
+    field.image = padded;
     Ok(divided)
 }
 
@@ -164,20 +171,6 @@ impl Regions {
         Some(column * self.rows + row)
     }
 
-    /// As [`Self::node`], of places up to a few pitches beyond the frame that at the frame.
-    #[must_use]
-    pub fn nearest(&self, image: &RangeImage, x_mm: f64, y_mm: f64) -> Option<usize> {
-        let (i, j) = image.origin();
-        let index = |value: f64, first: i64, count: usize| {
-            let at = (value / image.pitch_mm()).round() - first as f64;
-            let beyond = (-BESIDE..count as f64 + BESIDE).contains(&at);
-            (beyond && count > 0).then(|| at.clamp(0.0, (count - 1) as f64) as usize)
-        };
-        let column = index(x_mm, i, self.columns)?;
-        let row = index(y_mm, j, self.rows)?;
-        Some(column * self.rows + row)
-    }
-
     /// Neighbours of a node along columns and rows.
     pub fn neighbours(&self, node: usize) -> impl Iterator<Item = usize> + use<> {
         let (rows, columns) = (self.rows, self.columns);
@@ -191,11 +184,14 @@ impl Regions {
         beside.into_iter().flatten()
     }
 
-    /// Whether a node lies at the frame of the image.
+    /// Whether a node lies where the scan ends, or beyond.
     #[must_use]
     pub fn at_frame(&self, node: usize) -> bool {
         let (column, row) = (node / self.rows, node % self.rows);
-        column == 0 || row == 0 || column + 1 == self.columns || row + 1 == self.rows
+        column <= MARGIN
+            || row <= MARGIN
+            || column + 1 + MARGIN >= self.columns
+            || row + 1 + MARGIN >= self.rows
     }
 
     /// The surface of a region of the part.

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use jiff::Timestamp;
 use scan_files::Units;
 
 use super::train;
@@ -25,6 +26,13 @@ pub(crate) struct Args {
     /// current directory
     #[arg(short, long, value_name = "OUT.json")]
     output: Option<PathBuf>,
+    /// Rebuild the part from its features, as one closed solid, too
+    #[arg(long, value_name = "OUT.step")]
+    pub(super) step: Option<PathBuf>,
+    /// Time to be written into the STEP file; default: SOURCE_DATE_EPOCH, or when the input was
+    /// changed
+    #[arg(long, value_name = "TIME")]
+    pub(super) timestamp: Option<Timestamp>,
     /// Draw them over the part, too
     #[arg(long, value_name = "OUT.png")]
     pub(super) picture: Option<PathBuf>,

@@ -4,15 +4,17 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use deliverables::features::{FeaturesFile, write_features_picture};
-use deliverables::write_atomically;
+use deliverables::features::{
+    FeaturesFile, features_solid, write_features_picture, write_features_step,
+};
+use deliverables::{CadOptions, WriteError, write_atomically};
 use features::network::Classifier;
 use features::recognise::{RecogniseError, Settings, Teller, recognise};
 use serde::Serialize;
 
 use super::{Args, summary};
 use crate::command::shown::{self, Shown};
-use crate::command::{convert, places};
+use crate::command::{convert, places, timestamp};
 use crate::failure::Failure;
 use crate::{input, output};
 
@@ -22,6 +24,8 @@ pub(super) struct Recognised {
     pub(super) output: PathBuf,
     #[serde(flatten)]
     pub(super) file: FeaturesFile,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) step: Option<PathBuf>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) picture: Option<PathBuf>,
     pub(super) seconds: f64,
@@ -39,7 +43,10 @@ pub(super) async fn run(args: Args, json: bool) -> Result<(), Failure> {
 
 fn of_file(args: &Args, shown: &Shown) -> Result<Recognised, Failure> {
     let output = args.output();
-    for written in std::iter::once(&output).chain(&args.picture) {
+    for written in std::iter::once(&output)
+        .chain(&args.picture)
+        .chain(&args.step)
+    {
         places::check_file(written)?;
         if convert::same_file(written, args.scan()) {
             return Err(Failure::Usage(format!(
@@ -80,15 +87,36 @@ fn of_file(args: &Args, shown: &Shown) -> Result<Recognised, Failure> {
         })
         .map_err(|error| Failure::at(format!("cannot draw {}", path.display()), &error))?;
     }
+    let mut notes = Vec::new();
+    if let Some(path) = &args.step {
+        let (solid, told) = features_solid(&recognition)
+            .map_err(|error| Failure::at("cannot rebuild the part", &error))?;
+        notes = told;
+        let timestamp = timestamp::of(args.timestamp, scan.timestamp, args.scan())?;
+        let name = scan.name.clone().unwrap_or_else(|| args.name());
+        let cad = CadOptions::default();
+        write_atomically::<WriteError>(path, |sink| {
+            write_features_step(&solid, &name, timestamp, &cad, sink)
+        })
+        .map_err(|error| Failure::at(format!("cannot write {}", path.display()), &error))?;
+    }
     let mut warnings: Vec<String> = scan
         .notes
         .iter()
         .map(|note| format!("{}: {note}", args.scan().display()))
         .collect();
     warnings.extend(recognition.notes.iter().cloned());
+    if let Some(path) = &args.step {
+        warnings.extend(
+            notes
+                .iter()
+                .map(|note| format!("{}: {note}", path.display())),
+        );
+    }
     Ok(Recognised {
         output,
         file,
+        step: args.step.clone(),
         picture: args.picture.clone(),
         seconds,
         warnings,

@@ -25,6 +25,9 @@ pub(super) fn told(found: &Recognised) -> String {
         }
     }
     told.push(format!("written to   {}", found.output.display()));
+    if let Some(step) = &found.step {
+        told.push(format!("solid        {}", step.display()));
+    }
     if let Some(picture) = &found.picture {
         told.push(format!("picture      {}", picture.display()));
     }
@@ -37,7 +40,12 @@ fn line(feature: &FeatureEntry) -> Vec<String> {
         .dimensions_mm
         .iter()
         .map(|(name, value)| {
-            let sigma = feature.sigma_mm.get(name).copied().unwrap_or_default();
+            let sigma = feature
+                .sigma_mm
+                .dimensions
+                .get(name)
+                .copied()
+                .unwrap_or_default();
             format!("{} {value:.3} ({sigma:.3})", name.replace('_', " "))
         })
         .collect();
