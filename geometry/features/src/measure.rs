@@ -122,7 +122,9 @@ pub fn measured(
         warnings.push(format!(
             "its bottom is a cone of about {angle:.0} degrees; the depth is that of its edge"
         ));
-    } else if is_free && candidate.lie == Lie::Hollow {
+    } else if is_free && candidate.lie != Lie::Hollow {
+        warnings.push("its top is no plane: heights are those of the plane through it".to_owned());
+    } else if is_free {
         warnings
             .push("its floor is no plane: the depth is that of the plane through it".to_owned());
     }

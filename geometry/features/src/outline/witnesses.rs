@@ -80,7 +80,7 @@ impl Sight<'_> {
 /// Witnesses beside these pairs. Inside is where the pairs' inner nodes are.
 #[must_use]
 pub fn witnesses(sight: &Sight<'_>, pairs: &[Pair]) -> Vec<Witness> {
-    let Zone { node, columns } = Zone::of(sight, pairs);
+    let zone = Zone::of(sight, pairs);
     let image = &sight.field.image;
     let (first, _) = image.origin();
     let mut found = Vec::new();
@@ -95,13 +95,12 @@ pub fn witnesses(sight: &Sight<'_>, pairs: &[Pair]) -> Vec<Witness> {
     let beyond: Vec<Column> = before.chain(behind).collect();
     for column in sight.columns.iter().chain(&beyond) {
         let at = (column.x_mm() / image.pitch_mm()).round() as i64 - first;
-        if !usize::try_from(at).is_ok_and(|at| columns.contains(&at)) {
+        if !usize::try_from(at).is_ok_and(|at| zone.columns.contains(&at)) {
             continue;
         }
         let pair_at = |y_mm: f64| {
             let at = sight.regions.node(image, column.x_mm(), y_mm)?;
-            let pair = *node.get(&at)?;
-            pairs.get(pair)
+            pairs.get(zone.pair(at)?)
         };
         of_column(sight, column, &pair_at, &mut found);
     }
@@ -110,38 +109,44 @@ pub fn witnesses(sight: &Sight<'_>, pairs: &[Pair]) -> Vec<Witness> {
 
 /// Which pair speaks for which node.
 struct Zone {
-    node: std::collections::BTreeMap<usize, usize>,
+    /// Index of a pair for each node, and its squared distance in nodes.
+    node: Vec<(u32, u32)>,
     columns: core::ops::RangeInclusive<usize>,
 }
+
+/// No pair.
+const NOBODY: u32 = u32::MAX;
 
 impl Zone {
     fn of(sight: &Sight<'_>, pairs: &[Pair]) -> Self {
         let (columns, rows) = (sight.regions.columns, sight.regions.rows);
-        let mut nearest: std::collections::BTreeMap<usize, (usize, usize)> =
-            std::collections::BTreeMap::new();
+        let mut nearest = vec![(NOBODY, u32::MAX); columns * rows];
         let (mut low, mut high) = (usize::MAX, 0);
-        for (index, pair) in pairs.iter().enumerate() {
+        for (index, pair) in (0_u32..).zip(pairs) {
             for node in [pair.inner, pair.outer] {
                 let (column, row) = (node / rows, node % rows);
                 for c in column.saturating_sub(REACH)..=(column + REACH).min(columns - 1) {
                     (low, high) = (low.min(c), high.max(c));
                     for r in row.saturating_sub(REACH)..=(row + REACH).min(rows - 1) {
                         let far = c.abs_diff(column).pow(2) + r.abs_diff(row).pow(2);
-                        let entry = nearest.entry(c * rows + r).or_insert((usize::MAX, 0));
-                        if far < entry.0 {
-                            *entry = (far, index);
+                        let far = u32::try_from(far).unwrap_or(u32::MAX);
+                        let entry = &mut nearest[c * rows + r];
+                        if far < entry.1 {
+                            *entry = (index, far);
                         }
                     }
                 }
             }
         }
         Self {
-            node: nearest
-                .into_iter()
-                .map(|(n, (_, pair))| (n, pair))
-                .collect(),
+            node: nearest,
             columns: low..=high.max(low),
         }
+    }
+
+    fn pair(&self, node: usize) -> Option<usize> {
+        let (index, _) = *self.node.get(node)?;
+        (index != NOBODY).then_some(index as usize)
     }
 }
 
