@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use anyhow::{Context, Result};
 use relief_tests::rig::{Rig, small_house};
 use serde_json::json;
-use sim_scanner::{Object, Overrides, SimConfig};
+use sim_scanner::config::{Object, SimConfig};
+use sim_scanner::preset::Overrides;
 
 use crate::named;
 
