@@ -4,6 +4,8 @@ use super::{OUTSIDE, Region, Regions, Surface};
 
 /// Regions within so many deviations of it are scraps of it.
 const DEVIATIONS: f64 = 3.0;
+/// What is seen of it through a hole is less than this share of the part.
+const LARGEST: f64 = 0.4;
 /// Fewest nodes of a place where it is.
 const FEWEST: usize = 9;
 
@@ -32,6 +34,7 @@ pub(super) fn bottoms(divided: &mut Regions, noise_mm: f64) {
             *label = OUTSIDE;
         }
     }
+    let part = divided.labels.iter().filter(|l| **l != OUTSIDE).count();
     let mut seen = vec![false; divided.labels.len()];
     for start in 0..divided.labels.len() {
         if seen[start] || divided.labels[start] != OUTSIDE {
@@ -51,7 +54,7 @@ pub(super) fn bottoms(divided: &mut Regions, noise_mm: f64) {
             }
             next += 1;
         }
-        if is_open {
+        if is_open || piece.len() as f64 > LARGEST * part as f64 {
             continue;
         }
         let region = match table.filter(|_| piece.len() >= FEWEST) {
