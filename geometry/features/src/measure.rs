@@ -5,9 +5,9 @@ use nalgebra::Vector3;
 use crate::candidate::{Candidate, Lie};
 use crate::class::Class;
 use crate::feature::Dimension;
-use crate::outline::witnesses::Sight;
 use crate::outline::{Outline, Rectangle, Shape};
 use crate::plane::Plane;
+use crate::sight::Sight;
 
 /// What is measured of a candidate.
 #[derive(Debug, Clone, PartialEq)]

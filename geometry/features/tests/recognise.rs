@@ -18,7 +18,7 @@ fn settings() -> Settings<'static> {
     Settings {
         teller: Teller::Network(Classifier::shipped()),
         seed: 7,
-        fewest_pitches: Settings::USUAL_PITCHES,
+        least_pitches: Settings::USUAL_PITCHES,
     }
 }
 

@@ -9,12 +9,10 @@ use range_image::{Column, RangeImage};
 
 use super::posterior::Witness;
 use crate::border::Pair;
-use crate::field::Field;
-use crate::frame::Frame;
-use crate::levels::{Levels, Sense};
+use crate::levels::Sense;
 use crate::plane::Plane;
 use crate::ray::{passes, ray};
-use crate::regions::Regions;
+use crate::sight::Sight;
 
 /// Nodes to either side of the border whose samples are asked.
 const REACH: usize = 3;
@@ -33,49 +31,6 @@ const DOUBT_BETWEEN: f64 = 0.12;
 const NEAR_SLACKS: f64 = 4.0;
 /// How often a missing sample was on the upper surface nevertheless.
 const DOUBT_OF_MISSING: f64 = 0.25;
-
-/// What is looked at.
-#[derive(Debug, Clone, Copy)]
-pub struct Sight<'a> {
-    /// The columns of the field.
-    pub columns: &'a [Column],
-    /// Where rays come from in their own planes, y and z in millimetres, if that is known.
-    pub camera_mm: Option<[f64; 2]>,
-    /// The field.
-    pub field: &'a Field,
-    /// Its regions.
-    pub regions: &'a Regions,
-    /// Their levels.
-    pub levels: &'a Levels,
-    /// The plan.
-    pub frame: &'a Frame,
-}
-
-impl Sight<'_> {
-    /// The samples that are borne out, in the plan, of the nodes whose region is asked for and that
-    /// have none of another beside them.
-    pub(crate) fn samples(&self, is_wanted: &dyn Fn(u16) -> bool) -> Vec<[f64; 3]> {
-        let image = &self.field.image;
-        let labels = &self.regions.labels;
-        let is_inner: Vec<bool> = (0..labels.len())
-            .map(|node| {
-                let mut beside = self.regions.neighbours(node);
-                is_wanted(labels[node]) && beside.all(|other| is_wanted(labels[other]))
-            })
-            .collect();
-        let mut found = Vec::new();
-        for (column, kept) in self.columns.iter().zip(&self.field.supported) {
-            for (sample, _) in column.samples().iter().zip(kept).filter(|(_, k)| **k) {
-                let node = self.regions.node(image, column.x_mm(), sample.y_mm);
-                if node.is_some_and(|node| is_inner[node]) {
-                    let point = nalgebra::Vector3::new(column.x_mm(), sample.y_mm, sample.z_mm);
-                    found.push(self.frame.local(point));
-                }
-            }
-        }
-        found
-    }
-}
 
 /// Witnesses beside these pairs. Inside is where the pairs' inner nodes are.
 #[must_use]
@@ -359,7 +314,7 @@ fn height(sight: &Sight<'_>, node: usize, x_mm: f64, y_mm: f64) -> Option<(f64, 
         if surface.is_plane {
             return Some(at(&surface.plane));
         }
-        let z_mm = crate::levels::height(image, sight.regions, node)?;
+        let z_mm = sight.regions.height_mm(image, node)?;
         let slack = libm::tan(surface.slope_rad.min(1.4)) * image.pitch_mm() * REACH as f64;
         return Some((z_mm, slack));
     }
