@@ -294,3 +294,67 @@ fn the_network_decides() {
     assert_eq!(drawn.features.len(), told.features.len());
     assert_ne!(classes(&drawn), classes(&told));
 }
+
+#[test]
+fn a_slot_that_runs_out_is_cut_to_the_side_of_the_solid_and_no_wider() {
+    let slotted = |x: f64, y: f64| {
+        let (u, v) = turned(x, y);
+        if !within(u, v, [60.0, 40.0]) {
+            TABLE_MM
+        } else if within(u - 20.0, v, [20.0, 10.0]) {
+            -8.0
+        } else {
+            0.0
+        }
+    };
+    let found = found(&Bench::default(), &slotted);
+    let slot = of(&found, "slot")[0];
+    assert!((size(slot, "length") - 20.0).abs() < 0.1);
+    let solid = rebuilt(&found).unwrap().part.build().unwrap().solid;
+    let ought = 60.0 * 40.0 * -TABLE_MM - 20.0 * 10.0 * 8.0;
+    let off = solid.volume_mm3 / ought - 1.0;
+    // A wall that is a millimetre off makes 80 mm3 or more, 0.0015 of it.
+    assert!(off.abs() < 0.001, "{off}");
+}
+
+#[test]
+fn what_lies_beyond_the_rim_is_another_feature_s() {
+    // Between both is less land than a section takes in beyond the outline.
+    let side_by_side = |x: f64, y: f64| {
+        let (u, v) = turned(x, y);
+        if !within(u, v, [60.0, 40.0]) {
+            TABLE_MM
+        } else if within(u + 10.0, v, [12.0, 20.0]) {
+            -4.0
+        } else if within(u - 5.0, v, [14.0, 20.0]) {
+            -12.0
+        } else {
+            0.0
+        }
+    };
+    let found = found(&Bench::default(), &side_by_side);
+    let pockets = of(&found, "pocket");
+    assert_eq!(pockets.len(), 2, "{:?}", found.features);
+    for pocket in pockets {
+        assert_eq!(pocket.code, "4543212");
+    }
+}
+
+#[test]
+fn a_free_form_floor_with_a_fold_is_one_floor() {
+    let folded = |x: f64, y: f64| {
+        let (u, v) = turned(x, y);
+        if !within(u, v, [60.0, 40.0]) {
+            TABLE_MM
+        } else if within(u, v, [30.0, 20.0]) {
+            -12.0 + 0.02 * (u.abs() - 10.0).powi(2)
+        } else {
+            0.0
+        }
+    };
+    let found = found(&Bench::default(), &folded);
+    let pockets = of(&found, "pocket");
+    assert_eq!(found.features.len(), 2, "{:?}", found.features);
+    assert!((size(pockets[0], "length") - 30.0).abs() < 0.1);
+    assert!(pockets[0].warnings[0].contains("no plane"));
+}
