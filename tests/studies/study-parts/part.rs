@@ -9,7 +9,6 @@ use nalgebra::Vector3;
 use relief_tests::stl::triangles;
 use serde::Deserialize;
 use shapes::Family;
-use sim_scanner::Vec3;
 use sim_scanner::scene::{Body, Material, Mesh, MeshFace, Scene};
 
 use crate::surface::TrueSurface;
