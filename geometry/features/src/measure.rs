@@ -37,8 +37,7 @@ const CONTRADICTED: f64 = 0.08;
 /// A hollow whose floor lies within so many steps of the table goes through.
 const THROUGH_STEPS: f64 = 2.0;
 
-/// Measures a candidate as a feature of a class; `host` is the plane of what it goes into, `table`
-/// of what the part stands on.
+/// Measures a candidate as a feature of a class; `host` is the plane of what it goes into or stands on.
 #[must_use]
 pub fn measured(
     sight: &Sight<'_>,
@@ -53,10 +52,7 @@ pub fn measured(
         .levels
         .first()
         .and_then(|level| sight.levels.levels[usize::from(*level)].plane);
-    let middle = match candidate.outline.shape {
-        Shape::Circle(circle) => circle.centre_mm,
-        Shape::Rectangle(rectangle) => rectangle.middle_mm(),
-    };
+    let middle = candidate.outline.shape.middle_mm();
     // Where the axis through the middle meets a plane.
     let on = |plane: &Plane| {
         let mut w = 0.0;

@@ -174,10 +174,7 @@ fn treatment(
             _ => Kind::Chamfer,
         },
     };
-    let middle = match candidate.outline.shape {
-        Shape::Circle(circle) => circle.centre_mm,
-        Shape::Rectangle(rectangle) => rectangle.middle_mm(),
-    };
+    let middle = candidate.outline.shape.middle_mm();
     let at = sight.frame.world([middle[0], middle[1], 0.0]);
     let level_mm = (plane.z_mm(at.x, at.y) - at.z) * sight.frame.axes[2].z;
     let score = fitted.count as f64 / places.len() as f64;
