@@ -114,10 +114,12 @@ pub fn recognise(
         frame: &frame,
     };
     let least = settings.least_pitches;
-    let found = candidates(&sight, &top, step_mm, settings.seed, least, monitor)?;
+    let mut found = candidates(&sight, &top, step_mm, settings.seed, least, monitor)?;
     if found.first().is_none_or(|first| first.lie != Lie::Body) {
         return Err(RecogniseError::NoTop);
     }
+    let treated = treatments(&sight, &mut found);
+    monitor.check()?;
     let order = nested(&found);
     let mut features: Vec<Feature> = Vec::with_capacity(order.len());
     let mut ids: Vec<Option<u32>> = vec![None; found.len()];
@@ -129,18 +131,14 @@ pub fn recognise(
         let parent_id = parent.and_then(|p| ids[p]);
         features.push(feature(&sight, candidate, settings, step_mm, id, parent_id));
     }
-    let treated = treatments(&sight, &found);
     for treatment in treated {
         let id = u32::try_from(features.len()).unwrap_or(u32::MAX);
         let Some(parent) = ids[treatment.of] else {
             continue;
         };
-        let Some(of) = features.iter_mut().find(|f| f.id == parent) else {
+        let Some(of) = features.iter().find(|f| f.id == parent) else {
             continue;
         };
-        if treatment.kind == Kind::Round {
-            widen(of, found[treatment.of].lie, &treatment);
-        }
         let own = edge(&sight, &treatment, of, id);
         features.push(own);
     }
@@ -340,28 +338,6 @@ fn edge(sight: &Sight<'_>, treatment: &Treatment, of: &Feature, id: u32) -> Feat
         bottom: Bottom::Level,
         through: false,
         warnings: Vec::new(),
-    }
-}
-
-/// Moves the outline of a feature with a rounded edge to where that is steep.
-fn widen(of: &mut Feature, lie: Lie, round: &Treatment) {
-    let outwards = match lie {
-        Lie::Hollow => -round.beyond_mm,
-        Lie::Body | Lie::Raised => round.beyond_mm,
-    };
-    for dimension in &mut of.dimensions {
-        if ["diameter", "length", "width"].contains(&dimension.name) {
-            dimension.value_mm += 2.0 * outwards;
-            let own = dimension.sigma_mm;
-            dimension.sigma_mm = (own * own + 4.0 * round.sigma_mm * round.sigma_mm).sqrt();
-        }
-    }
-    match &mut of.outline {
-        Shape::Circle(circle) => circle.radius_mm += outwards,
-        Shape::Rectangle(own) => {
-            own.first_mm = [own.first_mm[0] - outwards, own.first_mm[1] + outwards];
-            own.second_mm = [own.second_mm[0] - outwards, own.second_mm[1] + outwards];
-        }
     }
 }
 

@@ -28,7 +28,6 @@ impl Sight<'_> {
     /// The samples that are borne out, in the plan, of the nodes whose region is asked for and that
     /// have none of another beside them.
     pub(crate) fn samples(&self, is_wanted: &dyn Fn(u16) -> bool) -> Vec<[f64; 3]> {
-        let image = &self.field.image;
         let labels = &self.regions.labels;
         let is_inner: Vec<bool> = (0..labels.len())
             .map(|node| {
@@ -36,11 +35,21 @@ impl Sight<'_> {
                 is_wanted(labels[node]) && beside.all(|other| is_wanted(labels[other]))
             })
             .collect();
+        self.samples_at(&|node| is_inner[node])
+    }
+
+    /// The samples that are borne out, in the plan, of the nodes whose level is asked for.
+    pub(crate) fn samples_of_levels(&self, is_wanted: &dyn Fn(u16) -> bool) -> Vec<[f64; 3]> {
+        self.samples_at(&|node| is_wanted(self.levels.labels[node]))
+    }
+
+    fn samples_at(&self, is_wanted: &dyn Fn(usize) -> bool) -> Vec<[f64; 3]> {
+        let image = &self.field.image;
         let mut found = Vec::new();
         for (column, kept) in self.columns.iter().zip(&self.field.supported) {
             for (sample, _) in column.samples().iter().zip(kept).filter(|(_, k)| **k) {
                 let node = self.regions.node(image, column.x_mm(), sample.y_mm);
-                if node.is_some_and(|node| is_inner[node]) {
+                if node.is_some_and(is_wanted) {
                     let point = nalgebra::Vector3::new(column.x_mm(), sample.y_mm, sample.z_mm);
                     found.push(self.frame.local(point));
                 }

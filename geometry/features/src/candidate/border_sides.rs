@@ -12,7 +12,7 @@ const WALL: f64 = 0.35;
 const COVERED: f64 = 0.25;
 
 /// The side nearest to a place, by the index in [`Rectangle::walls`].
-pub(super) fn side_of(rectangle: &Rectangle, place: [f64; 2]) -> usize {
+pub(crate) fn side_of(rectangle: &Rectangle, place: [f64; 2]) -> usize {
     let [a, b] = rectangle.along(place);
     let off = [
         (a - rectangle.first_mm[0]).abs(),

@@ -3,7 +3,7 @@
 mod border_sides;
 mod merge;
 mod outlined;
-pub(crate) mod tip;
+mod tip;
 mod top;
 
 use range_image::{Cancelled, Monitor};
@@ -14,6 +14,7 @@ use crate::levels::{AROUND, Levels, Sense};
 use crate::outline::{Outline, Shape};
 use crate::sight::Sight;
 
+pub(crate) use border_sides::side_of;
 pub use tip::Tip;
 pub use top::{Top, top};
 

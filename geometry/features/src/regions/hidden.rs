@@ -52,7 +52,8 @@ fn runs(
         };
         let (one, other) = (at(start.checked_sub(1)), at(Some(end)));
         let length = u32::try_from(end - start).unwrap_or(u32::MAX);
-        if (one.1 - other.1).abs() > step_mm {
+        // What slants is of different heights at the two ends of a hollow in it.
+        if one.0 != other.0 && (one.1 - other.1).abs() > step_mm {
             let lower = if one.1 < other.1 { one.0 } else { other.0 };
             for node in &line[start..end] {
                 if length < told[*node].0 {
