@@ -16,7 +16,7 @@ use crate::sight::Sight;
 
 /// Nodes to either side of the border whose samples are asked.
 const REACH: usize = 3;
-/// Columns and rays beyond the last ones of the scan.
+/// Columns beyond the last ones of the scan.
 const BEYOND: u32 = 4;
 /// Samples within so many deviations of a surface lie on it.
 const DEVIATIONS: f64 = 4.5;
@@ -43,7 +43,7 @@ pub fn witnesses(sight: &Sight<'_>, pairs: &[Pair]) -> Vec<Witness> {
         let step = beyond * sight.field.column_pitch_mm;
         Column::new(x_mm.unwrap_or(0.0) + step, Vec::new())
     };
-    // Beyond its last columns and rays, too, the scan has none.
+    // Beyond its last columns, too, the scan has none.
     let before =
         (1..=BEYOND).map(|k| empty(sight.columns.first().map(Column::x_mm), -f64::from(k)));
     let behind = (1..=BEYOND).map(|k| empty(sight.columns.last().map(Column::x_mm), f64::from(k)));
@@ -111,13 +111,7 @@ fn of_column<'p>(
     pair_at: &dyn Fn(f64) -> Option<&'p Pair>,
     found: &mut Vec<Witness>,
 ) {
-    let camera = sight.camera_mm;
-    let mut rays: Vec<(f64, f64)> = column
-        .samples()
-        .iter()
-        .map(|s| (ray(camera, s.y_mm, s.z_mm), s.z_mm))
-        .collect();
-    rays.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let rays = sight.rays_of(column);
     for sample in column.samples() {
         if let Some(pair) = pair_at(sample.y_mm)
             && let Some(side) = Side::of(sight, pair, column.x_mm(), sample.y_mm)
@@ -128,9 +122,6 @@ fn of_column<'p>(
     missing(sight, column.x_mm(), &rays, pair_at, found);
 }
 
-/// Most missing rays in a row that are looked at.
-const MOST_MISSING: f64 = 400.0;
-
 /// Rays that came back with nothing, between those that did and at both ends of the column.
 fn missing<'p>(
     sight: &Sight<'_>,
@@ -139,31 +130,15 @@ fn missing<'p>(
     pair_at: &dyn Fn(f64) -> Option<&'p Pair>,
     found: &mut Vec<Witness>,
 ) {
-    let step = sight.field.ray_step;
-    let [first, last] = sight.field.rays;
-    let level = sight.field.middle_z_mm;
-    let beyond = f64::from(BEYOND) * step;
-    let mut before = (first - beyond, f64::NEG_INFINITY);
-    let ends = [(last + beyond, f64::NEG_INFINITY)];
-    for &(at, z_mm) in rays.iter().chain(&ends) {
-        let gaps = ((at - before.0) / step).round();
-        let apart = (at - before.0) / gaps.max(1.0);
-        if (2.0..=MOST_MISSING).contains(&gaps) {
-            let near = before.1.max(z_mm);
-            let near = if near.is_finite() { near } else { level };
-            for k in 1..gaps as usize {
-                let ray = before.0 + apart * k as f64;
-                let guess = passes(sight.camera_mm, ray, near);
-                if let Some(pair) = pair_at(guess)
-                    && let Some(side) = Side::of(sight, pair, x_mm, guess)
-                {
-                    let y_mm = passes(sight.camera_mm, ray, side.upper_mm);
-                    found.push(side.witness(sight, x_mm, y_mm, false, DOUBT_OF_MISSING));
-                }
-            }
+    sight.missing_rays(rays, |ray, near_mm| {
+        let guess = passes(sight.camera_mm, ray, near_mm);
+        if let Some(pair) = pair_at(guess)
+            && let Some(side) = Side::of(sight, pair, x_mm, guess)
+        {
+            let y_mm = passes(sight.camera_mm, ray, side.upper_mm);
+            found.push(side.witness(sight, x_mm, y_mm, false, DOUBT_OF_MISSING));
         }
-        before = (at, z_mm);
-    }
+    });
 }
 
 /// The two surfaces beside a pair, at one place.

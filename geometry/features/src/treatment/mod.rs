@@ -1,5 +1,6 @@
 //! Chamfers, rounds, fillets and countersinks: the slanting strips along the edges of features.
 
+mod places;
 mod section;
 mod settle;
 
@@ -7,6 +8,7 @@ use crate::candidate::{Candidate, Lie, side_of};
 use crate::levels::Strip;
 use crate::outline::{Outline, Shape};
 use crate::sight::Sight;
+use places::Face;
 use section::{Section, Strays};
 use settle::{Edge, Form, Known, Settled};
 
@@ -224,33 +226,24 @@ fn edge(
     let into = INTO_FACE * reach_mm + FACE_PITCHES * pitch_mm;
     let out = OUT * reach_mm + OUT_PITCHES * pitch_mm;
     let others = levels_of_others(found, of, first.level);
-    let heights = |[u, v, w]: [f64; 3]| {
-        let at = sight.frame.world([u, v, w]);
-        let off = (at.z - plane.z_mm(at.x, at.y)) * sight.frame.axes[2].z;
-        if falls { -off } else { off }
-    };
-    let wanted = |[u, v, _]: &[f64; 3]| {
-        let off = shape.distance_mm([*u, *v]);
+    let is_wanted = |place: [f64; 2]| {
+        let off = shape.distance_mm(place);
         let within = if is_inside { -off } else { off };
         let is_near = (-out..reach_mm + into).contains(&within);
         is_near
             && match shape {
                 Shape::Circle(_) => true,
-                Shape::Rectangle(own) => own.walls[side_of(&own, [*u, *v])],
+                Shape::Rectangle(own) => own.walls[side_of(&own, place)],
             }
     };
-    let places: Vec<([f64; 2], f64)> = sight
-        .samples_of_levels(&|level| !others.contains(&level))
-        .into_iter()
-        .filter(wanted)
-        .map(|place| ([place[0], place[1]], heights(place)))
-        // What stands on the face tells nothing of its edge.
-        .filter(|(_, height)| *height > -6.0 * noise_mm)
-        .collect();
+    let mut places = Face { plane, falls }.places(sight, &|level| !others.contains(&level), &is_wanted);
+    // What stands on the face tells nothing of its edge.
+    places.retain(|place| place.height_mm > -6.0 * noise_mm);
     if places.len() < FEWEST {
         return None;
     }
-    let deepest = places.iter().map(|own| own.1).fold(0.0, f64::max);
+    let seen = places.iter().map(|own| own.height_mm);
+    let deepest = seen.filter(|height| height.is_finite()).fold(0.0, f64::max);
     Some(Edge {
         outline: shape,
         is_inside,
@@ -297,8 +290,9 @@ fn levels_of_others(found: &[Candidate], of: usize, face: u16) -> Vec<u16> {
 fn explained(edge: &Edge, settled: &Settled) -> f64 {
     let sign = if edge.is_inside { -1.0 } else { 1.0 };
     let (mut on, mut all) = (0_usize, 0_usize);
-    for (place, height) in &edge.places {
-        let distance = sign * settled.outline.distance_mm(*place);
+    for place in edge.places.iter().filter(|own| own.height_mm.is_finite()) {
+        let height = place.height_mm;
+        let distance = sign * settled.outline.distance_mm(place.at);
         if (0.0..settled.section.width_mm()).contains(&distance) {
             let (expected, slope) = settled.section.at(distance);
             let sigma = edge.strays.noise_mm + slope * edge.strays.blur_mm;

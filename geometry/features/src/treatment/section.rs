@@ -54,12 +54,23 @@ pub(super) struct Strays {
 
 /// Share of samples that tell of nothing: outliers and mixed ones.
 const OUTLIERS: f64 = 0.05;
+/// How often a ray that passes beyond the wall comes back with nothing against one that met the section.
+const MISSING: f64 = 0.25;
+/// What is steeper than this is lost so often that it tells nothing: 50 degrees.
+const TELLING: f64 = 1.2;
 /// What is steeper is no section, but a wall.
 const STEEPEST: f64 = 12.0;
 
 impl Strays {
-    /// Logarithm of how likely a sample at a distance from the wall has a height.
+    /// Logarithm of how likely a sample at a distance from the wall has a height, or a ray that passes
+    /// there does not come back.
     pub(super) fn log_likelihood(&self, section: Section, distance_mm: f64, height_mm: f64) -> f64 {
+        if height_mm.is_infinite() {
+            let share = 0.5 * libm::erfc(-distance_mm / self.blur_mm * core::f64::consts::FRAC_1_SQRT_2);
+            let (_, slope) = section.at(distance_mm.max(0.0));
+            let lost = if slope > TELLING { 1.0 } else { MISSING };
+            return libm::log(share * lost + (1.0 - share));
+        }
         let anywhere = OUTLIERS / self.span_mm;
         // Beyond the wall lies what is beyond the section.
         let below = if height_mm > section.rise_mm() - 3.0 * self.noise_mm {

@@ -1,14 +1,15 @@
 //! The section of a treated edge, and where its wall is, by the likelihood of the samples on both
 //! sides of the wall: what is steep is hardly seen, so neither is known without the other.
 
+use super::places::Place;
 use super::section::{Section, Strays};
 use crate::outline::{Circle, Rectangle, Shape};
 
 /// What is known of an edge before its section is.
 #[derive(Debug, Clone)]
 pub(super) struct Edge {
-    /// Places of the plan, and heights off the face.
-    pub(super) places: Vec<([f64; 2], f64)>,
+    /// What is seen of it.
+    pub(super) places: Vec<Place>,
     /// The outline as measured.
     pub(super) outline: Shape,
     /// Whether the section lies within the outline.
@@ -210,9 +211,10 @@ impl Edge {
         };
         let section = Self::section(form, numbers);
         let sign = if self.is_inside { -1.0 } else { 1.0 };
-        let mut heights = self.places.iter().map(|(_, height)| *height);
+        let mut heights = self.places.iter().map(|own| own.height_mm);
         let mut sum = 0.0;
-        shape.distances(self.places.iter().map(|(place, _)| *place), |distance| {
+        let rise_mm = section.rise_mm();
+        shape.distances(self.places.iter().map(|own| own.beside(rise_mm)), |distance| {
             if let Some(height) = heights.next() {
                 sum += self.strays.log_likelihood(section, sign * distance, height);
             }
