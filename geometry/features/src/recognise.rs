@@ -118,8 +118,7 @@ pub fn recognise(
     if found.first().is_none_or(|first| first.lie != Lie::Body) {
         return Err(RecogniseError::NoTop);
     }
-    let treated = treatments(&sight, &mut found);
-    monitor.check()?;
+    let treated = treatments(&sight, &mut found, monitor)?;
     let order = nested(&found);
     let mut features: Vec<Feature> = Vec::with_capacity(order.len());
     let mut ids: Vec<Option<u32>> = vec![None; found.len()];

@@ -1,16 +1,23 @@
 //! Chamfers, rounds, fillets and countersinks: the slanting strips along the edges of features.
 
+mod owner;
 mod places;
+mod rim;
 mod section;
 mod settle;
 
-use crate::candidate::{Candidate, Lie, side_of};
+use std::collections::BTreeMap;
+
+use range_image::{Cancelled, Monitor};
+
+use crate::candidate::{Candidate, Lie};
 use crate::levels::Strip;
-use crate::outline::{Outline, Shape};
+use crate::outline::Shape;
 use crate::sight::Sight;
-use places::Face;
-use section::{Section, Strays};
-use settle::{Edge, Form, Known, Settled};
+use owner::owner;
+use rim::Rim;
+use section::Section;
+use settle::{Edge, Form, Settled};
 
 /// What a strip is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -57,113 +64,88 @@ pub struct Treatment {
     pub score: f64,
 }
 
-/// Fewest samples that make a treatment.
-const FEWEST: usize = 24;
-/// Places across walls are so uncertain, shares of the pitch: the spot and the rays.
-const BLUR: f64 = 0.03;
-/// What is looked at reaches into the face this much further than the strip, and so many pitches ...
-const INTO_FACE: f64 = 1.2;
-const FACE_PITCHES: f64 = 4.0;
-/// ... and out of the outline as measured this much of its width, and so many pitches.
-const OUT: f64 = 1.0;
-const OUT_PITCHES: f64 = 3.0;
-/// A strip runs along an outline where it is seen in this share of as many sectors about its middle.
-const ALONG: f64 = 0.4;
-const SECTORS: usize = 32;
-/// Share of samples of a strip that may reach further than the strip.
-const BEYOND: f64 = 0.03;
 /// Where a section is told, samples lie within so many standard deviations of it.
 const EXPLAINED: f64 = 3.0;
-/// How well feet of walls are known by their tops, shares of the pitch.
-const FOOT: f64 = 0.15;
-/// And walls below broken edges, if they were taken for what they are.
-const TOP: f64 = 0.1;
-/// Standard uncertainty of widths that no number of samples falls below, shares of the pitch: no edge
-/// is made as exactly.
-const LEAST_SIGMA: f64 = 0.03;
+/// Standard uncertainty of widths and of walls that no number of samples falls below, shares of the
+/// pitch: neither spots nor edges are as exactly what they are taken for.
+const LEAST_SIGMA: f64 = 0.05;
+/// A section of which no strip was seen is one where its logarithm of likelihood is greater by so
+/// much than without any, it explains so much of what is there, and it is so many pitches wide.
+const LEAST_GAIN: f64 = 40.0;
+const LEAST_SCORE: f64 = 0.7;
+const LEAST_PITCHES: f64 = 3.0;
 
-/// The treatments that the strips make, for each candidate and kind one. What is steep of a section
+/// The treatments of rims and feet of candidates, one at most for each. What is steep of a section
 /// is hardly seen: the outlines of candidates are moved to where the sections say that walls are.
-#[must_use]
-pub fn treatments(sight: &Sight<'_>, found: &mut [Candidate]) -> Vec<Treatment> {
-    let mut groups: Vec<((usize, bool), Vec<Strip>)> = Vec::new();
+///
+/// # Errors
+/// Cancelled.
+pub fn treatments(
+    sight: &Sight<'_>,
+    found: &mut [Candidate],
+    monitor: &dyn Monitor,
+) -> Result<Vec<Treatment>, Cancelled> {
+    let mut groups: BTreeMap<(usize, bool), Vec<Strip>> = BTreeMap::new();
     for strip in &sight.levels.strips {
-        let Some(of) = owner(sight, found, strip) else {
-            continue;
-        };
-        let key = (of, strip.falls);
-        match groups.iter_mut().find(|(own, _)| *own == key) {
-            Some((_, strips)) => strips.push(*strip),
-            None => groups.push((key, vec![*strip])),
+        if let Some(of) = owner(sight, found, strip) {
+            groups.entry((of, strip.falls)).or_default().push(*strip);
         }
     }
-    groups.sort_by_key(|(key, _)| *key);
     let mut treated = Vec::new();
-    for ((of, falls), strips) in groups {
-        if let Some((own, outline)) = treatment(sight, found, of, falls, &strips) {
-            found[of].outline = outline;
-            treated.push(own);
-        }
-    }
-    treated
-}
-
-/// The candidate whose edge a strip runs along: a hollow in the face that it falls from, or that
-/// face's own.
-fn owner(sight: &Sight<'_>, found: &[Candidate], strip: &Strip) -> Option<usize> {
-    let regions = sight.regions;
-    let mut beside = vec![0_usize; sight.levels.levels.len()];
-    for node in 0..regions.labels.len() {
-        if regions.labels[node] != strip.region {
-            continue;
-        }
-        for other in regions.neighbours(node) {
-            let level = sight.levels.labels[other];
-            if level != strip.level {
-                beside[usize::from(level)] += 1;
+    for of in 0..found.len() {
+        for falls in [false, true] {
+            monitor.check()?;
+            let of_strips = groups
+                .get(&(of, falls))
+                .and_then(|strips| Rim::of_strips(sight, found, of, strips));
+            let rim = of_strips.or_else(|| Rim::hinted(sight, found, of, falls));
+            let Some((rim, edge)) = rim.and_then(|rim| Some((rim, rim.edge(sight, found)?))) else {
+                continue;
+            };
+            if let Some(settled) =
+                settled(&edge, falls, of_strips.is_some(), sight.field.pitch_mm())
+            {
+                treated.push(treatment(sight, &found[of], &rim, &edge, &settled));
+                if falls {
+                    moved(
+                        &mut found[of],
+                        &settled,
+                        LEAST_SIGMA * sight.field.pitch_mm(),
+                    );
+                }
             }
         }
     }
-    let holder = |level: u16| found.iter().position(|c| c.levels.contains(&level));
-    let own = holder(strip.level)?;
-    let most = (0..beside.len())
-        .filter(|k| beside[*k] > 0)
-        .max_by_key(|k| beside[*k]);
-    let other = most.and_then(|k| holder(u16::try_from(k).ok()?));
-    let Some(other) = other.filter(|other| *other != own) else {
-        return Some(own);
+    Ok(treated)
+}
+
+/// The section of an edge; of one without a strip only where there must be one.
+fn settled(edge: &Edge, falls: bool, is_strip: bool, pitch_mm: f64) -> Option<Settled> {
+    let arc = edge.settled(Form::Arc);
+    let slant = falls.then(|| edge.settled(Form::Slant)).flatten();
+    let samples = edge.places.len();
+    let best = [slant, arc]
+        .into_iter()
+        .flatten()
+        .max_by(|a, b| a.evidence(samples).total_cmp(&b.evidence(samples)))?;
+    let is_needed = || {
+        let plain = edge.settled(Form::Plain);
+        plain.is_none_or(|plain| best.evidence(samples) > plain.evidence(samples) + LEAST_GAIN)
+            && explained(edge, &best) >= LEAST_SCORE
+            && best.section.width_mm() >= LEAST_PITCHES * pitch_mm
     };
-    let goes_into = found[other].host != 0 && found[own].levels.contains(&found[other].host);
-    let is_others = match (strip.falls, found[other].lie) {
-        // Falls into a hollow of its face, or rises to what stands on its floor.
-        (true, Lie::Hollow) | (false, Lie::Raised) => goes_into,
-        _ => false,
-    };
-    Some(if is_others { other } else { own })
+    (is_strip || is_needed()).then_some(best)
 }
 
 fn treatment(
     sight: &Sight<'_>,
-    found: &[Candidate],
-    of: usize,
-    falls: bool,
-    strips: &[Strip],
-) -> Option<(Treatment, Outline)> {
-    let candidate = &found[of];
-    let first = strips.first()?;
-    let level = sight.levels.levels.get(usize::from(first.level))?;
-    let plane = level.plane?;
-    let edge = edge(sight, found, of, falls, strips)?;
-    let is_hole = matches!(candidate.outline.shape, Shape::Circle(_)) && candidate.lie == Lie::Hollow;
-    let arc = edge.settled(Form::Arc);
-    let settled = match (falls, edge.settled(Form::Slant)) {
-        (false, _) | (true, None) => arc?,
-        (true, Some(slant)) => match arc {
-            Some(arc) if arc.evidence(edge.places.len()) > slant.evidence(edge.places.len()) => arc,
-            _ => slant,
-        },
-    };
-    let kind = match (falls, settled.section) {
+    candidate: &Candidate,
+    rim: &Rim,
+    edge: &Edge,
+    settled: &Settled,
+) -> Treatment {
+    let is_hole = matches!(settled.outline, Shape::Circle(_)) && candidate.lie == Lie::Hollow;
+    let kind = match (rim.face.falls, settled.section) {
         (false, _) => Kind::Fillet,
         (true, Section::Arc(_)) => Kind::Round,
         (true, Section::Slant(..)) if is_hole => Kind::Countersink,
@@ -173,117 +155,35 @@ fn treatment(
     let at = sight.frame.world([middle[0], middle[1], 0.0]);
     let [own, _] = settled.sigmas_mm;
     let least = LEAST_SIGMA * sight.field.pitch_mm();
-    let treatment = Treatment {
+    Treatment {
         kind,
-        of,
+        of: rim.of,
         size_mm: settled.section.width_mm(),
         sigma_mm: (own * own + least * least).sqrt(),
         rise_mm: settled.section.rise_mm(),
-        level_mm: (plane.z_mm(at.x, at.y) - at.z) * sight.frame.axes[2].z,
-        score: explained(&edge, &settled),
+        level_mm: (rim.face.plane.z_mm(at.x, at.y) - at.z) * sight.frame.axes[2].z,
+        score: explained(edge, settled),
+    }
+}
+
+/// Moves the outline of a candidate to where the section below its face begins.
+fn moved(candidate: &mut Candidate, settled: &Settled, least_mm: f64) {
+    candidate.outline.shape = settled.outline;
+    let free = match settled.outline {
+        Shape::Circle(_) => 0..3,
+        Shape::Rectangle(_) => 1..5,
     };
-    let mut outline = candidate.outline;
-    if falls {
-        outline.shape = settled.outline;
-        for (a, row) in settled.covariance.iter().enumerate() {
-            for (b, value) in row.iter().enumerate() {
-                if *value != 0.0 {
-                    outline.covariance[a][b] = *value;
-                }
+    for (a, row) in candidate.outline.covariance.iter_mut().enumerate() {
+        for (b, own) in row.iter_mut().enumerate() {
+            let value = settled.covariance[a][b];
+            if value != 0.0 {
+                *own = value;
+            }
+            if a == b && free.contains(&a) {
+                *own += least_mm * least_mm;
             }
         }
     }
-    Some((treatment, outline))
-}
-
-/// The samples on both sides of a treated wall.
-fn edge(
-    sight: &Sight<'_>,
-    found: &[Candidate],
-    of: usize,
-    falls: bool,
-    strips: &[Strip],
-) -> Option<Edge> {
-    let candidate = &found[of];
-    let shape = candidate.outline.shape;
-    let pitch_mm = sight.field.pitch_mm();
-    let noise_mm = sight.field.noise_mm;
-    let first = strips.first()?;
-    let plane = sight.levels.levels.get(usize::from(first.level))?.plane?;
-    // A face falls into a hollow outside of its outline; what stands out falls inside of its own.
-    let is_inside = (candidate.lie == Lie::Hollow) != falls;
-    let is_strip = |region: u16| strips.iter().any(|strip| strip.region == region);
-    let seen = sight.samples(&is_strip);
-    if seen.len() < FEWEST || !runs_along(&seen, &shape) {
-        return None;
-    }
-    let mut reaches: Vec<f64> = seen
-        .into_iter()
-        .map(|[u, v, _]| shape.distance_mm([u, v]).abs())
-        .collect();
-    reaches.sort_by(f64::total_cmp);
-    let reach_mm = reaches[((1.0 - BEYOND) * (reaches.len() - 1) as f64) as usize];
-    let into = INTO_FACE * reach_mm + FACE_PITCHES * pitch_mm;
-    let out = OUT * reach_mm + OUT_PITCHES * pitch_mm;
-    let others = levels_of_others(found, of, first.level);
-    let is_wanted = |place: [f64; 2]| {
-        let off = shape.distance_mm(place);
-        let within = if is_inside { -off } else { off };
-        let is_near = (-out..reach_mm + into).contains(&within);
-        is_near
-            && match shape {
-                Shape::Circle(_) => true,
-                Shape::Rectangle(own) => own.walls[side_of(&own, place)],
-            }
-    };
-    let mut places = Face { plane, falls }.places(sight, &|level| !others.contains(&level), &is_wanted);
-    // What stands on the face tells nothing of its edge.
-    places.retain(|place| place.height_mm > -6.0 * noise_mm);
-    if places.len() < FEWEST {
-        return None;
-    }
-    let seen = places.iter().map(|own| own.height_mm);
-    let deepest = seen.filter(|height| height.is_finite()).fold(0.0, f64::max);
-    Some(Edge {
-        outline: shape,
-        is_inside,
-        reach_mm,
-        known: if falls {
-            Known::Tailed(TOP * pitch_mm)
-        } else {
-            Known::Normal(FOOT * pitch_mm)
-        },
-        strays: Strays {
-            noise_mm: noise_mm.max(LEAST_NOISE * pitch_mm),
-            blur_mm: BLUR * pitch_mm,
-            span_mm: deepest + 6.0 * noise_mm,
-        },
-        places,
-    })
-}
-
-/// Whether samples lie all along an outline.
-fn runs_along(seen: &[[f64; 3]], shape: &Shape) -> bool {
-    let middle = shape.middle_mm();
-    let mut has = [false; SECTORS];
-    for [u, v, _] in seen {
-        let angle = libm::atan2(v - middle[1], u - middle[0]) / core::f64::consts::TAU + 0.5;
-        has[((angle * SECTORS as f64) as usize).min(SECTORS - 1)] = true;
-    }
-    has.iter().filter(|own| **own).count() as f64 >= ALONG * SECTORS as f64
-}
-
-/// Noise is not taken to be smaller, shares of the pitch.
-const LEAST_NOISE: f64 = 0.01;
-
-/// Levels of other candidates than the one whose edge it is and the one whose face it runs out in.
-fn levels_of_others(found: &[Candidate], of: usize, face: u16) -> Vec<u16> {
-    let host = found[of].host;
-    let is_other = |(index, own): &(usize, &Candidate)| {
-        *index != of && !own.levels.contains(&face) && !own.levels.contains(&host)
-    };
-    let others = found.iter().enumerate().filter(is_other);
-    others.flat_map(|(_, own)| own.levels.iter().copied()).collect()
 }
 
 /// Share of the samples between wall and face that lie on the section.

@@ -26,7 +26,10 @@ impl Place {
         } else {
             -rise_mm
         };
-        [self.at[0] + up * self.tilt[0], self.at[1] + up * self.tilt[1]]
+        [
+            self.at[0] + up * self.tilt[0],
+            self.at[1] + up * self.tilt[1],
+        ]
     }
 }
 
@@ -43,14 +46,14 @@ impl Face {
         if self.falls { -off } else { off }
     }
 
-    /// The samples of levels, and of a face that falls the rays that passed, where they are wanted.
-    pub(super) fn places(
+    /// The samples of levels where they are wanted.
+    pub(super) fn samples(
         &self,
         sight: &Sight<'_>,
         is_level: &dyn Fn(u16) -> bool,
         is_wanted: &dyn Fn([f64; 2]) -> bool,
     ) -> Vec<Place> {
-        let mut found: Vec<Place> = sight
+        sight
             .samples_of_levels(is_level)
             .into_iter()
             .filter(|[u, v, _]| is_wanted([*u, *v]))
@@ -63,11 +66,7 @@ impl Face {
                     height_mm: self.height_mm(sight, &world),
                 }
             })
-            .collect();
-        if self.falls {
-            self.missing(sight, is_level, is_wanted, &mut found);
-        }
-        found
+            .collect()
     }
 
     /// What rises hides nothing beyond its wall.
@@ -83,13 +82,17 @@ impl Face {
         [(u1 - u0) / (w1 - w0), (v1 - v0) / (w1 - w0)]
     }
 
-    fn missing(
+    /// Rays that came back with nothing from where they are wanted; of what rises, none.
+    pub(super) fn missing(
         &self,
         sight: &Sight<'_>,
         is_level: &dyn Fn(u16) -> bool,
         is_wanted: &dyn Fn([f64; 2]) -> bool,
-        found: &mut Vec<Place>,
-    ) {
+    ) -> Vec<Place> {
+        let mut found = Vec::new();
+        if !self.falls {
+            return found;
+        }
         let image = &sight.field.image;
         for column in sight.columns {
             let x_mm = column.x_mm();
@@ -111,5 +114,6 @@ impl Face {
                 }
             });
         }
+        found
     }
 }

@@ -66,7 +66,8 @@ impl Strays {
     /// there does not come back.
     pub(super) fn log_likelihood(&self, section: Section, distance_mm: f64, height_mm: f64) -> f64 {
         if height_mm.is_infinite() {
-            let share = 0.5 * libm::erfc(-distance_mm / self.blur_mm * core::f64::consts::FRAC_1_SQRT_2);
+            let share =
+                0.5 * libm::erfc(-distance_mm / self.blur_mm * core::f64::consts::FRAC_1_SQRT_2);
             let (_, slope) = section.at(distance_mm.max(0.0));
             let lost = if slope > TELLING { 1.0 } else { MISSING };
             return libm::log(share * lost + (1.0 - share));

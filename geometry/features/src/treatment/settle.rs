@@ -69,6 +69,8 @@ impl Settled {
 pub(super) enum Form {
     Arc,
     Slant,
+    /// None: the wall meets the face.
+    Plain,
 }
 
 /// Places by which the search begins, and by which it ends.
@@ -90,13 +92,15 @@ const LEAST_STEP_MM: f64 = 0.001;
 /// Sweeps for each step at most.
 const SWEEPS: usize = 6;
 
+/// Corners are round from this share of the reach on.
+const ROUND_CORNER: f64 = 0.3;
 /// How far walls are moved to find the middle of where they may lie, in uncertainties of places
 /// across them, and steps on either side.
 const AMID_BLURS: f64 = 40.0;
 const AMID_STEPS: i32 = 60;
 
 /// Numbers that are searched for: width, slope, turn as a way at the outline's reach, ways outwards of
-/// the walls that there are (of a circle: of its radius).
+/// the walls that there are (of a circle: of its radius, then of its centre along u and v).
 type Numbers = [f64; 7];
 const WIDTH: usize = 0;
 const SLOPE: usize = 1;
@@ -109,14 +113,23 @@ impl Edge {
         let soft = self.thinned(FEW, SOFTER);
         let mut best: Option<(f64, Numbers)> = None;
         let free = self.free(form);
-        for width in WIDTHS {
-            let slopes = if form == Form::Slant { &SLOPES[..] } else { &[1.0][..] };
+        let widths = if form == Form::Plain {
+            &[0.0][..]
+        } else {
+            &WIDTHS[..]
+        };
+        for width in widths {
+            let slopes = if form == Form::Slant {
+                &SLOPES[..]
+            } else {
+                &[1.0][..]
+            };
             for slope in slopes {
                 for way in WAYS {
                     let mut numbers = [0.0; 7];
                     numbers[WIDTH] = width * self.reach_mm;
                     numbers[SLOPE] = *slope;
-                    let way_mm = way * numbers[WIDTH];
+                    let way_mm = way * numbers[WIDTH].max(0.5 * self.reach_mm);
                     self.move_walls(&free, &mut numbers, way_mm);
                     let own = soft.log_likelihood(form, &numbers);
                     if own.is_finite() && best.is_none_or(|(most, _)| own > most) {
@@ -128,7 +141,11 @@ impl Edge {
         let (_, start) = best?;
         let near = soft.climbed(form, start, LEAST_STEP_MM * 10.0);
         let sharp = self.thinned(MANY, 1.0);
-        let numbers = sharp.amid(form, &sharp.climbed(form, near, LEAST_STEP_MM));
+        let numbers = sharp.climbed(form, near, LEAST_STEP_MM);
+        let numbers = match form {
+            Form::Plain => numbers,
+            Form::Arc | Form::Slant => sharp.amid(form, &numbers),
+        };
         // Fewer samples say less than all of them do.
         let share = sharp.places.len() as f64 / self.places.len().max(1) as f64;
         sharp.told(form, &numbers, share)
@@ -149,15 +166,20 @@ impl Edge {
 
     /// Which numbers are free.
     fn free(&self, form: Form) -> Vec<usize> {
-        let mut free = vec![WIDTH];
-        if form == Form::Slant {
-            free.push(SLOPE);
-        }
+        let mut free = match form {
+            Form::Arc => vec![WIDTH],
+            Form::Slant => vec![WIDTH, SLOPE],
+            Form::Plain => Vec::new(),
+        };
         match self.outline {
-            Shape::Circle(_) => free.push(WALLS),
+            Shape::Circle(_) => free.extend([WALLS, WALLS + 1, WALLS + 2]),
             Shape::Rectangle(own) => {
                 free.push(TURN);
-                free.extend((0..4).filter(|side| own.walls[*side]).map(|side| WALLS + side));
+                free.extend(
+                    (0..4)
+                        .filter(|side| own.walls[*side])
+                        .map(|side| WALLS + side),
+                );
             }
         }
         free
@@ -168,7 +190,12 @@ impl Edge {
         match self.outline {
             Shape::Circle(own) => {
                 let radius_mm = own.radius_mm + numbers[WALLS];
-                (radius_mm > 0.0).then_some(Shape::Circle(Circle { radius_mm, ..own }))
+                let [u, v] = own.centre_mm;
+                let centre_mm = [u + numbers[WALLS + 1], v + numbers[WALLS + 2]];
+                (radius_mm > 0.0).then_some(Shape::Circle(Circle {
+                    centre_mm,
+                    radius_mm,
+                }))
             }
             Shape::Rectangle(own) => {
                 let sizes = own.sizes_mm();
@@ -187,8 +214,14 @@ impl Edge {
                 };
                 let [first, second] = moved.sizes_mm();
                 let least = first.min(second);
+                // A corner that is round stays about its middle.
+                let further = if own.corner_mm > ROUND_CORNER * self.reach_mm {
+                    0.25 * (w0 + w1 + w2 + w3)
+                } else {
+                    0.0
+                };
                 (least > 0.0).then_some(Shape::Rectangle(Rectangle {
-                    corner_mm: own.corner_mm.min(0.5 * least),
+                    corner_mm: (own.corner_mm + further).max(0.0).min(0.5 * least),
                     ..moved
                 }))
             }
@@ -199,11 +232,13 @@ impl Edge {
         match form {
             Form::Arc => Section::Arc(numbers[WIDTH]),
             Form::Slant => Section::Slant(numbers[WIDTH], numbers[SLOPE] * numbers[WIDTH]),
+            Form::Plain => Section::Slant(0.0, 0.0),
         }
     }
 
     fn log_likelihood(&self, form: Form, numbers: &Numbers) -> f64 {
-        if numbers[WIDTH] < NARROWEST * self.reach_mm || numbers[SLOPE] <= 0.0 {
+        let is_one = numbers[WIDTH] >= NARROWEST * self.reach_mm && numbers[SLOPE] > 0.0;
+        if form != Form::Plain && !is_one {
             return f64::NEG_INFINITY;
         }
         let Some(shape) = self.moved(numbers) else {
@@ -214,11 +249,14 @@ impl Edge {
         let mut heights = self.places.iter().map(|own| own.height_mm);
         let mut sum = 0.0;
         let rise_mm = section.rise_mm();
-        shape.distances(self.places.iter().map(|own| own.beside(rise_mm)), |distance| {
-            if let Some(height) = heights.next() {
-                sum += self.strays.log_likelihood(section, sign * distance, height);
-            }
-        });
+        shape.distances(
+            self.places.iter().map(|own| own.beside(rise_mm)),
+            |distance| {
+                if let Some(height) = heights.next() {
+                    sum += self.strays.log_likelihood(section, sign * distance, height);
+                }
+            },
+        );
         let ways = numbers[TURN..].iter();
         sum + ways.map(|way| self.known.log_likelihood(*way)).sum::<f64>()
     }
@@ -226,27 +264,32 @@ impl Edge {
     /// Moves all walls out of the material that the section is of.
     fn move_walls(&self, free: &[usize], numbers: &mut Numbers, way_mm: f64) {
         let outwards = if self.is_inside { way_mm } else { -way_mm };
-        for index in free.iter().filter(|index| **index >= WALLS) {
+        let walls = match self.outline {
+            Shape::Circle(_) => 1,
+            Shape::Rectangle(_) => 4,
+        };
+        for index in free
+            .iter()
+            .filter(|index| (WALLS..WALLS + walls).contains(*index))
+        {
             numbers[*index] += outwards;
         }
     }
 
     /// Climbs along the numbers one by one, with steps that become smaller.
-    fn climbed(
-        &self,
-        form: Form,
-        mut numbers: Numbers,
-        least_step_mm: f64,
-    ) -> Numbers {
+    fn climbed(&self, form: Form, mut numbers: Numbers, least_step_mm: f64) -> Numbers {
         let free = self.free(form);
         let mut best = self.log_likelihood(form, &numbers);
-        let mut step_mm = FIRST_STEP * numbers[WIDTH];
+        let mut step_mm = FIRST_STEP * numbers[WIDTH].max(0.5 * self.reach_mm);
         while step_mm > least_step_mm {
             for _ in 0..SWEEPS {
                 let before = best;
                 for index in &free {
                     // Slopes change what is a width away by as much.
-                    let scale = if *index == SLOPE { 1.0 / numbers[WIDTH] } else { 1.0 };
+                    let scale = match *index {
+                        SLOPE => 1.0 / numbers[WIDTH],
+                        _ => 1.0,
+                    };
                     for way in [scale * step_mm, -scale * step_mm] {
                         let mut other = numbers;
                         other[*index] += way;
@@ -258,7 +301,10 @@ impl Edge {
                     }
                 }
                 // Wider, with the walls moved by as much: the face's border stays.
-                for way in [step_mm, -step_mm] {
+                for way in [step_mm, -step_mm]
+                    .into_iter()
+                    .filter(|_| form != Form::Plain)
+                {
                     let mut other = numbers;
                     other[WIDTH] += way;
                     self.move_walls(&free, &mut other, way);
@@ -300,12 +346,7 @@ impl Edge {
     }
 
     /// The section with its uncertainties, from the curvature of the likelihood.
-    fn told(
-        &self,
-        form: Form,
-        numbers: &Numbers,
-        share: f64,
-    ) -> Option<Settled> {
+    fn told(&self, form: Form, numbers: &Numbers, share: f64) -> Option<Settled> {
         let free = self.free(form);
         let outline = self.moved(numbers)?;
         let covariance = self.covariance(form, numbers, &free) * share;
@@ -322,7 +363,14 @@ impl Edge {
             + 2.0 * slope * width * of(WIDTH, SLOPE);
         let mut numbers_of_outline = [[0.0; 6]; 6];
         match outline {
-            Shape::Circle(_) => numbers_of_outline[2][2] = of(WALLS, WALLS),
+            Shape::Circle(_) => {
+                let places = [WALLS + 1, WALLS + 2, WALLS];
+                for (row, a) in numbers_of_outline.iter_mut().zip(places) {
+                    for (value, b) in row.iter_mut().zip(places) {
+                        *value = of(a, b);
+                    }
+                }
+            }
             Shape::Rectangle(own) => {
                 let signs = [-1.0, 1.0, -1.0, 1.0];
                 for a in 0..4 {
@@ -347,12 +395,7 @@ impl Edge {
     }
 
     /// Inverse of the second derivatives, over the free numbers.
-    fn covariance(
-        &self,
-        form: Form,
-        numbers: &Numbers,
-        free: &[usize],
-    ) -> nalgebra::DMatrix<f64> {
+    fn covariance(&self, form: Form, numbers: &Numbers, free: &[usize]) -> nalgebra::DMatrix<f64> {
         let at = |moves: &[(usize, f64)]| {
             let mut other = *numbers;
             for (index, way) in moves {
@@ -366,7 +409,7 @@ impl Edge {
             .iter()
             .map(|&index| {
                 let mut step = LEAST_STEP_MM;
-                while step < 0.3 * numbers[WIDTH] {
+                while step < 0.3 * self.reach_mm {
                     let fall = 2.0 * centre - at(&[(index, step)]) - at(&[(index, -step)]);
                     if !(fall < 4.0) {
                         break;
