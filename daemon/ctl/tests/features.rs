@@ -60,6 +60,8 @@ fn a_block_with_a_hole_is_told_drawn_rebuilt_and_edited() {
             "part.step",
             "--picture",
             "part.png",
+            "--reduced",
+            "fewer.xyz",
         ],
     );
     assert!(
@@ -88,6 +90,18 @@ fn a_block_with_a_hole_is_told_drawn_rebuilt_and_edited() {
         size("diameter")
     );
     assert!((size("depth") - 6.0).abs() < 0.02, "{}", size("depth"));
+    // Wider than the minor diameters of M14 go.
+    assert_eq!(hole["thread_guess"], Value::Null);
+    let fewer = fs::read_to_string(at.join("fewer.xyz")).unwrap();
+    let left = told["reduced"]["left"].as_u64().unwrap();
+    assert_eq!(fewer.lines().count() as u64, left);
+    // Of what is level some go, and then every second.
+    let points = told["reduced"]["points"].as_u64().unwrap();
+    assert_eq!(points, 200 * 160);
+    let after_vectors = told["reduced"]["after_vector_sampling"].as_u64().unwrap();
+    assert!(left < after_vectors && after_vectors < points, "{told}");
+    let edges = told["reduced"]["sharp_edge_points"].as_u64().unwrap();
+    assert!(edges > 500, "{edges}");
     let file: Value =
         serde_json::from_slice(&fs::read(at.join("part.features.json")).unwrap()).unwrap();
     assert_eq!(file["features"], told["features"]);
@@ -99,13 +113,14 @@ fn a_block_with_a_hole_is_told_drawn_rebuilt_and_edited() {
             .starts_with(b"\x89PNG")
     );
 
-    fs::write(at.join("edits.toml"), "[[edit]]\nid = 1\ndiameter = 10.0\n").unwrap();
+    fs::write(at.join("edits.toml"), "[[edit]]\nid = 1\ndiameter = 10.3\n").unwrap();
     let edited = relief(
         at,
         &["features", "part.xyz", "--json", "--edit", "edits.toml"],
     );
     let told: Value = serde_json::from_slice(&edited.stdout).unwrap();
-    assert_eq!(told["features"][1]["dimensions_mm"]["diameter"], 10.0);
+    assert_eq!(told["features"][1]["dimensions_mm"]["diameter"], 10.3);
+    assert_eq!(told["features"][1]["thread_guess"], "M12");
     assert_eq!(told["features"][1]["sigma_mm"]["diameter"], 0.0);
 }
 
@@ -128,6 +143,7 @@ fn what_cannot_be_is_said() {
             &["features", "part.xyz", "--network", "few.xyz"],
             "few.xyz is no network",
         ),
+        (&["features", "part.xyz", "--reduce-rate", "3"], "--reduced"),
         (
             &["features", "part.xyz", "--edit", "none.toml"],
             "no [[edit]]",

@@ -231,6 +231,7 @@ fn cutter<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error
 /// The section and what is wrong in it.
 type Wrong = (&'static str, String);
 
+const DELIVERABLES: &str = "deliverables";
 const SURFACE: &str = "deliverables.surface";
 const SKIN: &str = "deliverables.skin";
 const TOOLPATH: &str = "deliverables.toolpath";
@@ -382,7 +383,12 @@ impl DeliverablesConfig {
             skin: skin.transpose()?,
             toolpath: toolpath.transpose()?.flatten(),
             features: self.features,
+            edits: self.edit.clone(),
         };
+        if !self.features && !self.edit.is_empty() {
+            let told = "edit changes features, which are off: set features = true";
+            return Err((DELIVERABLES, told.to_owned()));
+        }
         let of = self.toolpath.as_ref().and_then(|own| own.of);
         if of == Some(OfChoice::Surface) && further.surface.is_none() {
             let told = "of = \"surface\" mills the surface of [deliverables.surface], which is off: \

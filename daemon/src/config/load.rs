@@ -86,6 +86,10 @@ impl Config {
             // Whether it has the cutters.
             .and_then(|()| deliverables.further().map(drop))
             .map_err(|(section, message)| inconsistent(path, section, message))?;
+        if !config.deliverables.edit.is_empty() {
+            let told = "edit changes the features of one scan: give it with a rerun of that";
+            return Err(inconsistent(path, "deliverables", told.to_owned()));
+        }
         Ok(config)
     }
 

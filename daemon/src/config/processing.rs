@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use deliverables::features::EditEntry;
 use deliverables::{MeshFormat, MeshOptions, PointFormat};
 use pipeline::Settings;
 use scan_files::recommended_pitch_mm;
@@ -251,6 +252,9 @@ pub struct DeliverablesConfig {
     /// Whether machining features are recognised, and the part rebuilt from them.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub features: bool,
+    /// What is changed of the features of one scan; given with a rerun.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub edit: Vec<EditEntry>,
     /// Author in the CAD file's header; the scan's operator if left out.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub author: String,

@@ -6,7 +6,9 @@ use nalgebra::Vector3;
 use nurbs::BSplineSurface;
 
 use crate::candidate::Lie;
+use crate::class::Class;
 use crate::outline::Shape;
+use crate::thread::nominal_thread;
 
 /// A length with its standard uncertainty, millimetres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,6 +73,17 @@ pub struct Feature {
 }
 
 impl Feature {
+    /// The thread that a hole may have, by its diameter: a guess, since a plain hole of that size looks
+    /// the same.
+    #[must_use]
+    pub fn thread(&self) -> Option<&'static str> {
+        let diameter = self.dimension("diameter")?;
+        let is_hole = self.class == Class::Hole.as_str();
+        is_hole
+            .then(|| nominal_thread(diameter.value_mm, diameter.sigma_mm))
+            .flatten()
+    }
+
     /// A dimension by its name.
     #[must_use]
     pub fn dimension(&self, name: &str) -> Option<&Dimension> {

@@ -29,4 +29,5 @@ pub mod reduce;
 pub mod regions;
 pub mod section;
 pub mod sight;
+pub mod thread;
 pub mod treatment;

@@ -67,6 +67,27 @@ async fn a_scan_ends_in_features_where_they_are_asked_for() -> Result<()> {
     assert_eq!(step.matches("MANIFOLD_SOLID_BREP").count(), 1);
     assert!(result.file("features.png")?.starts_with(b"\x89PNG"));
 
+    let edit = json!([{ "id": 0, "length": 61.5 }]);
+    let edited = rig.rerun_to_result(&ended.scan.id, &[("deliverables.edit", edit)]);
+    let result = rig.result(&edited.await?.result).await?;
+    let told = result.json("features.json")?;
+    assert_eq!(told["features"][0]["dimensions_mm"]["length"], 61.5);
+    assert_eq!(told["features"][0]["sigma_mm"]["length"], 0.0);
+    let rebuilt = String::from_utf8(result.file("block.features.step")?.to_vec())?;
+    assert_ne!(rebuilt, step);
+
+    let edit = json!([{ "id": 9, "length": 61.5 }]);
+    let of_none = rig.rerun_to_result(&ended.scan.id, &[("deliverables.edit", edit)]);
+    let of_none = of_none.await?;
+    assert!(
+        of_none
+            .left_out
+            .iter()
+            .any(|told| told.contains("there is no feature 9")),
+        "{:?}",
+        of_none.left_out
+    );
+
     let off = [("deliverables.features", json!(false))];
     let without = rig.rerun_to_result(&ended.scan.id, &off).await?;
     let result = rig.result(&without.result).await?;

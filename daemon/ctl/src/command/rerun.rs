@@ -1,5 +1,8 @@
 //! `relief rerun`.
 
+use std::path::PathBuf;
+
+use deliverables::features::read_edits;
 use relief_api::{Job, Rerun, path};
 
 use super::named;
@@ -21,6 +24,10 @@ pub(crate) struct Args {
     /// may be given several times
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = setting::parse)]
     settings: Vec<Setting>,
+    /// Recognise machining features, and change types, dimensions and directions that you know
+    /// better, by a file as `relief features --edit` reads it; solid and picture follow
+    #[arg(long, value_name = "EDITS.toml")]
+    edit: Option<PathBuf>,
     /// Name of the new deliverables, instead of the scan's name
     #[arg(
         long,
@@ -50,6 +57,13 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
     let mut settings = setting::overrides(args.settings)?;
     args.regularize.add_to(&mut settings);
     args.processed.add_to(&mut settings);
+    if let Some(path) = &args.edit {
+        let edits = read_edits(path).map_err(|error| Failure::Failed(error.to_string()))?;
+        let edits =
+            serde_json::to_value(edits).map_err(|error| Failure::Failed(error.to_string()))?;
+        settings.insert("deliverables.features".to_owned(), true.into());
+        settings.insert("deliverables.edit".to_owned(), edits);
+    }
     let request = Rerun {
         name: args.name,
         settings,

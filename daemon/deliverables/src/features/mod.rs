@@ -1,5 +1,6 @@
 //! Recognised features as a file.
 
+mod edits;
 mod picture;
 mod step;
 
@@ -11,6 +12,7 @@ use features::feature::Feature;
 use features::recognise::Recognition;
 use serde::Serialize;
 
+pub use edits::{EditEntry, EditsError, read_edits};
 pub use picture::write_features_picture;
 pub use step::{FeaturesStepError, features_solid, write_features_step};
 
@@ -79,6 +81,9 @@ pub struct FeatureEntry {
     /// Whether it goes through the part.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub through: bool,
+    /// The thread that a hole may have, by its diameter; a guess.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thread_guess: Option<&'static str>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -162,6 +167,7 @@ impl FeatureEntry {
                 center: rounded(feature.centre_sigma_mm, LEAST_MM),
             },
             through: feature.through,
+            thread_guess: feature.thread(),
             warnings: feature.warnings.clone(),
         }
     }

@@ -160,7 +160,7 @@ pub(crate) fn write_further(
     if wanted.features {
         watch.stage(Stage::Features);
         if !extras.lacks_room_for(FEATURES_NAME) {
-            match recognised(inputs, watch) {
+            match recognised(inputs, &wanted.edits, watch) {
                 Ok(found) => write_recognised(extras, inputs, &found)?,
                 Err(stop) => left_out(extras, FEATURES_NAME, stop)?,
             }

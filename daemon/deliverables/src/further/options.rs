@@ -4,6 +4,7 @@ use toolpath::Machine;
 
 use super::machine::MachineFile;
 use super::report::{SkinSettingsReport, SurfaceSettingsReport, ToolpathSettingsReport};
+use crate::features::EditEntry;
 
 /// What is made of a scan beside the trimmed model. Nothing by default.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -16,6 +17,8 @@ pub struct Further {
     pub toolpath: Option<ToolpathOptions>,
     /// Machining features, and the part rebuilt from them.
     pub features: bool,
+    /// What is changed of them.
+    pub edits: Vec<EditEntry>,
 }
 
 /// How a surface is skinned.

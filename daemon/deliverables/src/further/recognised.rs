@@ -1,5 +1,6 @@
 //! Machining features of the scan, where they are asked for.
 
+use features::edit::edit;
 use features::network::Classifier;
 use features::recognise::{Recognition, Settings, Teller, recognise};
 use pipeline::Observer;
@@ -9,7 +10,8 @@ use super::make::{Stop, threaded};
 use crate::export::file_stem;
 use crate::extras::Extras;
 use crate::features::{
-    FEATURES_NAME, FeaturesFile, features_solid, write_features_picture, write_features_step,
+    EditEntry, FEATURES_NAME, FeaturesFile, features_solid, write_features_picture,
+    write_features_step,
 };
 use crate::write::{DeliverError, Inputs};
 
@@ -19,7 +21,11 @@ pub(crate) const FEATURES_PICTURE_NAME: &str = "features.png";
 const MOST_SAMPLES: usize = 1 << 25;
 
 /// Recognises the features of what was scanned.
-pub(crate) fn recognised(inputs: &Inputs<'_>, watch: &dyn Observer) -> Result<Recognition, Stop> {
+pub(crate) fn recognised(
+    inputs: &Inputs<'_>,
+    edits: &[EditEntry],
+    watch: &dyn Observer,
+) -> Result<Recognition, Stop> {
     let Some(points) = inputs.points else {
         return Err(Stop::Refused(
             "there are no samples to recognise features by".to_owned(),
@@ -54,9 +60,13 @@ pub(crate) fn recognised(inputs: &Inputs<'_>, watch: &dyn Observer) -> Result<Re
         seed: inputs.settings.regrid.seed,
         least_pitches: Settings::USUAL_PITCHES,
     };
-    threaded(inputs, || {
+    let mut found = threaded(inputs, || {
         Ok(recognise(&columns, points.0.camera_mm(), &settings, watch)?)
-    })
+    })?;
+    let edits: Vec<_> = edits.iter().map(EditEntry::edit).collect();
+    edit(&mut found, &edits)
+        .map_err(|error| Stop::Refused(format!("deliverables.edit: {error}")))?;
+    Ok(found)
 }
 
 /// Writes them: the file, the solid and the picture.

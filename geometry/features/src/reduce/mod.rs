@@ -1,6 +1,10 @@
 //! Fewer points (Jun & Park, section 4.2): vector sampling, and sampling by rate. Edge points are
 //! never removed.
 
+use range_image::Column;
+
+use crate::edges::{EdgeKind, EdgeSettings, edges_of_columns};
+
 /// What is removed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reduction {
@@ -9,6 +13,75 @@ pub struct Reduction {
     /// Sampling by rate: of what vector sampling leaves, every point goes whose number is a multiple
     /// of this. 1 removes all but edge points.
     pub rate: Option<usize>,
+}
+
+/// A scan with fewer points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reduced {
+    /// The points that stay, [x, y, z] in millimetres, column by column.
+    pub lines: Vec<Vec<[f64; 3]>>,
+    /// Points there were.
+    pub points: usize,
+    /// Sharp and smooth edge points among them.
+    pub edge_points: [usize; 2],
+    /// Points that vector sampling left.
+    pub after_vectors: usize,
+}
+
+impl Reduced {
+    /// Points that stay.
+    #[must_use]
+    pub fn left(&self) -> usize {
+        self.lines.iter().map(Vec::len).sum()
+    }
+}
+
+/// Reduces the columns of a scan, in the order of x; edge points are those along columns and, `pitch_mm`
+/// apart, across them.
+#[must_use]
+pub fn of_columns(
+    columns: &[Column],
+    pitch_mm: f64,
+    settings: &EdgeSettings,
+    reduction: &Reduction,
+) -> Reduced {
+    let lines: Vec<Vec<[f64; 3]>> = columns
+        .iter()
+        .map(|column| {
+            let samples = column.samples().iter();
+            samples
+                .map(|own| [column.x_mm(), own.y_mm, own.z_mm])
+                .collect()
+        })
+        .collect();
+    let edges = edges_of_columns(&lines, pitch_mm, settings);
+    let count = |kind: EdgeKind| {
+        let all = edges.iter().flatten();
+        all.filter(|own| **own == Some(kind)).count()
+    };
+    let is_edge: Vec<Vec<bool>> = edges
+        .iter()
+        .map(|line| line.iter().map(Option::is_some).collect())
+        .collect();
+    let by_vectors = Reduction {
+        rate: None,
+        ..*reduction
+    };
+    let left = |kept: &[Vec<bool>]| kept.iter().flatten().filter(|own| **own).count();
+    let after_vectors = left(&reduced(&lines, &is_edge, &by_vectors));
+    let kept = reduced(&lines, &is_edge, reduction);
+    let stay = |(line, kept): (&Vec<[f64; 3]>, &Vec<bool>)| {
+        let both = line.iter().zip(kept);
+        both.filter(|(_, kept)| **kept)
+            .map(|(own, _)| *own)
+            .collect()
+    };
+    Reduced {
+        points: lines.iter().map(Vec::len).sum(),
+        edge_points: [count(EdgeKind::Sharp), count(EdgeKind::Smooth)],
+        after_vectors,
+        lines: lines.iter().zip(&kept).map(stay).collect(),
+    }
 }
 
 /// Which points of each line stay, by vector sampling along each, then by rate over all lines, whose

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use jiff::Timestamp;
 use scan_files::Units;
 
-use super::train;
+use super::{reduced, train};
 use crate::command::units::UnitName;
 
 /// Recognise the machining features of a part in a scan, without a service
@@ -41,6 +41,12 @@ pub(crate) struct Args {
     /// Draw them over the part, too
     #[arg(long, value_name = "OUT.png")]
     pub(super) picture: Option<PathBuf>,
+    /// Write the scan's points, too, as text, fewer of them (Jun & Park, section 4.2): of what is
+    /// straight some go, then every n-th; edge points stay
+    #[arg(long, value_name = "OUT.xyz")]
+    pub(super) reduced: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) reduction: reduced::ReductionArgs,
     /// The network that tells the classes: `default`, `published` (the one of the paper, which
     /// always has an answer), or a file of `relief features train`
     #[arg(long, value_name = "NETWORK", default_value = "default")]

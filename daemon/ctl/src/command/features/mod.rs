@@ -1,7 +1,7 @@
 //! `relief features`.
 
 mod args;
-mod edits;
+mod reduced;
 mod run;
 mod summary;
 mod train;

@@ -5,14 +5,16 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use deliverables::features::{
-    FeaturesFile, features_solid, write_features_picture, write_features_step,
+    EditEntry, FeaturesFile, features_solid, read_edits, write_features_picture,
+    write_features_step,
 };
 use deliverables::{CadOptions, WriteError, write_atomically};
 use features::network::Classifier;
 use features::recognise::{RecogniseError, Settings, Teller, recognise};
 use serde::Serialize;
 
-use super::{Args, edits, summary};
+use super::reduced::{self, ReducedFile};
+use super::{Args, summary};
 use crate::command::shown::{self, Shown};
 use crate::command::{convert, places, timestamp};
 use crate::failure::Failure;
@@ -28,6 +30,8 @@ pub(super) struct Recognised {
     pub(super) step: Option<PathBuf>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) picture: Option<PathBuf>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) reduced: Option<ReducedFile>,
     pub(super) seconds: f64,
     pub(super) warnings: Vec<String>,
 }
@@ -46,6 +50,7 @@ fn of_file(args: &Args, shown: &Shown) -> Result<Recognised, Failure> {
     for written in std::iter::once(&output)
         .chain(&args.picture)
         .chain(&args.step)
+        .chain(&args.reduced)
     {
         places::check_file(written)?;
         if convert::same_file(written, args.scan()) {
@@ -68,7 +73,8 @@ fn of_file(args: &Args, shown: &Shown) -> Result<Recognised, Failure> {
     };
     shown.begin("features");
     let began = Instant::now();
-    let edits = args.edit.as_deref().map(edits::read).transpose()?;
+    let edits = args.edit.as_deref().map(read_edits).transpose();
+    let edits = edits.map_err(|error| Failure::Failed(error.to_string()))?;
     let mut recognition = regrid::with_threads(args.threads, || {
         recognise(&scan.columns, scan.camera_mm, &settings, shown)
     })
@@ -79,7 +85,8 @@ fn of_file(args: &Args, shown: &Shown) -> Result<Recognised, Failure> {
     })?;
     let seconds = began.elapsed().as_secs_f64();
     if let (Some(edits), Some(path)) = (&edits, &args.edit) {
-        features::edit::edit(&mut recognition, edits)
+        let edits: Vec<_> = edits.iter().map(EditEntry::edit).collect();
+        features::edit::edit(&mut recognition, &edits)
             .map_err(|error| Failure::at(path.display(), &error))?;
     }
     let file = FeaturesFile::of(&recognition);
@@ -92,6 +99,10 @@ fn of_file(args: &Args, shown: &Shown) -> Result<Recognised, Failure> {
         })
         .map_err(|error| Failure::at(format!("cannot draw {}", path.display()), &error))?;
     }
+    let reduced = args
+        .reduced
+        .as_deref()
+        .map(|path| reduced::write(path, args.reduction, &scan.columns, &recognition));
     let mut notes = Vec::new();
     if let Some(path) = &args.step {
         let (solid, told) = features_solid(&recognition)
@@ -123,6 +134,7 @@ fn of_file(args: &Args, shown: &Shown) -> Result<Recognised, Failure> {
         file,
         step: args.step.clone(),
         picture: args.picture.clone(),
+        reduced: reduced.transpose()?,
         seconds,
         warnings,
     })

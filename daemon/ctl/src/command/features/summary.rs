@@ -31,6 +31,17 @@ pub(super) fn told(found: &Recognised) -> String {
     if let Some(picture) = &found.picture {
         told.push(format!("picture      {}", picture.display()));
     }
+    if let Some(reduced) = &found.reduced {
+        told.push(format!(
+            "points       {}: {} of {}, {} after vector sampling; {} sharp and {} smooth edge points",
+            reduced.output.display(),
+            reduced.left,
+            reduced.points,
+            reduced.after_vector_sampling,
+            reduced.sharp_edge_points,
+            reduced.smooth_edge_points,
+        ));
+    }
     told.push(format!("time         {:.2} s", found.seconds));
     told.join("\n")
 }
@@ -51,6 +62,9 @@ fn line(feature: &FeatureEntry) -> Vec<String> {
         .collect();
     if feature.through {
         sizes.push("through".to_owned());
+    }
+    if let Some(thread) = feature.thread_guess {
+        sizes.push(format!("tapped {thread}? (a guess)"));
     }
     let [x, y, z] = feature.center_mm.map(|value| format!("{value:.3}"));
     vec![
