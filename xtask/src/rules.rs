@@ -39,7 +39,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("compare", &["range-image"]),
     ("skin", &["nurbs", "range-image"]),
-    ("surfacing", &["nurbs", "range-image"]),
+    (
+        "surfacing",
+        &["nurbs", "range-image", "reconstruct", "segment"],
+    ),
     ("toolpath", &["range-image"]),
     (
         "pipeline",

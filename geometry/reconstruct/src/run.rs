@@ -134,6 +134,56 @@ impl<'a> Fitted<'a> {
         settings: &'a ReconstructSettings,
         monitor: &dyn Monitor,
     ) -> Result<Self, ReconstructError> {
+        let mut all = Self::unfitted(image, map, settings, monitor)?;
+        if settings.method == Method::Relief {
+            let fitted = (0..all.nodes.len()).into_par_iter().map(|piece| {
+                monitor.check()?;
+                let domain = around(image, &all.nodes[piece]);
+                all.free_form(piece, domain)
+            });
+            // Of several errors the first, as without threads.
+            let fitted: Vec<Result<_, ReconstructError>> = fitted.collect();
+            let fitted: Vec<_> = fitted.into_iter().collect::<Result<_, _>>()?;
+            (all.surfaces, all.parameters) = fitted.into_iter().unzip();
+        }
+        monitor.progress(0.3);
+        Ok(all)
+    }
+
+    /// Takes surfaces that are there already, of each region by label from 1 on, with the numbers that
+    /// each was given. They are to reach three pitches beyond the nodes of their region, so that
+    /// borders stay on them; where a border does not, a free-form surface comes in their place.
+    ///
+    /// # Errors
+    /// As [`Self::of`], and [`ReconstructError::Surfaces`] when there are not as many as regions.
+    pub fn given(
+        image: &'a RangeImage,
+        map: &'a RegionMap,
+        surfaces: &[(PatchSurface, usize)],
+        settings: &'a ReconstructSettings,
+        monitor: &dyn Monitor,
+    ) -> Result<Self, ReconstructError> {
+        if surfaces.len() != usize::from(map.regions()) {
+            return Err(ReconstructError::Surfaces {
+                regions: usize::from(map.regions()),
+                surfaces: surfaces.len(),
+            });
+        }
+        let mut all = Self::unfitted(image, map, settings, monitor)?;
+        let of_pieces = all.pieces.regions.iter();
+        let own = of_pieces.filter_map(|region| surfaces.get(usize::from(*region) - 1).cloned());
+        (all.surfaces, all.parameters) = own.unzip();
+        monitor.progress(0.3);
+        Ok(all)
+    }
+
+    /// The pieces, without surfaces.
+    fn unfitted(
+        image: &'a RangeImage,
+        map: &'a RegionMap,
+        settings: &'a ReconstructSettings,
+        monitor: &dyn Monitor,
+    ) -> Result<Self, ReconstructError> {
         settings.validate()?;
         check_input(image, map)?;
         let limits = PieceLimits {
@@ -148,7 +198,7 @@ impl<'a> Fitted<'a> {
             });
         }
         monitor.check()?;
-        let mut all = Self {
+        Ok(Self {
             nodes: nodes_of(image, map, &pieces),
             noise: ImageNoise::of(image),
             surfaces: Vec::new(),
@@ -157,20 +207,7 @@ impl<'a> Fitted<'a> {
             map,
             settings,
             pieces,
-        };
-        if settings.method == Method::Relief {
-            let fitted = (0..all.nodes.len()).into_par_iter().map(|piece| {
-                monitor.check()?;
-                let domain = around(image, &all.nodes[piece]);
-                all.free_form(piece, domain)
-            });
-            // Of several errors the first, as without threads.
-            let fitted: Vec<Result<_, ReconstructError>> = fitted.collect();
-            let fitted: Vec<_> = fitted.into_iter().collect::<Result<_, _>>()?;
-            (all.surfaces, all.parameters) = fitted.into_iter().unzip();
-        }
-        monitor.progress(0.3);
-        Ok(all)
+        })
     }
 
     /// Draws the borders, and makes the model. Regions of which a form is known get that in
