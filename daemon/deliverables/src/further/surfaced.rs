@@ -37,6 +37,42 @@ pub struct CharacterLineFigures {
     pub jump: f64,
 }
 
+/// How trimmed pieces meet, where character lines run across the grid.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TrimmedFigures {
+    /// Trimmed faces.
+    pub faces: usize,
+    /// Length of the lines on which pieces meet within the tolerance.
+    pub meeting_mm: f64,
+    /// Length of those on which z steps.
+    pub step_mm: f64,
+    /// Length of those on which pieces part though the data have no step.
+    pub open_mm: f64,
+    /// Greatest distance in z of two pieces, but on steps.
+    pub greatest_gap_mm: f64,
+    /// Grid points past the trim of their piece.
+    pub nodes_across: usize,
+    /// Grid points in no piece.
+    pub left_out: usize,
+}
+
+impl TrimmedFigures {
+    /// The figures, where pieces are trimmed.
+    #[must_use]
+    pub fn of(made: &Made) -> Option<Self> {
+        let (lines, model) = (made.report.trimmed?, made.trimmed.as_ref()?);
+        Some(Self {
+            faces: model.faces.len(),
+            meeting_mm: lines.meeting_mm,
+            step_mm: lines.step_mm,
+            open_mm: lines.open_mm,
+            greatest_gap_mm: lines.greatest_gap_mm,
+            nodes_across: lines.nodes_across,
+            left_out: lines.left_out,
+        })
+    }
+}
+
 /// What fairing did.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FairingFigures {
@@ -155,6 +191,27 @@ pub fn surface_remarks(made: &Made, settings: &Settings, words: SurfaceWords) ->
             report.max_mm - settings.tolerance_mm,
             words.optimal
         ));
+    }
+    if let Some(lines) = report.trimmed {
+        if lines.open_mm > 0.0 {
+            remarks.push(format!(
+                "on {:.1} mm of the lines between pieces, these part by up to {:.3} mm where the scan \
+                 has no step; they meet on {:.1} mm",
+                lines.open_mm, lines.greatest_gap_mm, lines.meeting_mm
+            ));
+        }
+        if lines.nodes_across > 0 {
+            remarks.push(format!(
+                "{} of {} grid points lie just past the trim of their piece",
+                lines.nodes_across, report.nodes
+            ));
+        }
+        if lines.left_out > 0 {
+            remarks.push(format!(
+                "{} grid points, too few beside each other for a face, are in no piece",
+                lines.left_out
+            ));
+        }
     }
     // A surface that needs a control point for every fourth data point follows something else
     // than shape.
