@@ -221,7 +221,11 @@ pub fn make(
         if let Err(SurfaceError::Cancelled(cancelled)) = rough {
             return Err(cancelled.into());
         }
-        if pays(found, &rough, CLEARLY_PAYS) {
+        // Pieces along the grid may be as few once they are polished.
+        let is_along = rough
+            .as_ref()
+            .is_ok_and(|rough| !rough.report.lines.is_empty());
+        if !is_along && pays(found, &rough, CLEARLY_PAYS) {
             made = parted.take();
         }
     }
