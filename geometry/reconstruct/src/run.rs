@@ -8,7 +8,7 @@ use shapes::Form;
 use crate::accept::is_as_good;
 use crate::account::{Freedom, residuals, tally};
 use crate::assemble::{Carrier, Placement, domains, kinds, model, steps};
-use crate::border::cracks::trace;
+use crate::border::cracks::{Chain, CrackMap, trace};
 use crate::border::intersection::intersections;
 use crate::border::map::{BorderSettings, PlanarMap, build};
 use crate::border::settle::{Outlines, Placed};
@@ -84,6 +84,10 @@ pub(crate) const FAR: f64 = 2.0;
 /// can.
 const LEAST_SPAN: f64 = core::f64::consts::SQRT_2;
 
+/// Borders that pass a node within so many nodes are followed as closely as is asked for it: they may
+/// be drawn past it by more than a pitch.
+const ASKED_NODES: i64 = 2;
+
 /// A node with its place and height in millimetres.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Node {
@@ -120,6 +124,8 @@ pub struct Fitted<'a> {
     surfaces: Vec<PatchSurface>,
     /// Of each of these, as [`RegionFit::parameters`].
     parameters: Vec<usize>,
+    /// How closely borders are to follow each node; of none where there are no numbers.
+    closeness: Vec<u8>,
 }
 
 impl<'a> Fitted<'a> {
@@ -207,7 +213,40 @@ impl<'a> Fitted<'a> {
             map,
             settings,
             pieces,
+            closeness: Vec::new(),
         })
+    }
+
+    /// Has the borders near some nodes follow the nodes more closely than they need be smooth:
+    /// `closeness` is by node, column by column, 0 where nothing is asked, up to 3 where they run in
+    /// the middle between nodes, as a line of short straight pieces. A border is drawn in one way
+    /// throughout.
+    #[must_use]
+    pub fn closely(mut self, closeness: Vec<u8>) -> Self {
+        self.closeness = closeness;
+        self
+    }
+
+    /// How closely each border is to be followed.
+    fn levels(&self, cracks: &CrackMap) -> Vec<usize> {
+        let (columns, rows) = (self.image.columns() as i64, self.image.rows() as i64);
+        let near = |middle: &[f64; 2]| {
+            let [i, j] = middle.map(|at| at.floor() as i64);
+            let around = (i - ASKED_NODES + 1..=i + ASKED_NODES)
+                .flat_map(move |i| (j - ASKED_NODES + 1..=j + ASKED_NODES).map(move |j| (i, j)));
+            let within = around.filter(|(i, j)| (0..columns).contains(i) && (0..rows).contains(j));
+            within
+                .filter_map(|(i, j)| self.closeness.get((i * rows + j) as usize))
+                .max()
+        };
+        let of_chain = |chain: &Chain| {
+            let most = chain.middles.iter().filter_map(near).max();
+            most.map_or(0, |most| usize::from(*most))
+        };
+        match self.closeness.is_empty() {
+            true => Vec::new(),
+            false => cracks.chains.iter().map(of_chain).collect(),
+        }
     }
 
     /// Draws the borders, and makes the model. Regions of which a form is known get that in
@@ -249,6 +288,7 @@ impl<'a> Fitted<'a> {
                 })
                 .collect(),
             regions: self.pieces.regions.clone(),
+            levels: self.levels(&cracks),
         };
         let mut planar = build(&cracks, &placed, &outlines, &borders, monitor)?;
 

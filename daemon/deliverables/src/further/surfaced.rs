@@ -192,27 +192,6 @@ pub fn surface_remarks(made: &Made, settings: &Settings, words: SurfaceWords) ->
             words.optimal
         ));
     }
-    if let Some(lines) = report.trimmed {
-        if lines.open_mm > 0.0 {
-            remarks.push(format!(
-                "on {:.1} mm of the lines between pieces, these part by up to {:.3} mm where the scan \
-                 has no step; they meet on {:.1} mm",
-                lines.open_mm, lines.greatest_gap_mm, lines.meeting_mm
-            ));
-        }
-        if lines.nodes_across > 0 {
-            remarks.push(format!(
-                "{} of {} grid points lie just past the trim of their piece",
-                lines.nodes_across, report.nodes
-            ));
-        }
-        if lines.left_out > 0 {
-            remarks.push(format!(
-                "{} grid points, too few beside each other for a face, are in no piece",
-                lines.left_out
-            ));
-        }
-    }
     // A surface that needs a control point for every fourth data point follows something else
     // than shape.
     if report.placement == Placement::Optimal && 4 * report.control_points > report.nodes {

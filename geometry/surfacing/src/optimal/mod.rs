@@ -52,11 +52,8 @@ pub(crate) fn place(
     let mut u = Direction::new(problem.columns, fixed[0].clone());
     let mut v = Direction::new(problem.rows, fixed[1].clone());
     if !problem.is_full {
-        // A first surface, so that the holes are filled from more than their neighbours.
-        problem.refill(&Knots {
-            u: Breaks::uniform(problem.columns, 8).solvable(),
-            v: Breaks::uniform(problem.rows, 8).solvable(),
-        });
+        let first = first_knots(problem);
+        problem.refill(&first);
     }
     let mut knots = None;
     for (step, share) in SHARES.into_iter().enumerate() {
@@ -98,8 +95,10 @@ pub(crate) fn place(
     polish::polish(problem, knots, fixed, visits, monitor)
 }
 
-/// Of the tolerance, what each direction may take where control points are only estimated.
+/// Of the tolerance, what each direction may take where control points are only estimated, and how
+/// often what holes are filled with is found anew: they are to ask for none.
 const ESTIMATED_SHARE: f64 = 0.9;
+const ESTIMATES: usize = 2;
 
 /// About how many control points a surface over the grid takes: as many as each direction needs by
 /// itself.
@@ -111,15 +110,28 @@ pub(crate) fn estimate(
     tolerance_mm: f64,
     monitor: &dyn Monitor,
 ) -> Result<usize, Cancelled> {
-    let problem = Problem::new(grid, tolerance_mm, monitor);
+    let mut problem = Problem::new(grid, tolerance_mm, monitor);
     let target = ESTIMATED_SHARE * tolerance_mm;
     let mut u = Direction::new(problem.columns, Vec::new());
     let mut v = Direction::new(problem.rows, Vec::new());
-    let knots = Knots {
-        u: u.spread(target, |axis| problem.columns_off(axis), monitor)?,
-        v: v.spread(target, |axis| problem.rows_off(axis), monitor)?,
-    };
+    let mut knots = first_knots(&problem);
+    let times = if problem.is_full { 1 } else { ESTIMATES };
+    for _ in 0..times {
+        problem.refill(&knots);
+        knots = Knots {
+            u: u.spread(target, |axis| problem.columns_off(axis), monitor)?,
+            v: v.spread(target, |axis| problem.rows_off(axis), monitor)?,
+        };
+    }
     Ok(knots.control_points())
+}
+
+/// Those of a first surface, so that holes are filled from more than their neighbours.
+fn first_knots(problem: &Problem) -> Knots {
+    Knots {
+        u: Breaks::uniform(problem.columns, 8).solvable(),
+        v: Breaks::uniform(problem.rows, 8).solvable(),
+    }
 }
 
 /// Halves the spans that exceed the tolerance until none does, or all nodes have a knot.

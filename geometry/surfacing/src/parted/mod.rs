@@ -8,11 +8,19 @@
 //! 3. The borders between regions are drawn and the surfaces trimmed by `reconstruct`: at a crease
 //!    by the curve in which both surfaces intersect, at a step by one curve between their nodes.
 //!
+//! Where z goes on smoothly over a border, as where a step runs out, both pieces pass the nodes on
+//! either side; and borders that leave nodes on the wrong side are drawn closer to the nodes. Pieces
+//! are trimmed only if every data point then lies within the tolerance of the face where it is, and
+//! pieces meet within it wherever there is no step.
+//!
 //! A piece is trimmed, and its surface goes on beyond its trims by a few nodes.
 
 mod block;
 mod regions;
+mod settle;
 mod trims;
+
+use std::collections::{BTreeMap, BTreeSet};
 
 use range_image::{Monitor, RegionMap};
 use reconstruct::Model;
@@ -26,25 +34,39 @@ use crate::problem::Problem;
 use crate::surface::{Part, Piece, in_space};
 use crate::within::fit_within;
 use block::{Block, MARGIN};
+use trims::Trimmed;
+
+/// Shares of the tolerance that pieces which part where they should meet are fitted within the next
+/// time: two that pass the same nodes within half of it meet within it. There is none after the last.
+const SHARES: [f64; 3] = [0.7, 0.5, 0.5];
 
 /// How trimmed pieces meet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lines {
     /// Length of the lines on which two pieces meet within the tolerance, millimetres.
     pub meeting_mm: f64,
-    /// Length of those on which z steps from one piece to the other, as it does between data points
-    /// beside.
+    /// Length of those on which z steps from one piece to the other: by no more than it does between
+    /// data points within two nodes but for twice the tolerance, and there, carried on straight from
+    /// both sides, by more than half of it.
     pub step_mm: f64,
-    /// Length of those on which pieces part by more than the tolerance though the data beside have no
-    /// step: their heights, carried on straight from both sides, meet within it.
+    /// Length of the others, on which pieces part by more than the tolerance though the data beside
+    /// have no such step: none, or pieces are not trimmed.
     pub open_mm: f64,
     /// Greatest distance in z of two pieces on a line, but for steps, millimetres.
     pub greatest_gap_mm: f64,
-    /// Data points on the other side of the trim of their piece, and not within the tolerance of what
-    /// is there: trims run smoothly between the points, and past a few by less than a pitch.
+    /// Data points that the face where they are, or none, does not pass within the tolerance: none, or
+    /// pieces are not trimmed.
     pub nodes_across: usize,
-    /// Data points, apart from all others, that are too few for a face.
+    /// Data points in no piece: none, or pieces are not trimmed.
     pub left_out: usize,
+}
+
+impl Lines {
+    /// Whether every data point is on a face within the tolerance, and pieces meet within it but for
+    /// steps.
+    fn hold(&self) -> bool {
+        self.nodes_across == 0 && self.left_out == 0 && self.open_mm == 0.0
+    }
 }
 
 /// Trimmed pieces, and how they were made.
@@ -67,49 +89,93 @@ pub(crate) fn parted(
     tolerance_mm: f64,
     monitor: &dyn Monitor,
 ) -> Result<Option<Parted>, SurfaceError> {
-    let image = grid.to_image();
     let part = |from: f64, size: f64| Part {
         monitor,
         from,
         size,
     };
-    let Some(map) = regions::regions(grid, &image, tolerance_mm, &part(0.0, 0.3))? else {
+    let image = grid.to_image();
+    let Some((image, map)) = regions::regions(grid, &image, tolerance_mm, &part(0.0, 0.3))? else {
         return Ok(None);
     };
-    let counts = usize::from(map.regions());
+    let mut bands = regions::bands(grid, &map, tolerance_mm);
     let mut deviations_mm = vec![f64::NAN; grid.raw_z_mm().len()];
     let mut pieces: Vec<Piece> = Vec::new();
-    let mut control_points = 0;
-    for label in 1..=map.regions() {
-        let from = 0.3 + 0.6 * f64::from(label - 1) / counts as f64;
-        let part = part(from, 0.6 / counts as f64);
-        let Some(piece) = fitted(grid, &map, label, tolerance_mm, &mut deviations_mm, &part)?
+    let mut again: BTreeMap<u16, f64> = (1..=map.regions()).map(|label| (label, 1.0)).collect();
+    let round = 0.7 / SHARES.len() as f64;
+    for (begun, closer) in SHARES.into_iter().enumerate() {
+        let from = 0.3 + round * begun as f64;
+        let size = 0.6 * round / again.len().max(1) as f64;
+        for (done, (&label, share)) in again.iter().enumerate() {
+            let part = part(from + size * done as f64, size);
+            let at = usize::from(label) - 1;
+            let region = Region {
+                map: &map,
+                label,
+                band: &bands[at],
+            };
+            let within_mm = share * tolerance_mm;
+            let Some(piece) = fitted(grid, &region, within_mm, &mut deviations_mm, &part)? else {
+                return Ok(None);
+            };
+            match pieces.get_mut(at) {
+                Some(old) => *old = piece,
+                None => pieces.push(piece),
+            }
+        }
+        let part = part(from + 0.6 * round, 0.4 * round);
+        let trimmed = trims::trimmed(grid, &image, &map, &pieces, tolerance_mm, &part)?;
+        let Some(Trimmed {
+            model,
+            lines,
+            open,
+            across,
+        }) = trimmed
         else {
             return Ok(None);
         };
-        control_points += piece.knots.control_points();
-        pieces.push(piece);
+        if lines.hold() {
+            return Ok(Some(Parted {
+                control_points: pieces.iter().map(|p| p.knots.control_points()).sum(),
+                pieces,
+                model,
+                deviations_mm,
+                lines,
+            }));
+        }
+        again = open.iter().map(|label| (*label, closer)).collect();
+        for (n, label) in across {
+            // Where the samples end nothing else is to be had.
+            let Some(label) = label else { return Ok(None) };
+            // A face that lies where a node of another does passes that, too.
+            bands[usize::from(label) - 1].insert(n);
+            again.entry(label).or_insert(1.0);
+        }
+        if again.is_empty() {
+            return Ok(None);
+        }
     }
-    let trimmed = trims::trimmed(grid, &image, &map, &pieces, tolerance_mm, &part(0.9, 0.1))?;
-    Ok(trimmed.map(|(model, lines)| Parted {
-        pieces,
-        model,
-        deviations_mm,
-        lines,
-        control_points,
-    }))
+    Ok(None)
+}
+
+/// The nodes that a piece is to pass.
+struct Region<'a> {
+    map: &'a RegionMap,
+    label: u16,
+    /// Nodes of others.
+    band: &'a BTreeSet<usize>,
 }
 
 /// The surface of one region; `None` where it does not come within the tolerance.
 fn fitted(
     grid: &HeightGrid,
-    map: &RegionMap,
-    label: u16,
+    region: &Region<'_>,
     tolerance_mm: f64,
     deviations_mm: &mut [f64],
     monitor: &dyn Monitor,
 ) -> Result<Option<Piece>, SurfaceError> {
-    let Some(block) = Block::of(grid, |n| map.raw_labels()[n] == label) else {
+    let is_own = |n: usize| region.map.raw_labels()[n] == region.label;
+    let Some(block) = Block::of(grid, |n| is_own(n) || region.band.contains(&n)) else {
         return Ok(None);
     };
     let mut problem = Problem::new(&block.grid, tolerance_mm, monitor);
@@ -129,8 +195,8 @@ fn fitted(
     for i in 0..block.extent[0] {
         for j in 0..block.extent[1] {
             let at = (i + MARGIN) * rows + j + MARGIN;
-            if !own[at].is_nan() {
-                let n = (block.first[0] + i) * grid.rows() + block.first[1] + j;
+            let n = (block.first[0] + i) * grid.rows() + block.first[1] + j;
+            if !own[at].is_nan() && is_own(n) {
                 deviations_mm[n] = own[at] - z[at];
             }
         }

@@ -1,23 +1,44 @@
 //! Pieces trimmed where they end.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nurbs::PatchSurface;
 use range_image::{Monitor, RangeImage, RegionMap};
 use reconstruct::{
-    Evidence, Face, Fitted, Model, ReconstructError, ReconstructSettings, Surface, check,
+    Evidence, Face, Fitted, Model, ReconstructError, ReconstructSettings, Reconstruction, Surface,
+    check,
 };
 
 use super::Lines;
-use super::regions::{Link, links};
+use super::regions::{Link, links, square};
 use crate::error::SurfaceError;
 use crate::grid::HeightGrid;
 use crate::surface::Piece;
 
 /// Fewest nodes of a connected part of a region that becomes a face.
 const FEWEST_NODES: usize = 4;
+/// Nodes so near to a line tell whether z steps there, and how far z, carried on straight from both
+/// sides, is apart at a step, in tolerances.
+const BESIDE_NODES: usize = 2;
+const LEAST_STEP: f64 = 0.5;
+/// Nodes so near to a place on a line far from all nodes have the borders beside them drawn anew.
+const FAR_NODES: usize = 4;
+/// How closely a border can be drawn to the nodes.
+const CLOSEST: u8 = 3;
+/// Times that borders are drawn: as a rule, two for each step by which they can be drawn closer.
+const MOST_DRAWINGS: usize = 12;
 /// Places along an edge, for each pitch, at which both sides are compared.
 const PER_PITCH: f64 = 4.0;
+
+/// Trimmed pieces.
+pub(super) struct Trimmed {
+    pub(super) model: Model,
+    pub(super) lines: Lines,
+    /// Labels of pieces that part where there is no step.
+    pub(super) open: BTreeSet<u16>,
+    /// Nodes that no face passes, and the label of the face that is there.
+    pub(super) across: Vec<(usize, Option<u16>)>,
+}
 
 /// The model of the pieces, one for each label, and its lines. `None` where they cannot all be
 /// trimmed on their own surfaces.
@@ -31,7 +52,7 @@ pub(super) fn trimmed(
     pieces: &[Piece],
     tolerance_mm: f64,
     monitor: &dyn Monitor,
-) -> Result<Option<(Model, Lines)>, SurfaceError> {
+) -> Result<Option<Trimmed>, SurfaceError> {
     // The image lies on its lattice, the grid where it was measured.
     let off_mm = [image.x_mm(0) - grid.x_mm(0), image.y_mm(0) - grid.y_mm(0)];
     let mut surfaces = Vec::with_capacity(pieces.len());
@@ -46,23 +67,77 @@ pub(super) fn trimmed(
         min_piece_nodes: FEWEST_NODES,
         ..ReconstructSettings::default()
     };
-    let made = Fitted::given(image, map, &surfaces, &settings, monitor)
-        .and_then(|fitted| fitted.reconstruct(Evidence::default(), monitor));
-    let made = match made {
-        Ok(made) => made,
-        Err(ReconstructError::Cancelled(cancelled)) => return Err(cancelled.into()),
-        Err(_) => return Ok(None),
-    };
     let is_own = |face: &Face| {
         let Surface::Patches(patches) = &face.surface;
         surfaces
             .get(usize::from(face.region).wrapping_sub(1))
             .is_some_and(|own| own.0 == *patches)
     };
-    if !made.model.faces.iter().all(is_own) || check::model(&made.model).is_err() {
-        return Ok(None);
+    let mut closeness = vec![0; grid.raw_z_mm().len()];
+    for _ in 0..MOST_DRAWINGS {
+        let made = Fitted::given(image, map, &surfaces, &settings, monitor).and_then(|fitted| {
+            let fitted = fitted.closely(closeness.clone());
+            fitted.reconstruct(Evidence::default(), monitor)
+        });
+        let made = match made {
+            Ok(made) => made,
+            Err(ReconstructError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Err(_) => return Ok(None),
+        };
+        if check::model(&made.model).is_err() {
+            return Ok(None);
+        }
+        let across = across(grid, image, map, &made, tolerance_mm);
+        let foreign = made.model.faces.iter().filter(|face| !is_own(face));
+        let foreign: BTreeSet<u16> = foreign.map(|face| face.region).collect();
+        let (lines, open) = meetings(grid, image, map, &made.model, tolerance_mm);
+        // Borders that leave nodes out, or the surface, or run far from all nodes, are drawn anew,
+        // nearer to the nodes.
+        let labels = map.raw_labels();
+        let beyond = (0..labels.len()).filter(|n| foreign.contains(&labels[*n]));
+        let far = open.iter().filter(|open| open.is_far).flat_map(|open| {
+            let [i, j] = [0, 1].map(|d| open.at[d].min([grid.columns(), grid.rows()][d] - 1));
+            square(i * grid.rows() + j, FAR_NODES, grid.columns(), grid.rows())
+        });
+        let asking: BTreeSet<usize> = across.iter().copied().chain(beyond).chain(far).collect();
+        let mut is_nearer = false;
+        for n in asking {
+            is_nearer |= closeness[n] < CLOSEST;
+            closeness[n] = (closeness[n] + 1).min(CLOSEST);
+        }
+        if is_nearer {
+            continue;
+        }
+        if !foreign.is_empty() {
+            return Ok(None);
+        }
+        let face_at = |n: usize| (made.face_at[n] as usize).checked_sub(1);
+        let region_at = |n: usize| Some(made.model.faces.get(face_at(n)?)?.region);
+        let across: Vec<_> = across.into_iter().map(|n| (n, region_at(n))).collect();
+        let mut model = made.model;
+        move_model(&mut model, off_mm.map(|mm| -mm));
+        return Ok(Some(Trimmed {
+            model,
+            lines: Lines {
+                nodes_across: across.len(),
+                ..lines
+            },
+            open: open.iter().flat_map(|open| open.regions).collect(),
+            across,
+        }));
     }
-    let mut nodes_across = 0;
+    Ok(None)
+}
+
+/// Nodes that no face passes within the tolerance.
+fn across(
+    grid: &HeightGrid,
+    image: &RangeImage,
+    map: &RegionMap,
+    made: &Reconstruction,
+    tolerance_mm: f64,
+) -> Vec<usize> {
+    let mut across = Vec::new();
     for (n, (label, face)) in map.raw_labels().iter().zip(&made.face_at).enumerate() {
         let z_mm = grid.raw_z_mm()[n];
         let face = (*face as usize)
@@ -76,15 +151,20 @@ pub(super) fn trimmed(
             let Surface::Patches(patches) = &face.surface;
             (patches.z(image.x_mm(i), image.y_mm(j)) - z_mm).abs() <= tolerance_mm
         });
-        nodes_across += usize::from(!is_near);
+        if !is_near {
+            across.push(n);
+        }
     }
-    let lines = Lines {
-        nodes_across,
-        ..meetings(grid, image, map, &made.model, tolerance_mm)
-    };
-    let mut model = made.model;
-    move_model(&mut model, off_mm.map(|mm| -mm));
-    Ok(Some((model, lines)))
+    across
+}
+
+/// A place on a line where two pieces part though there is no step.
+struct Open {
+    /// Column and row of the node before it.
+    at: [usize; 2],
+    regions: [u16; 2],
+    /// No nodes of both are beside it.
+    is_far: bool,
 }
 
 /// How pieces meet on the edges of the model, which is where the image is.
@@ -94,7 +174,7 @@ fn meetings(
     map: &RegionMap,
     model: &Model,
     tolerance_mm: f64,
-) -> Lines {
+) -> (Lines, Vec<Open>) {
     let (labels, z) = (map.raw_labels(), grid.raw_z_mm());
     let left_out = labels
         .iter()
@@ -124,6 +204,7 @@ fn meetings(
             }
         }
     }
+    let mut open = Vec::new();
     let pitch_mm = grid.pitch_mm();
     for (edge, sides) in model.edges.iter().zip(&sides) {
         let &[a, b] = sides.as_slice() else { continue };
@@ -139,26 +220,38 @@ fn meetings(
                 (y - image.y_mm(0)) / pitch_mm,
             ]
             .map(|nodes| nodes.max(0.0) as usize);
-            // A step is where the data beside have one.
-            let cells = (at[0].saturating_sub(1)..at[0] + 2)
-                .flat_map(|i| (at[1].saturating_sub(1)..at[1] + 2).map(move |j| [i, j]));
-            let is_step = cells
+            let cells = (at[0].saturating_sub(BESIDE_NODES)..=at[0] + BESIDE_NODES).flat_map(|i| {
+                (at[1].saturating_sub(BESIDE_NODES)..=at[1] + BESIDE_NODES).map(move |j| [i, j])
+            });
+            let mut beside = cells
                 .filter_map(|cell| near.get(&cell))
                 .flatten()
                 .filter(|link| link.labels.contains(&a.region) && link.labels.contains(&b.region))
-                .any(|link| link.jump_mm > tolerance_mm);
+                .peekable();
+            let is_far = beside.peek().is_none();
+            // A step is where the data beside have one as high; each side may be off by the tolerance.
+            let is_step = beside.any(|link| {
+                let [n, m] = link.nodes;
+                let is_as_high = (z[n] - z[m]).abs() + 2.0 * tolerance_mm >= gap_mm;
+                is_as_high && link.jump_mm > LEAST_STEP * tolerance_mm
+            });
             if gap_mm <= tolerance_mm {
                 lines.meeting_mm += part_mm;
                 lines.greatest_gap_mm = lines.greatest_gap_mm.max(gap_mm);
             } else if is_step {
                 lines.step_mm += part_mm;
             } else {
+                open.push(Open {
+                    at,
+                    regions: [a.region, b.region],
+                    is_far,
+                });
                 lines.open_mm += part_mm;
                 lines.greatest_gap_mm = lines.greatest_gap_mm.max(gap_mm);
             }
         }
     }
-    lines
+    (lines, open)
 }
 
 fn shift(patches: &mut PatchSurface, by_mm: [f64; 2]) {

@@ -33,8 +33,8 @@ pub(crate) struct Args {
     /// .stp). Default: the scan's name with .igs, in the current directory
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
-    /// IGES entities of the surfaces: 128 (rational B-splines), or 114 (parametric splines, the same
-    /// shape to 1e-9 mm); default: 128
+    /// IGES entities of the surfaces: 128 (rational B-splines), or 114 (parametric splines of the
+    /// same shape); default: 128
     #[arg(long, value_name = "TYPE", value_enum)]
     entities: Option<EntityName>,
     /// Greatest distance in z between surface and grid, millimetres
