@@ -44,6 +44,9 @@ pub(crate) struct Options {
     /// Leave out the recorded scan, which takes longer than all others together.
     #[arg(long)]
     pub(crate) no_recorded: bool,
+    /// Also judge recognised machining features: scans of the published part, random and odd ones.
+    #[arg(long)]
+    pub(crate) features: bool,
     /// Where the scans go; `target/judges/scenes` if not given.
     #[arg(long)]
     pub(crate) out: Option<PathBuf>,
@@ -125,6 +128,12 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         println!("\n{}", case.name);
         if let Err(error) = judges.judge(&case, &folder) {
             failed.push(format!("{}: {error}", case.name));
+        }
+    }
+    if options.features {
+        let short = ["--short", "--check"].map(Into::into);
+        if let Err(error) = study::features(&short) {
+            failed.push(format!("machining features: {error}"));
         }
     }
     if failed.is_empty() {

@@ -9,6 +9,7 @@ mod reproduce;
 mod rules;
 mod safety;
 mod shell;
+mod solids;
 mod study;
 mod toolpath;
 mod units;
@@ -46,6 +47,10 @@ enum Chore {
     ///
     /// Needs Python 3; installs the judge's packages into `target/judges/toolpath`.
     JudgeToolpath(toolpath::Options),
+    /// Let OpenCASCADE judge solids of random parts, rebuilt from their features.
+    ///
+    /// Needs Python 3; installs the judge's packages into `target/judges`.
+    JudgeSolids(solids::Options),
     /// Repeat the experiments of Shim & Lee 1995 and write `docs/reproduction.md`.
     ///
     /// For the figures' pictures it needs Python 3, as `judge` does; `--check` and `--print`
@@ -89,6 +94,7 @@ fn main() -> anyhow::Result<()> {
         Chore::Judge(options) => judge::run(&options),
         Chore::Peers(peers) => peers::run(&peers),
         Chore::JudgeToolpath(options) => toolpath::run(&options),
+        Chore::JudgeSolids(options) => solids::run(&options),
         Chore::Reproduce(options) => reproduce::run(&options),
         Chore::Fuzz(options) => fuzz::run(&options),
         Chore::Study(study) => study::run(&study),
@@ -126,6 +132,7 @@ fn full() -> anyhow::Result<()> {
         gmsh: true,
         within_s: Some(SLOWEST_S),
         no_recorded: false,
+        features: false,
         out: None,
     })?;
     peers::run(&peers::Peers::Skin(peers::Options { short: false }))?;
@@ -133,6 +140,7 @@ fn full() -> anyhow::Result<()> {
         surfaces: 20,
         linuxcnc: true,
     })?;
+    solids::run(&solids::Options { parts: 500 })?;
     vm::run(&vm::Vm::Usb(vm::Options::default()))?;
     fuzz::run(&fuzz::Options {
         seconds: 600,

@@ -14,6 +14,8 @@ const DRAWN: [[&str; 2]; 2] = [
     ["study-surfaces", "docs/reproduction-koo-lee.md"],
     ["study-sections", "docs/reproduction-jo-kwon-han.md"],
 ];
+/// Jun & Park: the scans of their part, judged by OpenCASCADE's side, fill the page.
+const JUN_PARK: &str = "docs/reproduction-jun-park.md";
 const PICTURES: &str = "docs/pictures/reproduction";
 
 #[derive(Debug, Args)]
@@ -24,12 +26,21 @@ pub(crate) struct Options {
     /// Print the part of the page whose heading has these words, and write nothing.
     #[arg(long, value_name = "WORDS", conflicts_with = "no_pictures")]
     print: Option<String>,
+    /// Table 3 of Jun & Park alone: machining features on 50 scans of their part.
+    ///
+    /// Needs Python 3, as `judge` does.
+    #[arg(long, conflicts_with_all = ["check", "print", "no_pictures"])]
+    features: bool,
     /// Leave the pictures as they are.
     #[arg(long)]
     no_pictures: bool,
 }
 
 pub(crate) fn run(options: &Options) -> Result<()> {
+    if options.features {
+        let page = ["--only-published", "--table", JUN_PARK].map(Into::into);
+        return study::features(&page);
+    }
     let words = |words: &[&str]| -> Vec<OsString> { words.iter().map(Into::into).collect() };
     let drawn = |option: &str| {
         let mut all = DRAWN.into_iter();

@@ -31,7 +31,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("solids", &["nurbs"]),
     (
         "cad-exchange",
-        &["nurbs", "reconstruct", "shapes", "solids"],
+        &["nurbs", "reconstruct", "shapes", "solids", "terraces"],
     ),
     (
         "tessellate",
@@ -44,6 +44,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &["nurbs", "range-image", "reconstruct", "segment"],
     ),
     ("toolpath", &["range-image"]),
+    ("terraces", &["nurbs"]),
+    ("features", &["nurbs", "range-image", "segment", "terraces"]),
     (
         "pipeline",
         &[
@@ -113,9 +115,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-const DELIVERABLES: [&str; 16] = [
+const DELIVERABLES: [&str; 18] = [
     "cad-exchange",
     "compare",
+    "features",
     "mesh-files",
     "nurbs",
     "page",
@@ -128,6 +131,7 @@ const DELIVERABLES: [&str; 16] = [
     "skin",
     "storage",
     "surfacing",
+    "terraces",
     "tessellate",
     "toolpath",
 ];
@@ -153,10 +157,11 @@ const DAEMON: [&str; 18] = [
     "toolpath",
 ];
 
-const COMMAND_LINE: [&str; 21] = [
+const COMMAND_LINE: [&str; 22] = [
     "cad-exchange",
     "compare",
     "deliverables",
+    "features",
     "nurbs",
     "pipeline",
     "range-image",

@@ -77,6 +77,13 @@ pub(crate) enum Study {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
+    /// Hold recognised machining features against what parts, built by OpenCASCADE, really have.
+    #[command(disable_help_flag = true)]
+    Features {
+        /// Options of the study; `--help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
     /// Hold the shapes found on faces against what the faces are.
     #[command(disable_help_flag = true)]
     Shapes {
@@ -105,6 +112,7 @@ pub(crate) fn run(study: &Study) -> Result<()> {
             program("study-crashes", options)
         }
         Study::Faults { options } => program("study-faults", options),
+        Study::Features { options } => features(options),
         Study::Mutations { options } => program("study-mutations", options),
         Study::Outline { options } => program("study-outline", options),
         Study::Parts { options } => {
@@ -130,6 +138,16 @@ pub(crate) fn run(study: &Study) -> Result<()> {
             program("study-throughput", &options)
         }
     }
+}
+
+/// What is recognised on scans of known parts, by the command as it is delivered.
+pub(crate) fn features(options: &[OsString]) -> Result<()> {
+    let python = judge::python(&shell::root().join("target/judges"), &[])?;
+    // The study looks for it beside itself.
+    shell::run("cargo", &["build", "--release", "--bin", "relief"])?;
+    let mut words: Vec<OsString> = vec!["judge".into(), "--python".into(), python.into()];
+    words.extend(options.iter().cloned());
+    program("study-features", &words)
 }
 
 /// Where the figures of B-spline surfaces are kept.

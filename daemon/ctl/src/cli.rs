@@ -6,15 +6,16 @@ use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    abort, change, compare, convert, demo, doctor, fetch, jobs, laser, manual, rerun, resume, scan,
-    scans, skin, status, surface, token, toolpath, watch, webhooks,
+    abort, change, compare, convert, demo, doctor, features, fetch, jobs, laser, manual, rerun,
+    resume, scan, scans, skin, status, surface, token, toolpath, watch, webhooks,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
 ///
 /// `relief demo` shows the whole road with a simulated scanner; `relief convert` takes an
 /// existing scan file, `relief surface` makes one B-spline surface of it, and `relief compare` holds
-/// it against its nominal; `relief skin` makes a surface of cross-sections, `relief toolpath` mills a
+/// it against its nominal; `relief features` recognises holes, pockets, slots and their like in it;
+/// `relief skin` makes a surface of cross-sections, `relief toolpath` mills a
 /// model; `relief doctor` finds out why something does not work. The other
 /// commands speak to the service, reliefd.
 #[derive(Debug, Parser)]
@@ -33,6 +34,7 @@ pub(crate) enum Command {
     Demo(demo::Args),
     Convert(convert::Args),
     Compare(compare::Args),
+    Features(features::Args),
     Skin(skin::Args),
     Surface(surface::Args),
     Toolpath(toolpath::Args),

@@ -49,9 +49,28 @@ fn the_schemas_are_schemas() {
         assert!(schema["$schema"].as_str().unwrap().contains("2020-12"));
     }
     for command in [
-        "compare", "convert", "skin", "surface", "demo", "scan", "abort", "resume", "status",
-        "scans", "jobs", "retry", "cancel", "rerun", "watch", "fetch", "doctor", "token", "laser",
-        "toolpath", "webhooks",
+        "compare",
+        "convert",
+        "skin",
+        "surface",
+        "demo",
+        "scan",
+        "abort",
+        "resume",
+        "status",
+        "scans",
+        "jobs",
+        "retry",
+        "cancel",
+        "rerun",
+        "watch",
+        "fetch",
+        "doctor",
+        "token",
+        "laser",
+        "toolpath",
+        "webhooks",
+        "features_train",
     ] {
         let reference = format!("commands.schema.json#/$defs/{command}");
         assert!(

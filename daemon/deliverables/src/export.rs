@@ -158,6 +158,16 @@ pub fn write_step(
     cad: &CadOptions,
     mut sink: impl Write,
 ) -> Result<(), WriteError> {
+    step::write(model, &step_options(name, timestamp, cad), &mut sink)?;
+    Ok(())
+}
+
+/// The options of a STEP file.
+pub(crate) fn step_options(
+    name: &str,
+    timestamp: Timestamp,
+    cad: &CadOptions,
+) -> step::WriteOptions {
     let time = timestamp
         .to_zoned(TimeZone::UTC)
         .strftime("%Y-%m-%dT%H:%M:%S+00:00")
@@ -167,8 +177,7 @@ pub fn write_step(
     options.unit = cad.step_units;
     options.author.clone_from(&cad.author);
     options.organization.clone_from(&cad.organisation);
-    step::write(model, &options, &mut sink)?;
-    Ok(())
+    options
 }
 
 /// A name made fit for a file: no separators, no control characters, no leading dot or

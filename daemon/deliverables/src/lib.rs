@@ -11,6 +11,7 @@ pub mod comparison;
 mod deviations;
 mod export;
 mod extras;
+pub mod features;
 mod file;
 mod filed;
 mod further;

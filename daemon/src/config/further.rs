@@ -381,6 +381,7 @@ impl DeliverablesConfig {
             surface: surface.transpose()?,
             skin: skin.transpose()?,
             toolpath: toolpath.transpose()?.flatten(),
+            features: self.features,
         };
         let of = self.toolpath.as_ref().and_then(|own| own.of);
         if of == Some(OfChoice::Surface) && further.surface.is_none() {

@@ -248,6 +248,9 @@ pub struct DeliverablesConfig {
         skip_serializing_if = "Option::is_none"
     )]
     pub toolpath: Option<ToolpathConfig>,
+    /// Whether machining features are recognised, and the part rebuilt from them.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub features: bool,
     /// Author in the CAD file's header; the scan's operator if left out.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub author: String,

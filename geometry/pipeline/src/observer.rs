@@ -22,13 +22,15 @@ pub enum Stage {
     Skin,
     /// The milling of the model is planned and simulated, where that is asked for.
     Toolpath,
+    /// Machining features are recognised, where that is asked for.
+    Features,
     /// The pictures are drawn.
     Pictures,
 }
 
 impl Stage {
     /// Every stage, in order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Regrid,
         Self::Segment,
         Self::Reconstruct,
@@ -36,6 +38,7 @@ impl Stage {
         Self::Surface,
         Self::Skin,
         Self::Toolpath,
+        Self::Features,
         Self::Pictures,
     ];
 
@@ -50,6 +53,7 @@ impl Stage {
             Self::Surface => "surface",
             Self::Skin => "skin",
             Self::Toolpath => "toolpath",
+            Self::Features => "features",
             Self::Pictures => "pictures",
         }
     }

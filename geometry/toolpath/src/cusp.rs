@@ -10,6 +10,8 @@
 use crate::cutter::Cutter;
 use crate::edge::highest;
 
+/// The step-over of a flat end on slopes, as a share of its radius.
+const FLAT_STEP: f64 = 0.2;
 /// Rounds of halving for where the cusp is.
 const ROUNDS: usize = 32;
 
@@ -80,6 +82,18 @@ pub(crate) fn level_step_mm(cutter: &Cutter, cusp_mm: f64) -> f64 {
     let r = cutter.corner_mm();
     let cusp = cusp_mm.min(r);
     2.0 * (cutter.disc_mm() + (cusp * (2.0 * r - cusp)).sqrt())
+}
+
+/// The step-over that is small for a slope, millimetres: that of the corner alone, and for a flat end,
+/// whose steps on a slope have no other measure, a share of its radius.
+pub(crate) fn slope_step_mm(cutter: &Cutter, cusp_mm: f64) -> f64 {
+    let corner = level_step_mm(cutter, cusp_mm) - 2.0 * cutter.disc_mm();
+    let step = if corner > 0.0 {
+        corner
+    } else {
+        FLAT_STEP * cutter.radius_mm()
+    };
+    step.max(1e-3)
 }
 
 #[cfg(test)]

@@ -38,8 +38,8 @@ impl Edge {
     }
 
     /// The tip of a cutter that touches it between its ends; `None` where it passes the cutter by, or
-    /// is touched at an end. That is a corner's business.
-    pub(crate) fn tip_mm(&self, cutter: &Cutter, at: [f64; 2]) -> Option<f64> {
+    /// is touched at an end, which is a corner's business, or where that is no higher than `floor_mm`.
+    pub(crate) fn tip_mm(&self, cutter: &Cutter, at: [f64; 2], floor_mm: f64) -> Option<f64> {
         let (px, py) = (self.start[0] - at[0], self.start[1] - at[1]);
         let from = px * self.along[0] + py * self.along[1];
         let apart = px * self.along[1] - py * self.along[0];
@@ -48,14 +48,37 @@ impl Edge {
         if reach < 0.0 {
             return None;
         }
+        let to = from + self.length;
+        // No point of it is nearer to the axis than this.
+        let nearest = from.max(-to).max(0.0);
+        if self.top - height(cutter, apart * apart + nearest * nearest) <= floor_mm {
+            return None;
+        }
+        if cutter.kind() == Kind::Bull
+            && (falls(cutter, self.slope, apart, from) || !falls(cutter, self.slope, apart, to))
+        {
+            return None;
+        }
         let s = best_place(cutter, self.slope, apart.abs(), reach.sqrt());
-        if s < from || s > from + self.length {
+        if s < from || s > to {
             return None;
         }
         // Rounding must not lift the point above the edge's higher end.
         let z = (self.start[2] + self.slope * (s - from)).min(self.top);
         Some(z - height(cutter, apart * apart + s * s))
     }
+}
+
+/// Whether the tip that touches an edge at `s` gets lower from there on.
+fn falls(cutter: &Cutter, slope: f64, apart: f64, s: f64) -> bool {
+    let rho = (apart * apart + s * s).sqrt();
+    let out = rho - cutter.disc_mm();
+    if out <= 0.0 {
+        return slope < 0.0 || (slope == 0.0 && s >= 0.0);
+    }
+    let r = cutter.corner_mm();
+    let rise = ((r - out) * (r + out)).max(0.0).sqrt();
+    slope * rho * rise < out * s
 }
 
 /// The highest of `slope s - h(sqrt(apart^2 + s^2))` over all `s`.
@@ -155,7 +178,7 @@ mod tests {
             ] {
                 let tip = Edge::new(a, b)
                     .unwrap()
-                    .tip_mm(&cutter, [0.1, 0.2])
+                    .tip_mm(&cutter, [0.1, 0.2], f64::NEG_INFINITY)
                     .unwrap();
                 let forced = by_force(&cutter, a, b, [0.1, 0.2]);
                 // Points miss the very best by a step of the slope where it is at the rim.

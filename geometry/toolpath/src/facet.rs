@@ -117,7 +117,7 @@ impl Facet {
         let radius = cutter.radius_mm();
         for corner in 0..3 {
             if let Some((edge, on_edge)) = &self.edges[corner]
-                && let Some(z_mm) = edge.tip_mm(cutter, at)
+                && let Some(z_mm) = edge.tip_mm(cutter, at, best.z_mm)
                 && z_mm > best.z_mm
             {
                 *best = Contact {

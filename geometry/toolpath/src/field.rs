@@ -9,7 +9,7 @@ pub(crate) struct Field<'a> {
     pub(crate) surface: &'a Surface,
     pub(crate) cutter: Cutter,
     /// Unit direction of passes.
-    along: [f64; 2],
+    pub(crate) along: [f64; 2],
     /// Limits along and across them, within the cutter's reach of the surface.
     pub(crate) s: [f64; 2],
     pub(crate) t: [f64; 2],
@@ -67,8 +67,17 @@ impl<'a> Field<'a> {
         self.contact(at).map(|(tip, _)| tip)
     }
 
+    /// The same; `None` also where it is not below `limit_mm`.
+    pub(crate) fn tip_below(&self, at: [f64; 2], limit_mm: f64) -> Option<f64> {
+        self.contact_below(at, limit_mm).map(|(tip, _)| tip)
+    }
+
     fn contact(&self, at: [f64; 2]) -> Option<(f64, bool)> {
-        let contact = self.surface.drop_cutter(&self.cutter, at)?;
+        self.contact_below(at, f64::INFINITY)
+    }
+
+    fn contact_below(&self, at: [f64; 2], limit_mm: f64) -> Option<(f64, bool)> {
+        let contact = self.surface.drop_below(&self.cutter, at, limit_mm)?;
         let mills = !contact.on_edge || self.surface.height_mm(at).is_some();
         mills.then_some((contact.z_mm, contact.on_edge))
     }

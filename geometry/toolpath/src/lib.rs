@@ -4,7 +4,8 @@
 //! triangles --> Surface --> cutter dropped onto it: heights of the tip
 //!                             |
 //!                             +--> roughing in levels, around the surface and an allowance
-//!                             +--> finishing passes, as far apart as their cusps allow
+//!                             +--> finishing passes, as far apart as their cusps allow; short ones
+//!                                    |   where these are still too high
 //!                                    |
 //!                                    v
 //!               samples --> lines and arcs above them --> links, retracts --> Operation
@@ -31,19 +32,25 @@ mod facet;
 mod field;
 mod link;
 mod machine;
+mod mend;
 mod motion;
 mod parallel;
 mod plan;
 mod post;
 mod quantize;
+mod reach;
+mod ridge;
 mod rough;
 mod scallop;
 mod settings;
+mod simplify;
 mod simulate;
 mod strand;
 mod surface;
 mod time;
 mod trace;
+mod way;
+mod ways;
 
 pub use cutter::{Cutter, CutterError, DIAMETERS_MM, Kind};
 pub use drop::drop_cutter;

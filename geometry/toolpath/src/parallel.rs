@@ -1,5 +1,5 @@
-//! Parallel finishing passes: each as far from the one before as the demanded cusp allows where
-//! that is highest.
+//! Parallel finishing passes: each as far from the one before as the demanded cusp allows along most of
+//! it. Where cusps would be higher, short passes are added later (see `mend`).
 
 use range_image::{Cancelled, Monitor};
 use rayon::prelude::*;
@@ -14,6 +14,8 @@ pub(crate) const STEEP: f64 = 0.258_819;
 /// The step is sought until the highest cusp is this share below what is asked for, at most.
 const NEAR_ENOUGH: f64 = 0.015;
 const ROUNDS: usize = 12;
+/// Share of a pass along which cusps may be higher at first: short passes mend them.
+const EXCEEDED: f64 = 0.25;
 /// Stations within the cutter's radius.
 const STATIONS: f64 = 16.0;
 /// The greatest share of the cutter's diameter that a step may be.
@@ -38,15 +40,6 @@ pub(crate) fn limit(passes: usize) -> Result<(), ToolpathError> {
     })
 }
 
-/// Where passes run, and how much was too steep for them.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Passes {
-    /// Places across, ascending.
-    pub(crate) across_mm: Vec<f64>,
-    /// Share of the stations that are steeper than passes are drawn for.
-    pub(crate) steep_share: f64,
-}
-
 /// Heights of a pass at the stations.
 struct Line {
     across: f64,
@@ -64,12 +57,12 @@ impl Line {
     }
 }
 
-/// Places the passes.
+/// Places the passes: where they run across, ascending.
 pub(crate) fn passes(
     field: &Field<'_>,
     cusp_mm: f64,
     monitor: &dyn Monitor,
-) -> Result<Option<Passes>, ToolpathError> {
+) -> Result<Option<Vec<f64>>, ToolpathError> {
     let stations = field.stations(STATIONS);
     let line = |across: f64| Line::new(field, &stations, across);
     let level = cusp::level_step_mm(&field.cutter, cusp_mm).max(1e-3);
@@ -88,14 +81,13 @@ pub(crate) fn passes(
     let mut across_mm = vec![first];
     let mut here = line(first);
     let mut step = level;
-    let (mut steep, mut all) = (0, 0);
     limit(((last - first) / (1.5 * level).min(widest)) as usize)?;
     while here.across < last {
         monitor.check()?;
         limit(across_mm.len())?;
         monitor.progress((here.across - first) / (last - first));
         let (mut low, mut high) = (0.0_f64, f64::INFINITY);
-        let mut best: Option<(Line, Tally)> = None;
+        let mut best: Option<Line> = None;
         for _ in 0..ROUNDS {
             let next = line((here.across + step).min(last));
             let amid = line(f64::midpoint(here.across, next.across));
@@ -103,27 +95,23 @@ pub(crate) fn passes(
             let reached = next.across - here.across;
             let is_last = next.across >= last;
             // Where nothing can be told, as at the outline, the next pass is near enough anyhow.
-            let is_told = tally.all > 0 || reached <= cautious;
-            let cusp = if is_told {
-                tally.highest
-            } else {
-                f64::INFINITY
-            };
+            let is_told = tally.is_told || reached <= cautious;
+            let cusp = if is_told { tally.cusp } else { f64::INFINITY };
             let fits = cusp <= cusp_mm;
             if fits {
                 low = reached;
                 let done = cusp >= (1.0 - NEAR_ENOUGH) * cusp_mm
                     || reached >= widest
                     || is_last
-                    || tally.all == 0;
-                best = Some((next, tally));
+                    || !tally.is_told;
+                best = Some(next);
                 if done {
                     break;
                 }
             } else {
                 high = reached;
                 if reached <= least * 1.0001 {
-                    best = Some((next, tally));
+                    best = Some(next);
                     break;
                 }
             }
@@ -139,33 +127,22 @@ pub(crate) fn passes(
             .max(least)
             .min(widest);
         }
-        let (next, tally) = match best {
-            Some(found) => found,
-            None => {
-                let next = line((here.across + low.max(least)).min(last));
-                (next, Tally::default())
-            }
-        };
+        let next = best.unwrap_or_else(|| line((here.across + low.max(least)).min(last)));
         step = (next.across - here.across).max(least);
-        steep += tally.steep;
-        all += tally.all;
         across_mm.push(next.across);
         here = next;
     }
-    Ok(Some(Passes {
-        across_mm,
-        steep_share: f64::from(steep) / f64::from(all.max(1)),
-    }))
+    Ok(Some(across_mm))
 }
 
-#[derive(Debug, Default)]
 struct Tally {
-    highest: f64,
-    steep: u32,
-    all: u32,
+    /// The cusp that is exceeded at [`EXCEEDED`] of the stations.
+    cusp: f64,
+    /// Whether anything could be told.
+    is_told: bool,
 }
 
-/// The highest cusp between two lines.
+/// The cusps between two lines.
 fn tally(field: &Field<'_>, stations: &[f64], a: &Line, b: &Line, amid: &Line) -> Tally {
     let near = |line: &Line, k: usize| {
         let [before, tip, behind] =
@@ -179,32 +156,31 @@ fn tally(field: &Field<'_>, stations: &[f64], a: &Line, b: &Line, amid: &Line) -
         Some((near, on_edge))
     };
     let of = |k: usize| {
-        let mut tally = Tally::default();
-        let (Some((a, _)), Some((b, _))) = (near(a, k), near(b, k)) else {
-            return tally;
-        };
+        let ((a, _), (b, _)) = (near(a, k)?, near(b, k)?);
         // Where it rolls around an edge, there is no surface to leave cusps on.
-        let Some((amid, false)) = near(amid, k) else {
-            return tally;
+        let (amid, false) = near(amid, k)? else {
+            return None;
         };
-        tally.all = 1;
-        let (cusp, nz) = cusp::height_mm(&field.cutter, a, b, amid);
-        if nz >= STEEP {
-            tally.highest = cusp;
-        } else {
-            tally.steep = 1;
-        }
-        tally
+        Some(cusp::height_mm(&field.cutter, a, b, amid))
     };
-    let sum = |p: Tally, q: Tally| Tally {
-        highest: p.highest.max(q.highest),
-        steep: p.steep + q.steep,
-        all: p.all + q.all,
+    let told: Vec<(f64, f64)> = (0..stations.len()).into_par_iter().filter_map(of).collect();
+    let mut cusps: Vec<f64> = told
+        .iter()
+        .filter(|(_, nz)| *nz >= STEEP)
+        .map(|(cusp, _)| *cusp)
+        .collect();
+    let exceeded = (EXCEEDED * cusps.len() as f64) as usize;
+    let cusp = if exceeded < cusps.len() {
+        *cusps
+            .select_nth_unstable_by(exceeded, |a, b| b.total_cmp(a))
+            .1
+    } else {
+        0.0
     };
-    (0..stations.len())
-        .into_par_iter()
-        .map(of)
-        .reduce(Tally::default, sum)
+    Tally {
+        cusp,
+        is_told: !told.is_empty(),
+    }
 }
 
 /// The first and the last place across where the cutter mills anything.

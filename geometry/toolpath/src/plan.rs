@@ -8,8 +8,9 @@ use crate::error::ToolpathError;
 use crate::field::Field;
 use crate::link::Links;
 use crate::machine::Machine;
+use crate::mend::{Mend, Mended};
 use crate::motion::{Move, Operation};
-use crate::parallel::{self, Passes};
+use crate::parallel;
 use crate::quantize::quantized;
 use crate::rough::Rough;
 use crate::scallop;
@@ -71,14 +72,8 @@ pub fn plan(
     }
     let from = if settings.rough.is_some() { 0.3 } else { 0.0 };
     let part = Part::new(monitor, from, 1.0);
-    let (finish, steep_share) = finishing(surface, machine, settings, &part)?;
-    if steep_share > 0.0 {
-        notes.push(format!(
-            "{:.2} % of the passes' places are steeper than 75 degrees or at a wall: there passes \
-             lie farther apart than the scallop asks for",
-            100.0 * steep_share
-        ));
-    }
+    let (finish, told) = finishing(surface, machine, settings, &part)?;
+    notes.extend(told);
     operations.push(finish);
     for operation in &operations {
         check::after(machine, operation)?;
@@ -154,14 +149,17 @@ fn finishing(
     machine: &Machine,
     settings: &Settings,
     monitor: &dyn Monitor,
-) -> Result<(Operation, f64), ToolpathError> {
+) -> Result<(Operation, Vec<String>), ToolpathError> {
     let cutter = settings.finish;
     let field = Field::new(surface, cutter, settings.angle_deg);
     // What the corridor adds to cusps is taken from them, half of it: it adds all or nothing.
     let tolerance_mm = settings
         .tolerance_mm
         .min(SHARE_OF_CUSP * settings.scallop_mm);
-    let cusp_mm = settings.scallop_mm - tolerance_mm / 2.0;
+    // So is what rounding of heights adds.
+    let unit_mm = 1.0 / crate::post::scale(machine.decimals);
+    let cusp_mm =
+        settings.scallop_mm - (tolerance_mm + unit_mm.min(0.1 * settings.scallop_mm)) / 2.0;
     let drawing = Drawing {
         fineness: Fineness::of(cutter.corner_mm(), WOBBLE_MM, LEAST_MM),
         tolerance_mm,
@@ -176,27 +174,18 @@ fn finishing(
             mend: "choose a larger scallop",
         });
     }
-    let ways = Part::new(monitor, 0.0, 0.6);
-    let Some((lines, steep_share)) = (match settings.pattern {
+    let ways = Part::new(monitor, 0.0, 0.4);
+    let found = match settings.pattern {
         Pattern::Parallel => {
-            let found = parallel::passes(&field, cusp_mm, &ways)?;
-            found.map(
-                |Passes {
-                     across_mm,
-                     steep_share,
-                 }| {
-                    let [from, to] = field.s;
-                    let line = |t: &f64| vec![field.place(from, *t), field.place(to, *t)];
-                    (across_mm.iter().map(line).collect(), steep_share)
-                },
-            )
+            let [from, to] = field.s;
+            let line = |t: &f64| vec![field.place(from, *t), field.place(to, *t)];
+            let across_mm = parallel::passes(&field, cusp_mm, &ways)?;
+            across_mm.map(|across_mm| across_mm.iter().map(line).collect())
         }
         Pattern::Scallop => scallop::passes(&field, cusp_mm, &ways)?,
-    }) else {
-        return Err(ToolpathError::Nowhere(cutter));
     };
-    let lines: Vec<Vec<[f64; 2]>> = lines;
-    let ways = Part::new(monitor, 0.6, 1.0);
+    let lines: Vec<Vec<[f64; 2]>> = found.ok_or(ToolpathError::Nowhere(cutter))?;
+    let ways = Part::new(monitor, 0.4, 0.6);
     let tip = |at: [f64; 2]| field.tip(at);
     let drawn: Result<Vec<Vec<Strand>>, ToolpathError> = (0..lines.len())
         .into_par_iter()
@@ -211,23 +200,55 @@ fn finishing(
         .collect();
     let drawn = drawn?;
     let passes = drawn.iter().filter(|strands| !strands.is_empty()).count();
-    let strands: Vec<Strand> = drawn.into_iter().flatten().collect();
+    let mut strands: Vec<Strand> = drawn.into_iter().flatten().collect();
     if strands.is_empty() {
         return Err(ToolpathError::Nowhere(cutter));
     }
     let touching = |at: [f64; 2]| surface.drop_cutter(&cutter, at).map(|contact| contact.z_mm);
+    let level_mm = crate::cusp::level_step_mm(&cutter, cusp_mm).max(1e-3);
+    let mend = Mend {
+        field: &field,
+        drawing,
+        scallop_mm: settings.scallop_mm,
+        level_mm,
+        slope_mm: crate::cusp::slope_step_mm(&cutter, cusp_mm),
+        decimals: machine.decimals,
+        tip: &touching,
+    };
+    let mended = mend.mended(&strands, &Part::new(monitor, 0.6, 1.0))?;
     let links = Links {
         safe_z_mm: machine.safe_z_mm,
         feeds_mm_per_min: machine.feeds_mm_per_min(machine.tool(&cutter)?),
-        most_mm: LINKED_STEPS * crate::cusp::level_step_mm(&cutter, cusp_mm).max(0.1),
+        most_mm: LINKED_STEPS * level_mm.max(0.1),
         drawing,
         tip: &touching,
     };
+    let notes = told(&mended);
+    let passes = passes + mended.strands.len();
+    strands.extend(mended.strands);
     let mut moves = Vec::new();
     links.add(&mut moves, &strands, machine.stock.z_mm[1], None);
     links.retract(&mut moves);
     let finish = operation(machine, cutter, "finishing", passes, &moves, &touching)?;
-    Ok((finish, steep_share))
+    Ok((finish, notes))
+}
+
+/// What is worth knowing of cusps, in words.
+fn told(mended: &Mended) -> Vec<String> {
+    let left = mended.left_mm.map(|(cusp_mm, [x, y])| {
+        format!(
+            "a cusp of {cusp_mm:.4} mm is left near x {x:.2}, y {y:.2} mm, more than the scallop asks \
+             for: no pass reaches it"
+        )
+    });
+    let coarse = mended.coarse_mm.map(|[apart_mm, wanted_mm]| {
+        format!(
+            "cusps were measured on lines {apart_mm:.3} mm apart, not {wanted_mm:.3} mm: there are too \
+             many for so small a scallop, and between them cusps may be higher; choose a larger \
+             scallop, or mill the model in parts"
+        )
+    });
+    left.into_iter().chain(coarse).collect()
 }
 
 /// A part of the whole, whose progress is a part of that of the whole.

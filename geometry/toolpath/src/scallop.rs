@@ -15,6 +15,7 @@ use crate::cusp;
 use crate::error::ToolpathError;
 use crate::field::Field;
 use crate::parallel::STEEP;
+use crate::simplify::simplified;
 
 /// Rounds for the way to the next pass.
 const ROUNDS: usize = 10;
@@ -23,7 +24,7 @@ const STATIONS: f64 = 24.0;
 /// How near to the cusp's height that is, as a share of it.
 const NEAR_ENOUGH: f64 = 0.004;
 /// How far corners of a pass may be off it, as a share of the step on a level plane.
-const SMOOTH: f64 = 0.005;
+const SMOOTH: f64 = 0.003;
 
 /// Rounds in which places of a new pass are drawn nearer, and the share of the wanted cusp from which
 /// that is done.
@@ -38,7 +39,7 @@ pub(crate) struct Place {
     pub(crate) tip: Option<f64>,
 }
 
-type Lines = (Vec<Vec<[f64; 2]>>, f64);
+type Lines = Vec<Vec<[f64; 2]>>;
 
 /// Places the passes: for each the corners of its way as seen from above.
 pub(crate) fn passes(
@@ -58,7 +59,6 @@ pub(crate) fn passes(
     };
     let mut here: Vec<Place> = stations.par_iter().map(|s| at(*s, first)).collect();
     let mut lines = vec![corners(field, &here, level)];
-    let (mut steep, mut all) = (0_usize, 0_usize);
     let most = ((last - first) / (level * STEEP * 0.25)).ceil() as usize + 2;
     crate::parallel::limit(((last - first) / (1.5 * level)) as usize)?;
     for _ in 0..most {
@@ -70,7 +70,7 @@ pub(crate) fn passes(
         }
         monitor.progress((done - first) / (last - first));
         let window = (2.0 * level / (stations[1] - stations[0])).ceil() as usize + 2;
-        let steps: Vec<Option<(f64, bool)>> = (0..here.len())
+        let steps: Vec<Option<f64>> = (0..here.len())
             .into_par_iter()
             .map(|k| {
                 let from = k.saturating_sub(window);
@@ -78,8 +78,6 @@ pub(crate) fn passes(
                 step(field, here[k], near, cusp_mm, level, last)
             })
             .collect();
-        all += steps.iter().flatten().count();
-        steep += steps.iter().flatten().filter(|(_, steep)| *steep).count();
         // Where the cutter mills nothing a pass keeps to its neighbours.
         let across = filled(&steps, level);
         let mut next: Vec<Place> = here
@@ -112,10 +110,10 @@ pub(crate) fn passes(
         here = next;
         lines.push(corners(field, &here, level));
     }
-    Ok(Some((lines, steep as f64 / all.max(1) as f64)))
+    Ok(Some(lines))
 }
 
-/// How far the next pass is across, and whether it is too steep there to be told.
+/// How far the next pass is across; no less than what suits 75 degrees.
 fn step(
     field: &Field<'_>,
     here: Place,
@@ -123,7 +121,7 @@ fn step(
     cusp_mm: f64,
     level: f64,
     last: f64,
-) -> Option<(f64, bool)> {
+) -> Option<f64> {
     here.tip?;
     let least = level * STEEP;
     let most = 3.0 * level;
@@ -142,14 +140,14 @@ fn step(
         };
         let is_last = here.t + step >= last;
         if (cusp - cusp_mm).abs() <= NEAR_ENOUGH * cusp_mm || (is_last && cusp <= cusp_mm) {
-            return Some((step, false));
+            return Some(step);
         }
         if cusp < cusp_mm {
             low = step;
         } else {
             high = step;
             if step <= least {
-                return Some((least, true));
+                return Some(least);
             }
         }
         told = Some(step);
@@ -162,14 +160,14 @@ fn step(
             2.0 * step
         };
         if low >= most {
-            return Some((most, false));
+            return Some(most);
         }
         step = next.clamp(least, most);
     }
     if low > 0.0 {
-        Some((low, false))
+        Some(low)
     } else {
-        told.map(|_| (least, true))
+        told.map(|_| least)
     }
 }
 
@@ -220,11 +218,11 @@ pub(crate) fn nearest(near: &[Place], [s, t, tip]: [f64; 3]) -> Option<(f64, [f6
 }
 
 /// Steps where there are none, from the nearest stations that have one.
-fn filled(steps: &[Option<(f64, bool)>], level: f64) -> Vec<f64> {
+fn filled(steps: &[Option<f64>], level: f64) -> Vec<f64> {
     let known: Vec<(usize, f64)> = steps
         .iter()
         .enumerate()
-        .filter_map(|(k, step)| step.map(|(step, _)| (k, step)))
+        .filter_map(|(k, step)| step.map(|step| (k, step)))
         .collect();
     (0..steps.len())
         .map(|k| {
@@ -237,29 +235,8 @@ fn filled(steps: &[Option<(f64, bool)>], level: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The corners of a pass, few where it is straight (Ramer 1972, Douglas & Peucker 1973).
+/// The corners of a pass, few where it is straight.
 fn corners(field: &Field<'_>, places: &[Place], level: f64) -> Vec<[f64; 2]> {
-    let mut keep = vec![false; places.len()];
-    let mut open = vec![(0, places.len().saturating_sub(1))];
-    while let Some((from, to)) = open.pop() {
-        if let (Some(a), Some(b)) = (keep.get_mut(from), places.get(to)) {
-            *a = true;
-            let a = places[from];
-            keep[to] = true;
-            let off = |p: &Place| {
-                let share = (p.s - a.s) / (b.s - a.s).max(1e-12);
-                (p.t - a.t - share * (b.t - a.t)).abs()
-            };
-            let inner = from + 1..to;
-            let worst = inner
-                .map(|k| (k, off(&places[k])))
-                .fold((0, 0.0), |m, n| if n.1 > m.1 { n } else { m });
-            if worst.1 > SMOOTH * level {
-                open.push((worst.0, to));
-                open.push((from, worst.0));
-            }
-        }
-    }
-    let kept = places.iter().zip(&keep).filter(|(_, keep)| **keep);
-    kept.map(|(p, _)| field.place(p.s, p.t)).collect()
+    let all: Vec<[f64; 2]> = places.iter().map(|p| field.place(p.s, p.t)).collect();
+    simplified(&all, SMOOTH * level)
 }

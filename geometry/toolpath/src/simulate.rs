@@ -13,13 +13,12 @@ use crate::error::ToolpathError;
 use crate::machine::Cuboid;
 use crate::motion::{Operation, Travel};
 use crate::surface::Surface;
+use crate::way::Way;
 
 /// Nodes at most.
 const MOST_NODES: usize = 16_000_000;
 /// How far chords may lie off arcs.
 const CHORD_MM: f64 = 5e-5;
-/// Rounds of halving for the way of a tool.
-const ROUNDS: usize = 40;
 /// Rapid moves that take more than this run into material.
 const RAPID_MM: f64 = 1e-3;
 /// Rows that a task looks after.
@@ -127,20 +126,36 @@ impl HeightField {
             }
         }
         let (origin, pitch, columns) = (self.origin_mm, self.pitch_mm, self.columns);
+        // Fine paths have millions of strokes: each band looks at those that come near it.
+        let mut near: Vec<Vec<u32>> = vec![Vec::new(); self.rows.div_ceil(BAND)];
+        for (index, stroke) in (0..).zip(&strokes) {
+            let radius = cutters.get(stroke.cutter).map_or(0.0, Cutter::radius_mm);
+            let (a, b) = (stroke.from[1], stroke.to[1]);
+            let band = |y: f64| ((y - origin[1]) / (BAND as f64 * pitch)).max(0.0) as usize;
+            let last = band(a.max(b) + radius + pitch);
+            for list in near
+                .iter_mut()
+                .take(last + 1)
+                .skip(band(a.min(b) - radius - pitch))
+            {
+                list.push(index);
+            }
+        }
         let bands: Result<Vec<(f64, [f64; 2])>, Cancelled> = self
             .heights_mm
             .par_chunks_mut(BAND * columns.max(1))
             .enumerate()
-            .map(|(band, heights)| {
+            .map(|(band_number, heights)| {
                 monitor.check()?;
                 let mut band = Band {
-                    origin: [origin[0], origin[1] + (band * BAND) as f64 * pitch],
+                    origin: [origin[0], origin[1] + (band_number * BAND) as f64 * pitch],
                     pitch,
                     columns,
                     heights,
                     worst: (0.0, [0.0; 2]),
                 };
-                for stroke in &strokes {
+                for index in &near[band_number] {
+                    let stroke = &strokes[*index as usize];
                     if let Some(cutter) = cutters.get(stroke.cutter) {
                         band.cut(cutter, stroke);
                     }
@@ -222,112 +237,19 @@ impl Band<'_> {
             for column in columns.clone() {
                 let height = &mut self.heights[row * self.columns + column];
                 // Nothing of the cutter is lower than its tip.
-                if *height <= way.lowest {
+                if *height <= way.lowest_mm {
                     continue;
                 }
                 let x = self.origin[0] + column as f64 * self.pitch;
-                let Some(left) = way.leaves(cutter, [x, y], *height) else {
+                let Some((left, _)) = way.leaves(cutter, [x, y], *height) else {
                     continue;
                 };
-                if left < *height {
-                    let taken = *height - left;
-                    *height = left;
-                    if stroke.is_rapid && taken > RAPID_MM && taken > self.worst.0 {
-                        self.worst = (taken, [x, y]);
-                    }
+                let taken = *height - left;
+                *height = left;
+                if stroke.is_rapid && taken > RAPID_MM && taken > self.worst.0 {
+                    self.worst = (taken, [x, y]);
                 }
             }
         }
-    }
-}
-
-/// A straight way as seen from above.
-struct Way {
-    from: [f64; 3],
-    along: [f64; 2],
-    length: f64,
-    slope: f64,
-    lowest: f64,
-}
-
-impl Way {
-    fn new(a: [f64; 3], b: [f64; 3]) -> Self {
-        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-        let length = (dx * dx + dy * dy).sqrt();
-        let lowest = a[2].min(b[2]);
-        if length < 1e-9 {
-            // Straight down or up: what its lowest place takes.
-            return Self {
-                from: [a[0], a[1], lowest],
-                along: [1.0, 0.0],
-                length: 0.0,
-                slope: 0.0,
-                lowest,
-            };
-        }
-        Self {
-            from: a,
-            along: [dx / length, dy / length],
-            length,
-            slope: (b[2] - a[2]) / length,
-            lowest,
-        }
-    }
-
-    /// The height that is left at a place; `None` out of reach, or where that is above `height`
-    /// anyhow.
-    fn leaves(&self, cutter: &Cutter, at: [f64; 2], height: f64) -> Option<f64> {
-        let (px, py) = (at[0] - self.from[0], at[1] - self.from[1]);
-        let foot = px * self.along[0] + py * self.along[1];
-        let aside = px * self.along[1] - py * self.along[0];
-        let aside = aside * aside;
-        let radius = cutter.radius_mm();
-        let reach = radius * radius - aside;
-        if reach < 0.0 {
-            return None;
-        }
-        let reach = reach.sqrt();
-        let (mut low, mut high) = ((foot - reach).max(0.0), (foot + reach).min(self.length));
-        if low > high {
-            return None;
-        }
-        let nearest = foot.clamp(low, high) - foot;
-        let least = cutter.profile((aside + nearest * nearest).sqrt());
-        if self.lowest + least >= height {
-            return None;
-        }
-        let value = |t: f64| {
-            let off = t - foot;
-            self.from[2] + self.slope * t + cutter.profile((aside + off * off).sqrt())
-        };
-        // The derivative of what is left, by way.
-        let falls = |t: f64| {
-            let off = t - foot;
-            let rho = (aside + off * off).sqrt();
-            let out = rho - cutter.disc_mm();
-            if out <= 0.0 {
-                return self.slope < 0.0;
-            }
-            let rise = ((cutter.corner_mm() - out) * (cutter.corner_mm() + out))
-                .max(0.0)
-                .sqrt();
-            // out / rise off / rho + slope < 0, without dividing by nothing.
-            out * off + self.slope * rho * rise < 0.0
-        };
-        if !falls(low) {
-            return Some(value(low));
-        }
-        if falls(high) {
-            return Some(value(high));
-        }
-        for _ in 0..ROUNDS {
-            let middle = f64::midpoint(low, high);
-            if falls(middle) {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        Some(value(low).min(value(high)))
     }
 }

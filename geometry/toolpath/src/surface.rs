@@ -107,6 +107,17 @@ impl Surface {
     /// corners. `None` where nothing is below it.
     #[must_use]
     pub fn drop_cutter(&self, cutter: &Cutter, at_mm: [f64; 2]) -> Option<Contact> {
+        self.drop_below(cutter, at_mm, f64::INFINITY)
+    }
+
+    /// The same; `None` also where the tip would stand as high as `limit_mm`, which is often told long
+    /// before it is known how high that is.
+    pub(crate) fn drop_below(
+        &self,
+        cutter: &Cutter,
+        at_mm: [f64; 2],
+        limit_mm: f64,
+    ) -> Option<Contact> {
         let mut best = Contact {
             z_mm: f64::NEG_INFINITY,
             on_edge: false,
@@ -130,6 +141,9 @@ impl Surface {
                     if facet.top_mm > best.z_mm {
                         facet.raise(cutter, at_mm, &mut best);
                     }
+                }
+                if best.z_mm >= limit_mm {
+                    return None;
                 }
                 continue;
             }

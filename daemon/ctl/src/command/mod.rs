@@ -6,6 +6,7 @@ pub(crate) mod compare;
 pub(crate) mod convert;
 pub(crate) mod demo;
 pub(crate) mod doctor;
+pub(crate) mod features;
 pub(crate) mod fetch;
 mod grid;
 pub(crate) mod jobs;
@@ -43,6 +44,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
     match invocation.command {
         Command::Demo(args) => block_on(demo::run(args, json)),
         Command::Compare(args) => block_on(compare::run(args, json)),
+        Command::Features(args) => block_on(features::run(args, json)),
         Command::Toolpath(args) => block_on(toolpath::run(args, json)),
         Command::Convert(args) => block_on(convert::run(args, json)),
         Command::Skin(args) => block_on(skin::run(args, json)),

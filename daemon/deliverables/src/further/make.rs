@@ -2,9 +2,12 @@
 //! the model.
 
 use cad_exchange::iges::NamedSurface;
+use features::field::FieldError;
+use features::recognise::RecogniseError;
 use pipeline::{Observer, Stage};
 use range_image::Cancelled;
 use reconstruct::Model;
+use segment::SegmentError;
 use skin::SkinError;
 use surfacing::{HeightGrid, Made, SurfaceError};
 use tessellate::{MeshFace, TessellateError};
@@ -12,6 +15,7 @@ use toolpath::{Surface, ToolpathError};
 
 use super::milled::{MillError, mill};
 use super::options::{MillOf, SkinOptions, ToolpathOptions};
+use super::recognised::{recognised, write_recognised};
 use super::report::{SkinReport, SurfaceReport, ToolpathReport};
 use super::skinned::{SkinFigures, cut_remark, rows_of, skin_pictures};
 use super::surface_file::{SurfaceFormat, SurfacesError, made_model, write_made};
@@ -21,6 +25,7 @@ use super::surfaced::{
 };
 use crate::export::{Entities, file_stem, write_surfaces};
 use crate::extras::Extras;
+use crate::features::FEATURES_NAME;
 use crate::meshes::{TrianglesError, triangles};
 use crate::write::{DeliverError, Inputs};
 
@@ -33,7 +38,7 @@ pub(crate) struct FurtherReports {
 }
 
 /// Why one is left out; a wish to end is none.
-enum Stop {
+pub(super) enum Stop {
     Cancelled(Cancelled),
     Refused(String),
 }
@@ -48,6 +53,19 @@ impl From<SurfaceError> for Stop {
     fn from(error: SurfaceError) -> Self {
         match error {
             SurfaceError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Refused(other.to_string()),
+        }
+    }
+}
+
+impl From<RecogniseError> for Stop {
+    fn from(error: RecogniseError) -> Self {
+        match error {
+            RecogniseError::Cancelled(cancelled)
+            | RecogniseError::Field(FieldError::Cancelled(cancelled))
+            | RecogniseError::Segment(SegmentError::Cancelled(cancelled)) => {
+                Self::Cancelled(cancelled)
+            }
             other => Self::Refused(other.to_string()),
         }
     }
@@ -83,7 +101,7 @@ impl From<TrianglesError> for Stop {
 }
 
 /// Work by as many threads as the settings have.
-fn threaded<T: Send>(
+pub(super) fn threaded<T: Send>(
     inputs: &Inputs<'_>,
     work: impl FnOnce() -> Result<T, Stop> + Send,
 ) -> Result<T, Stop> {
@@ -134,6 +152,16 @@ pub(crate) fn write_further(
             match milled(extras, inputs, options, (&name, made.as_ref()), watch)? {
                 Ok(report) => reports.toolpath = report,
                 Err(stop) => left_out(extras, &name, stop)?,
+            }
+        }
+        watch.progress(1.0);
+    }
+    if wanted.features {
+        watch.stage(Stage::Features);
+        if !extras.lacks_room_for(FEATURES_NAME) {
+            match recognised(inputs, watch) {
+                Ok(found) => write_recognised(extras, inputs, &found)?,
+                Err(stop) => left_out(extras, FEATURES_NAME, stop)?,
             }
         }
         watch.progress(1.0);

@@ -4,6 +4,7 @@ mod machine;
 mod make;
 mod milled;
 mod options;
+mod recognised;
 mod report;
 mod skinned;
 mod surface_file;

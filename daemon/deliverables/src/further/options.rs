@@ -14,6 +14,8 @@ pub struct Further {
     pub skin: Option<SkinOptions>,
     /// An NC program.
     pub toolpath: Option<ToolpathOptions>,
+    /// Machining features, and the part rebuilt from them.
+    pub features: bool,
 }
 
 /// How a surface is skinned.

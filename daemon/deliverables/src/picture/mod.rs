@@ -6,6 +6,7 @@ mod deviations;
 mod heights;
 mod inliers;
 mod machined;
+mod outlines;
 mod plot;
 mod range;
 mod regions;
@@ -23,6 +24,7 @@ use skin::Skin;
 use crate::deviations::Deviations;
 use canvas::Canvas;
 
+pub use outlines::OutlineNote;
 pub use regions::RegionNote;
 
 /// Draws the range image with a colour scale in millimetres and writes it as PNG.
@@ -31,6 +33,19 @@ pub use regions::RegionNote;
 /// What the sink reports.
 pub fn write_range(image: &RangeImage, name: &str, sink: impl Write) -> std::io::Result<()> {
     encode(&range::draw(image, name), sink)
+}
+
+/// Draws outlines with their numbers over the shaded part, with a legend, and writes it as PNG.
+///
+/// # Errors
+/// What the sink reports.
+pub fn write_outlines(
+    image: &RangeImage,
+    notes: &[OutlineNote],
+    name: &str,
+    sink: impl Write,
+) -> std::io::Result<()> {
+    encode(&outlines::draw(image, notes, name), sink)
 }
 
 /// Draws the regions over the shaded part, with trim loops, vertices, numbers and a

@@ -5,7 +5,8 @@
 //! faces of solids and shells that any program wrote.
 //!
 //! A scan sees a part from one side, so its faces never close: they become open shells
-//! (`SHELL_BASED_SURFACE_MODEL`, ISO 10303-42, 6.4.26), and no solid is written.
+//! (`SHELL_BASED_SURFACE_MODEL`, ISO 10303-42, 6.4.26). What was rebuilt from its features is closed:
+//! [`write_solid`] writes that.
 
 mod read;
 mod write;
@@ -15,5 +16,6 @@ pub use read::{
     read_body, read_model,
 };
 pub use write::{
-    DEFAULT_PALETTE, FaceDefect, LengthUnit, Schema, Summary, WriteError, WriteOptions, write,
+    DEFAULT_PALETTE, FaceDefect, LengthUnit, Schema, SolidSummary, Summary, WriteError,
+    WriteOptions, write, write_solid,
 };

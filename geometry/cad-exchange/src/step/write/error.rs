@@ -30,6 +30,9 @@ pub enum WriteError {
         /// The name.
         name: String,
     },
+    /// A solid is not closed.
+    #[error("the solid cannot be written: {0}")]
+    Solid(terraces::Unsound),
     /// A face breaks a promise of the model.
     #[error("face {face:?} cannot be written: {defect}")]
     Face {

@@ -12,6 +12,7 @@ mod measure;
 mod options;
 mod product;
 mod shapes;
+mod solid;
 mod spell;
 mod style;
 
@@ -22,6 +23,7 @@ use reconstruct::{Face, Model};
 pub use crate::common::{DEFAULT_PALETTE, FaceDefect};
 pub use error::WriteError;
 pub use options::{LengthUnit, Schema, WriteOptions};
+pub use solid::{SolidSummary, write_solid};
 
 use crate::brep::{Brep, Carrier, Sharing, Topology, Use};
 use crate::common::check;
@@ -102,7 +104,30 @@ pub fn write(
     styles.finish(&mut data, units.context);
     product::properties(&mut data, &shapes, &units, shape, &moments);
 
-    let head = header(options);
+    let bytes = exchange(&data, options, "trimmed faces from a range scan", out)?;
+    Ok(Summary {
+        faces: faces.len(),
+        shells: topology.shells.len(),
+        edges: topology.edges.len(),
+        shared_edges: topology.shared,
+        partly_shared: topology.partly_shared,
+        parted_creases: topology.parted,
+        instances: data.count(),
+        bytes,
+        uncertainty_mm,
+        area_mm2: moments.area_mm2,
+        centroid_mm: moments.centroid_mm(),
+    })
+}
+
+/// Writes header and data; returns how many bytes these are.
+fn exchange(
+    data: &Data,
+    options: &WriteOptions,
+    description: &str,
+    out: &mut impl io::Write,
+) -> io::Result<usize> {
+    let head = header(options, description);
     let parts = [
         &head,
         "DATA;\n",
@@ -112,23 +137,11 @@ pub fn write(
     for part in parts {
         out.write_all(part.as_bytes())?;
     }
-    Ok(Summary {
-        faces: faces.len(),
-        shells: topology.shells.len(),
-        edges: topology.edges.len(),
-        shared_edges: topology.shared,
-        partly_shared: topology.partly_shared,
-        parted_creases: topology.parted,
-        instances: data.count(),
-        bytes: parts.iter().map(|part| part.len()).sum(),
-        uncertainty_mm,
-        area_mm2: moments.area_mm2,
-        centroid_mm: moments.centroid_mm(),
-    })
+    Ok(parts.iter().map(|part| part.len()).sum())
 }
 
 /// The header section (ISO 10303-21, clause 8).
-fn header(options: &WriteOptions) -> String {
+fn header(options: &WriteOptions, description: &str) -> String {
     let text = |value: &str| {
         let mut out = String::new();
         spell::text(&mut out, value);
@@ -139,7 +152,7 @@ fn header(options: &WriteOptions) -> String {
     let (system, schema) = (text(&options.system), options.schema.identifier());
     format!(
         "ISO-10303-21;\nHEADER;\n\
-         FILE_DESCRIPTION(('trimmed faces from a range scan'),'2;1');\n\
+         FILE_DESCRIPTION(('{description}'),'2;1');\n\
          FILE_NAME({name},{time},({author}),\n({organization}),{system},{system},'');\n\
          FILE_SCHEMA(('{schema}'));\nENDSEC;\n"
     )
@@ -153,29 +166,14 @@ fn write_faces(
     carriers: &[Carrier],
     topology: &Topology,
 ) -> Vec<Id> {
-    let vertices: Vec<Id> = topology
-        .vertices
-        .iter()
-        .map(|&point| {
-            let point = shapes.point(data, "", point);
-            data.add("VERTEX_POINT", |v| {
-                v.text("");
-                v.id(point);
-            })
-        })
-        .collect();
+    let vertices = write_vertices(data, shapes, &topology.vertices);
     let edges: Vec<Id> = topology
         .edges
         .iter()
         .map(|strand| {
             let ends_mm = strand.ends.map(|vertex| topology.vertices[vertex]);
             let curve = shapes.curve(data, strand, ends_mm);
-            data.add("EDGE_CURVE", |v| {
-                v.text("");
-                strand.ends.iter().for_each(|&end| v.id(vertices[end]));
-                v.id(curve);
-                v.word(".T.");
-            })
+            write_edge(data, strand.ends.map(|end| vertices[end]), curve)
         })
         .collect();
     let faces = model.faces.iter().zip(carriers).zip(&topology.uses);
@@ -196,19 +194,55 @@ fn write_face(
     edges: &[Id],
 ) -> Id {
     let surface = shapes.surface(data, carrier, &face.surface);
+    let uses = loops.iter().map(|border| {
+        let senses = border.iter().map(|of| (edges[of.edge], of.forward));
+        senses.collect::<Vec<_>>()
+    });
+    advanced_face(data, &face.name, surface, carrier.same_sense(), uses)
+}
+
+/// `VERTEX_POINT` of each point.
+fn write_vertices(data: &mut Data, shapes: &Shapes, points_mm: &[[f64; 3]]) -> Vec<Id> {
+    let points = points_mm.iter().map(|&point| {
+        let point = shapes.point(data, "", point);
+        data.add("VERTEX_POINT", |v| {
+            v.text("");
+            v.id(point);
+        })
+    });
+    points.collect()
+}
+
+/// `EDGE_CURVE`, in the sense of its curve.
+fn write_edge(data: &mut Data, ends: [Id; 2], curve: Id) -> Id {
+    data.add("EDGE_CURVE", |v| {
+        v.text("");
+        ends.iter().for_each(|&end| v.id(end));
+        v.id(curve);
+        v.word(".T.");
+    })
+}
+
+/// `ADVANCED_FACE` of a surface and its loops, the outer one first, by edges and their senses.
+fn advanced_face(
+    data: &mut Data,
+    name: &str,
+    surface: Id,
+    same_sense: bool,
+    loops: impl Iterator<Item = Vec<(Id, bool)>>,
+) -> Id {
     let bounds: Vec<Id> = loops
-        .iter()
         .enumerate()
         .map(|(n, border)| {
             let uses: Vec<Id> = border
-                .iter()
-                .map(|of| {
+                .into_iter()
+                .map(|(edge, forward)| {
                     data.add("ORIENTED_EDGE", |v| {
                         v.text("");
                         v.word("*");
                         v.word("*");
-                        v.id(edges[of.edge]);
-                        v.word(if of.forward { ".T." } else { ".F." });
+                        v.id(edge);
+                        v.word(if forward { ".T." } else { ".F." });
                     })
                 })
                 .collect();
@@ -229,10 +263,10 @@ fn write_face(
         })
         .collect();
     data.add("ADVANCED_FACE", |v| {
-        v.text(&face.name);
+        v.text(name);
         v.ids(&bounds);
         v.id(surface);
-        v.word(if carrier.same_sense() { ".T." } else { ".F." });
+        v.word(if same_sense { ".T." } else { ".F." });
     })
 }
 
@@ -261,8 +295,21 @@ fn write_shells(
         v.text("");
         v.ids(&shells);
     });
+    let keyword = "MANIFOLD_SURFACE_SHAPE_REPRESENTATION";
+    represent(data, shapes, units, options, shape, (keyword, model));
+}
+
+/// The representation that gives a model to the product.
+fn represent(
+    data: &mut Data,
+    shapes: &Shapes,
+    units: &Units,
+    options: &WriteOptions,
+    shape: Id,
+    (keyword, model): (&str, Id),
+) {
     let origin = shapes.placement(data, [0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
-    let representation = data.add("MANIFOLD_SURFACE_SHAPE_REPRESENTATION", |v| {
+    let representation = data.add(keyword, |v| {
         v.text(&options.product);
         v.ids(&[origin, model]);
         v.id(units.context);

@@ -124,32 +124,68 @@ pub(super) fn properties(
     shape: Id,
     moments: &Moments,
 ) {
-    let element = data.add("DERIVED_UNIT_ELEMENT", |v| {
-        v.id(units.length);
-        v.real(2.0);
-    });
-    let square = data.add("DERIVED_UNIT", |v| v.ids(&[element]));
-    let area = moments.area_mm2 / (shapes.unit.mm() * shapes.unit.mm());
-    let area = data.add("MEASURE_REPRESENTATION_ITEM", |v| {
-        v.text("surface area measure");
-        v.typed("AREA_MEASURE", area);
-        v.id(square);
-    });
+    let unit_mm2 = shapes.unit.mm() * shapes.unit.mm();
+    let area = moments.area_mm2 / unit_mm2;
+    let area = measure(
+        data,
+        units,
+        2.0,
+        ("surface area measure", "AREA_MEASURE"),
+        area,
+    );
     let centroid = shapes.point(data, "centre point", moments.centroid_mm());
     for (name, item) in [("surface area", area), ("centroid", centroid)] {
-        let property = data.add("PROPERTY_DEFINITION", |v| {
-            v.text("geometric validation property");
-            v.text(name);
-            v.id(shape);
-        });
-        let representation = data.add("REPRESENTATION", |v| {
-            v.text(name);
-            v.ids(&[item]);
-            v.id(units.context);
-        });
-        data.add("PROPERTY_DEFINITION_REPRESENTATION", |v| {
-            v.id(property);
-            v.id(representation);
-        });
+        property(data, units, shape, name, item);
     }
+}
+
+/// The volume of a solid, as a validation property.
+pub(super) fn volume(data: &mut Data, shapes: &Shapes, units: &Units, shape: Id, volume_mm3: f64) {
+    let unit = shapes.unit.mm();
+    let volume = volume_mm3 / (unit * unit * unit);
+    let item = measure(
+        data,
+        units,
+        3.0,
+        ("volume measure", "VOLUME_MEASURE"),
+        volume,
+    );
+    property(data, units, shape, "volume", item);
+}
+
+/// A measure in a power of the unit of length.
+fn measure(
+    data: &mut Data,
+    units: &Units,
+    power: f64,
+    (name, keyword): (&str, &str),
+    value: f64,
+) -> Id {
+    let element = data.add("DERIVED_UNIT_ELEMENT", |v| {
+        v.id(units.length);
+        v.real(power);
+    });
+    let unit = data.add("DERIVED_UNIT", |v| v.ids(&[element]));
+    data.add("MEASURE_REPRESENTATION_ITEM", |v| {
+        v.text(name);
+        v.typed(keyword, value);
+        v.id(unit);
+    })
+}
+
+fn property(data: &mut Data, units: &Units, shape: Id, name: &str, item: Id) {
+    let property = data.add("PROPERTY_DEFINITION", |v| {
+        v.text("geometric validation property");
+        v.text(name);
+        v.id(shape);
+    });
+    let representation = data.add("REPRESENTATION", |v| {
+        v.text(name);
+        v.ids(&[item]);
+        v.id(units.context);
+    });
+    data.add("PROPERTY_DEFINITION_REPRESENTATION", |v| {
+        v.id(property);
+        v.id(representation);
+    });
 }

@@ -1,6 +1,6 @@
 //! Points, curves and surfaces (ISO 10303-42, clause 4).
 
-use nurbs::{KnotVector, PatchSurface, PiecewiseCubic};
+use nurbs::{BSplineCurve, BSplineSurface, KnotVector, PatchSurface, PiecewiseCubic};
 use reconstruct::Surface;
 use shapes::Family;
 
@@ -61,10 +61,7 @@ impl Shapes {
         match carrier {
             Carrier::Plane(flat) => {
                 let placement = self.placement(data, flat.origin_mm, flat.normal, flat.x);
-                data.add("PLANE", |v| {
-                    v.text("");
-                    v.id(placement);
-                })
+                self.elementary(data, "PLANE", placement, &[], None)
             }
             Carrier::Round(analytic) => self.analytic(data, analytic),
             Carrier::Swept(generated) => self.swept(data, generated),
@@ -82,16 +79,39 @@ impl Shapes {
             Family::Sphere => "SPHERICAL_SURFACE",
             Family::Torus => "TOROIDAL_SURFACE",
         };
+        let (lengths, angle) = (&carrier.lengths_mm[..], carrier.angle_rad);
+        self.elementary(data, keyword, placement, lengths, angle)
+    }
+
+    /// A surface or a curve of a placement and numbers.
+    pub(super) fn elementary(
+        &self,
+        data: &mut Data,
+        keyword: &str,
+        placement: Id,
+        lengths_mm: &[f64],
+        angle_rad: Option<f64>,
+    ) -> Id {
         data.add(keyword, |v| {
             v.text("");
             v.id(placement);
-            for &length_mm in &carrier.lengths_mm {
+            for &length_mm in lengths_mm {
                 v.real(length_mm / self.unit.mm());
             }
-            carrier
-                .angle_rad
-                .into_iter()
-                .for_each(|angle| v.real(angle));
+            angle_rad.into_iter().for_each(|angle| v.real(angle));
+        })
+    }
+
+    /// `VECTOR` of a direction and a length.
+    pub(super) fn vector(&self, data: &mut Data, direction: [f64; 3], length_mm: f64) -> Id {
+        let direction = data.add("DIRECTION", |v| {
+            v.text("");
+            v.reals(&direction);
+        });
+        data.add("VECTOR", |v| {
+            v.text("");
+            v.id(direction);
+            v.real(length_mm / self.unit.mm());
         })
     }
 
@@ -108,12 +128,7 @@ impl Shapes {
         match &carrier.by {
             By::Shift { along_mm, .. } => {
                 let length_mm = along_mm.norm();
-                let direction = direction(data, (along_mm / length_mm).into());
-                let vector = data.add("VECTOR", |v| {
-                    v.text("");
-                    v.id(direction);
-                    v.real(length_mm / self.unit.mm());
-                });
+                let vector = self.vector(data, (along_mm / length_mm).into(), length_mm);
                 data.add("SURFACE_OF_LINEAR_EXTRUSION", |v| {
                     v.text("");
                     v.id(profile);
@@ -139,7 +154,11 @@ impl Shapes {
     }
 
     fn patches(&self, data: &mut Data, patches: &PatchSurface) -> Id {
-        let spline = patches.to_bspline(SMOOTH_MM);
+        self.spline_surface(data, &patches.to_bspline(SMOOTH_MM))
+    }
+
+    /// `B_SPLINE_SURFACE_WITH_KNOTS`, not closed.
+    pub(super) fn spline_surface(&self, data: &mut Data, spline: &BSplineSurface) -> Id {
         let points: Vec<Id> = spline
             .points()
             .iter()
@@ -168,7 +187,16 @@ impl Shapes {
     }
 
     fn spline(&self, data: &mut Data, curve: &PiecewiseCubic<3>, ends_mm: [[f64; 3]; 2]) -> Id {
-        let spline = curve.to_bspline(SMOOTH_MM);
+        self.spline_curve(data, &curve.to_bspline(SMOOTH_MM), ends_mm)
+    }
+
+    /// `B_SPLINE_CURVE_WITH_KNOTS` of a spline, from vertex to vertex.
+    pub(super) fn spline_curve(
+        &self,
+        data: &mut Data,
+        spline: &BSplineCurve<3>,
+        ends_mm: [[f64; 3]; 2],
+    ) -> Id {
         let last = spline.points().len().saturating_sub(1);
         let points: Vec<Id> = spline
             .points()

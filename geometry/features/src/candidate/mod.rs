@@ -1,0 +1,243 @@
+//! What may be features: levels with their outlines, before anything says what they are.
+
+mod border_sides;
+mod merge;
+mod outlined;
+pub(crate) mod tip;
+mod top;
+
+use range_image::{Cancelled, Monitor};
+
+use crate::border::{Border, border};
+use crate::frame::Frame;
+use crate::levels::{AROUND, Levels, Sense};
+use crate::outline::witnesses::Sight;
+use crate::outline::{Outline, Shape};
+
+pub use tip::Tip;
+pub use top::{Top, top};
+
+/// How a level lies in what is around it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lie {
+    /// The body that all others are cut into and stand on.
+    Body,
+    /// Lower than what is around it, where there is something.
+    Hollow,
+    /// Higher than what is around it.
+    Raised,
+}
+
+/// A level that may be a feature.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// Its levels: one, or the pieces of one that another cuts apart.
+    pub levels: Vec<u16>,
+    /// How it lies.
+    pub lie: Lie,
+    /// Its outline in the plan.
+    pub outline: Outline,
+    /// The level that it goes into or stands on.
+    pub host: u16,
+    /// Share of its outermost border that rises, falls, and lies at the frame of the scan.
+    pub rises: f64,
+    /// See `rises`.
+    pub falls: f64,
+    /// Whether the scan ends in it.
+    pub is_cut: bool,
+    /// Nodes of it.
+    pub nodes: usize,
+    /// The cone that its floor is, of a drilled hole.
+    pub tip: Option<Tip>,
+}
+
+/// Outermost pairs of which at least this share rises are a hollow's.
+const HOLLOW: f64 = 0.2;
+/// Of which at least this share falls, what stands out.
+const RAISED: f64 = 0.6;
+/// A hollow goes into what at least this share of its walls rise to.
+const HOST: f64 = 0.12;
+/// Where more than this share of the border lies at the frame of the scan, that cuts it.
+const CUT: f64 = 0.06;
+
+/// Candidates of all levels; the body first. Smaller ones than `fewest` nodes are left out.
+///
+/// # Errors
+/// Cancelled.
+pub fn candidates(
+    sight: &Sight<'_>,
+    top: &Top,
+    step_mm: f64,
+    seed: u64,
+    fewest: usize,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Candidate>, Cancelled> {
+    let image = &sight.field.image;
+    let own_border =
+        |is_own: &dyn Fn(u16) -> bool| border(image, sight.regions, sight.levels, step_mm, is_own);
+    let body = own_border(&|level| level != AROUND);
+    let mut found = Vec::new();
+    if let Some(outline) = outlined::outlined(sight, &body, Lie::Body, seed) {
+        found.push(Candidate {
+            levels: top.levels.clone(),
+            lie: Lie::Body,
+            outline,
+            host: AROUND,
+            rises: 0.0,
+            falls: 1.0,
+            is_cut: body.at_frame as f64 > CUT * (body.pairs.len() + body.at_frame) as f64,
+            nodes: body.nodes,
+            tip: None,
+        });
+    }
+    let mut sets = merge::sets(sight, top, step_mm);
+    let mut others: Vec<Candidate> = Vec::new();
+    while let Some(set) = (!sets.is_empty()).then(|| sets.remove(0)) {
+        monitor.check()?;
+        let Some(own) = candidate(sight, set, step_mm, seed, fewest) else {
+            continue;
+        };
+        // Pieces of one floor, of which the rest is hidden, have one outline.
+        match others.iter().position(|other| are_one(sight, other, &own)) {
+            Some(index) => {
+                let mut both = others.remove(index).levels;
+                both.extend(own.levels);
+                both.sort_by_key(|l| {
+                    let level = &sight.levels.levels[usize::from(*l)];
+                    (!level.is_seen(), std::cmp::Reverse(level.nodes), *l)
+                });
+                sets.insert(0, both);
+            }
+            None => others.push(own),
+        }
+    }
+    found.extend(others);
+    Ok(found)
+}
+
+/// A piece is part of another whose outline holds this share of its nodes.
+const HELD: f64 = 0.95;
+
+/// Whether two hollows go into the same, and one lies within the outline of the other.
+fn are_one(sight: &Sight<'_>, one: &Candidate, other: &Candidate) -> bool {
+    let image = &sight.field.image;
+    let rows = sight.levels.rows;
+    let holds = |outer: &Candidate, inner: &Candidate| {
+        let (mut inside, mut all) = (0, 0);
+        for (node, level) in sight.levels.labels.iter().enumerate() {
+            if inner.levels.contains(level) {
+                let (x, y) = (image.x_mm(node / rows), image.y_mm(node % rows));
+                let [u, v, _] = sight.frame.local(nalgebra::Vector3::new(x, y, 0.0));
+                let off = outer.outline.shape.distance_mm([u, v]);
+                inside += usize::from(off < 0.5 * image.pitch_mm());
+                all += 1;
+            }
+        }
+        f64::from(all) * HELD <= inside as f64
+    };
+    let both = one.lie == Lie::Hollow && other.lie == Lie::Hollow && one.host == other.host;
+    both && (holds(one, other) || holds(other, one))
+}
+
+/// Of the area within its outline a level takes at least this share; less is a rest of an edge.
+const FILLED: f64 = 0.12;
+
+/// Whether an outline is narrower than features are, or hardly filled: the rest of a slanting edge.
+fn is_scrap(sight: &Sight<'_>, outline: &Outline, nodes: usize, fewest: usize) -> bool {
+    let pitch = sight.field.image.pitch_mm();
+    let [a, b] = match outline.shape {
+        Shape::Circle(circle) => [2.0 * circle.radius_mm; 2],
+        Shape::Rectangle(rectangle) => rectangle.sizes_mm(),
+    };
+    // `fewest` is half the square of the least width in nodes.
+    let least = (2.0 * fewest as f64).sqrt() * pitch;
+    a.min(b) < least || (nodes as f64) * pitch * pitch < FILLED * a * b
+}
+
+/// The candidate of a set of levels, if they are one.
+fn candidate(
+    sight: &Sight<'_>,
+    set: Vec<u16>,
+    step_mm: f64,
+    seed: u64,
+    fewest: usize,
+) -> Option<Candidate> {
+    let own = border(
+        &sight.field.image,
+        sight.regions,
+        sight.levels,
+        step_mm,
+        &|level| set.contains(&level),
+    );
+    if own.nodes < fewest {
+        return None;
+    }
+    let [rises, falls, level] =
+        [Sense::Rises, Sense::Falls, Sense::Level].map(|sense| own.outermost(sense) as f64);
+    let all = (rises + falls + level + own.at_frame as f64).max(1.0);
+    let lie = if rises >= HOLLOW * all {
+        Lie::Hollow
+    } else if falls >= RAISED * all {
+        Lie::Raised
+    } else {
+        return None;
+    };
+    let host = host(sight.levels, &own, lie)?;
+    let seed = seed ^ (u64::from(*set.first()?) << 32);
+    let outline = outlined::outlined(sight, &own, lie, seed)?;
+    if is_scrap(sight, &outline, own.nodes, fewest) {
+        return None;
+    }
+    let tip = (lie == Lie::Hollow)
+        .then(|| tip::tip(sight, *set.first()?, &outline.shape))
+        .flatten();
+    Some(Candidate {
+        tip,
+        levels: set,
+        lie,
+        outline,
+        host,
+        rises: rises / all,
+        falls: falls / all,
+        is_cut: own.at_frame as f64 > CUT * all,
+        nodes: own.nodes,
+    })
+}
+
+/// Of a hollow the highest of the levels that enough of the border rises to: what is cut across
+/// several floors is cut from the highest. Of what stands out, the level that most of it falls to.
+fn host(levels: &Levels, own: &Border, lie: Lie) -> Option<u16> {
+    let wanted = match lie {
+        Lie::Hollow => Sense::Rises,
+        Lie::Raised | Lie::Body => Sense::Falls,
+    };
+    let mut counts = vec![0_usize; levels.levels.len()];
+    for pair in &own.pairs {
+        if pair.outermost && pair.sense == wanted && pair.beyond != AROUND {
+            counts[usize::from(pair.beyond)] += 1;
+        }
+    }
+    let all: usize = counts.iter().sum();
+    let height = |index: usize| {
+        let plane = levels.levels[index].plane.as_ref();
+        plane.map_or(f64::NEG_INFINITY, |p| {
+            p.z_mm(p.middle_mm[0], p.middle_mm[1])
+        })
+    };
+    let found = (0..counts.len()).filter(|k| counts[*k] > 0);
+    let index = match lie {
+        Lie::Hollow => found
+            .filter(|k| counts[*k] as f64 >= HOST * all as f64)
+            .max_by(|a, b| height(*a).total_cmp(&height(*b))),
+        Lie::Raised | Lie::Body => found.max_by_key(|k| (counts[*k], std::cmp::Reverse(*k))),
+    }?;
+    u16::try_from(index).ok()
+}
+
+/// The plan of the part: its top face's.
+#[must_use]
+pub fn frame_of(top: &Top) -> Frame {
+    let [x, y] = top.plane.middle_mm;
+    let origin = nalgebra::Vector3::new(x, y, top.plane.z_mm(x, y));
+    Frame::upon(origin, top.plane.normal())
+}

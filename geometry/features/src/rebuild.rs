@@ -1,0 +1,221 @@
+//! The part rebuilt from its features: a block, with what was recognised cut into it and raised on
+//! it, as [`terraces`] makes a solid of it.
+
+use terraces::{Floor, Frame, Operation, Outline, OutlineError, Part, Piece, Treatment};
+
+use crate::candidate::Lie;
+use crate::feature::{Bottom, Feature};
+use crate::outline::{Rectangle, Shape};
+use crate::recognise::Recognition;
+use crate::treatment::Kind;
+
+/// Why there is no part.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RebuildError {
+    /// No block among the features.
+    #[error("there is no block that the others could be cut into")]
+    NoBlock,
+    /// An outline that is none.
+    #[error("{class} {id}: {error}")]
+    Outline {
+        /// Class of the feature.
+        class: String,
+        /// Its number.
+        id: u32,
+        /// What is wrong.
+        error: OutlineError,
+    },
+}
+
+/// A part, and what had to be assumed for it.
+#[derive(Debug, Clone)]
+pub struct Rebuilt {
+    /// The part.
+    pub part: Part,
+    /// What is not measured, for the user.
+    pub assumed: Vec<String>,
+}
+
+/// What runs out is cut this far beyond where it ends, millimetres, so that no skin is left.
+const BEYOND_MM: f64 = 1.0;
+/// Least height of a block under its deepest floor, and share of its length, where no table was
+/// seen.
+const LEAST_UNDER_MM: f64 = 2.0;
+const UNDER_SHARE: f64 = 0.05;
+
+/// The part that the features describe.
+///
+/// # Errors
+/// No block, or an outline that is none.
+pub fn rebuilt(recognition: &Recognition) -> Result<Rebuilt, RebuildError> {
+    let features = &recognition.features;
+    let block = features.iter().find(|f| f.lie == Some(Lie::Body));
+    let block = block.ok_or(RebuildError::NoBlock)?;
+    let mut assumed = Vec::new();
+    let top_mm = block.heights_mm.0;
+    let bottom_mm = block.heights_mm.1.unwrap_or_else(|| {
+        let ends = features.iter().filter_map(|f| f.heights_mm.1);
+        let lowest = ends.fold(top_mm, f64::min);
+        let length = block.dimension("length").map_or(0.0, |d| d.value_mm);
+        assumed.push(
+            "the block's bottom, which was not seen, lies under its deepest floor".to_owned(),
+        );
+        lowest - LEAST_UNDER_MM.max(UNDER_SHARE * length)
+    });
+    let mut part = Part::new(outline(block, 0.0)?, top_mm, bottom_mm);
+    let frame = &recognition.frame;
+    part.frame = Frame {
+        origin_mm: frame.origin_mm.into(),
+        x: frame.axes[0].into(),
+        z: frame.axes[2].into(),
+    };
+    part.upper = upper(features, block.id);
+    for feature in features.iter().filter(|f| f.id != block.id) {
+        let name = format!("{} {}", feature.class, feature.id);
+        let operation = match feature.lie {
+            Some(Lie::Hollow) => {
+                let outline = outline(feature, BEYOND_MM)?;
+                Operation::cut(name, outline, floor(feature, &mut assumed))
+            }
+            Some(Lie::Raised) => {
+                let z_mm = feature.heights_mm.1.unwrap_or(feature.heights_mm.0);
+                Operation::raise(name, outline(feature, 0.0)?, Floor::Level { z_mm })
+            }
+            Some(Lie::Body) | None => continue,
+        };
+        part.operations.push(Operation {
+            upper: upper(features, feature.id),
+            lower: lower(features, feature.id),
+            ..operation
+        });
+    }
+    Ok(Rebuilt { part, assumed })
+}
+
+fn floor(feature: &Feature, assumed: &mut Vec<String>) -> Floor {
+    if feature.through {
+        return Floor::Through;
+    }
+    let level = |z_mm: f64| Floor::Level { z_mm };
+    match (&feature.bottom, feature.heights_mm.1) {
+        (_, None) => {
+            assumed.push(format!(
+                "{} {} goes through: its floor was not seen",
+                feature.class, feature.id
+            ));
+            Floor::Through
+        }
+        (Bottom::Level | Bottom::Unseen, Some(z_mm)) => level(z_mm),
+        (Bottom::Tip(slope), Some(rim_mm)) => match feature.outline {
+            Shape::Circle(_) => Floor::Tip {
+                rim_mm,
+                angle_rad: core::f64::consts::PI - 2.0 * libm::atan(*slope),
+            },
+            Shape::Rectangle(_) => level(rim_mm),
+        },
+        (Bottom::FreeForm(surface), Some(_)) => Floor::FreeForm(surface.clone()),
+    }
+}
+
+/// The treated edge at the top of a feature's wall.
+fn upper(features: &[Feature], of: u32) -> Option<Treatment> {
+    treated(
+        features,
+        of,
+        &[Kind::Chamfer, Kind::Countersink, Kind::Round],
+    )
+}
+
+/// And at its foot.
+fn lower(features: &[Feature], of: u32) -> Option<Treatment> {
+    treated(features, of, &[Kind::Fillet])
+}
+
+fn treated(features: &[Feature], of: u32, kinds: &[Kind]) -> Option<Treatment> {
+    let feature = features.iter().find(|f| {
+        f.lie.is_none() && f.parent == Some(of) && kinds.iter().any(|k| k.as_str() == f.class)
+    })?;
+    let value = |name: &str| feature.dimension(name).map(|d| d.value_mm);
+    if let Some(radius_mm) = value("radius") {
+        return Some(Treatment::Round { radius_mm });
+    }
+    let height_mm = (feature.heights_mm.0 - feature.heights_mm.1?).abs();
+    let width_mm = match feature.outline {
+        Shape::Circle(circle) => {
+            value("width").or_else(|| Some(0.5 * value("diameter")? - circle.radius_mm))
+        }
+        Shape::Rectangle(_) => value("width"),
+    }?;
+    let is_one = width_mm > 0.0 && height_mm > 0.0;
+    is_one.then_some(Treatment::Chamfer {
+        width_mm,
+        height_mm,
+    })
+}
+
+/// The outline of a feature; sides at which it runs out are moved outwards.
+fn outline(feature: &Feature, beyond_mm: f64) -> Result<Outline, RebuildError> {
+    let made = match feature.outline {
+        Shape::Circle(circle) => Outline::circle(circle.centre_mm, circle.radius_mm),
+        Shape::Rectangle(own) => Outline::new(pieces(&own, beyond_mm)),
+    };
+    made.map_err(|error| RebuildError::Outline {
+        class: feature.class.clone(),
+        id: feature.id,
+        error,
+    })
+}
+
+/// Corners with a smaller radius than this are sharp, millimetres, unless it is measured.
+const SHARP_MM: f64 = 0.3;
+
+fn pieces(own: &Rectangle, beyond_mm: f64) -> Vec<Piece> {
+    let moved = |side: usize| if own.walls[side] { 0.0 } else { beyond_mm };
+    let first = [own.first_mm[0] - moved(0), own.first_mm[1] + moved(1)];
+    let second = [own.second_mm[0] - moved(2), own.second_mm[1] + moved(3)];
+    // Counter-clockwise, from the corner at the greater end of both axes; each with the ways in
+    // which its arc is entered and left.
+    let corners = [
+        ([1, 1], [0.0, -1.0], [-1.0, 0.0]),
+        ([0, 1], [1.0, 0.0], [0.0, -1.0]),
+        ([0, 0], [0.0, 1.0], [1.0, 0.0]),
+        ([1, 0], [-1.0, 0.0], [0.0, 1.0]),
+    ];
+    let mut pieces: Vec<Piece> = Vec::new();
+    let mut ends = Vec::new();
+    for ([a, b], back, on) in corners {
+        let corner = [first[a], second[b]];
+        let is_round = own.walls[a] && own.walls[2 + b] && own.corner_mm > SHARP_MM;
+        let radius = if is_round { own.corner_mm } else { 0.0 };
+        let along = |way: [f64; 2]| [corner[0] + radius * way[0], corner[1] + radius * way[1]];
+        let centre = [
+            corner[0] + radius * (back[0] + on[0]),
+            corner[1] + radius * (back[1] + on[1]),
+        ];
+        ends.push((
+            own.place(along(back)),
+            own.place(along(on)),
+            own.place(centre),
+            is_round,
+        ));
+    }
+    for (k, (enter, leave, center, is_round)) in ends.iter().enumerate() {
+        if *is_round {
+            pieces.push(Piece::Arc {
+                from: *enter,
+                to: *leave,
+                center: *center,
+                ccw: true,
+            });
+        }
+        let next = ends[(k + 1) % ends.len()].0;
+        let far = (next[0] - leave[0]).abs() + (next[1] - leave[1]).abs();
+        if far > 1e-6 {
+            pieces.push(Piece::Line {
+                from: *leave,
+                to: next,
+            });
+        }
+    }
+    pieces
+}

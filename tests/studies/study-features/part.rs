@@ -1,0 +1,183 @@
+//! A part before the scanner, as `tests/judges/features` writes it: STL triangles by face, and the
+//! conditions of its scan. The truth about its features stays in the file; the judge reads it.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+use serde::Deserialize;
+use sim_scanner::Vec3;
+use sim_scanner::scene::{Body, FaceSurface, Material, Mesh, MeshFace, Scene, Surface};
+
+/// How a part is scanned.
+#[derive(Debug, Clone, Deserialize)]
+pub(crate) struct Conditions {
+    /// Seed of the scanner's noise.
+    pub(crate) seed: u64,
+    /// Distance of columns, and of samples in them at the part's middle, millimetres.
+    pub(crate) pitch_mm: f64,
+    pub(crate) noise_mm: f64,
+    pub(crate) outliers: f64,
+    pub(crate) mixed: f64,
+    pub(crate) dropouts: f64,
+    pub(crate) spot_radius_mm: f64,
+    /// Height of the table that the part lies on, where it is seen.
+    pub(crate) table_z_mm: Option<f64>,
+    /// Lower and upper corner of the box that the scan covers.
+    pub(crate) view_mm: [[f64; 3]; 2],
+    /// Samples outside of it are not taken: lower and upper x and y.
+    pub(crate) window_mm: Option<[[f64; 2]; 2]>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Told {
+    scan: Conditions,
+    faces: Vec<ToldFace>,
+}
+
+#[derive(Debug, Deserialize)]
+struct ToldFace {
+    kind: String,
+    #[serde(default)]
+    point_mm: [f64; 3],
+    #[serde(default)]
+    direction: Option<[f64; 3]>,
+    #[serde(default)]
+    radius_mm: f64,
+    #[serde(default)]
+    tube_mm: f64,
+    #[serde(default)]
+    half_angle_rad: f64,
+    first_triangle: usize,
+    triangles: usize,
+}
+
+impl ToldFace {
+    /// What rays meet; `None` for a free form, whose triangles they meet.
+    fn surface(&self) -> Result<Option<FaceSurface>> {
+        let point_mm = Vec3::from_array(self.point_mm);
+        let axis = self.direction.map_or(Vec3::Z, Vec3::from_array);
+        let axis = axis.try_normalize().context("a direction without one")?;
+        let surface = match self.kind.as_str() {
+            "plane" => Surface::Plane {
+                normal: axis,
+                offset_mm: axis.dot(point_mm),
+            },
+            "cylinder" => Surface::Cylinder {
+                base_mm: point_mm,
+                axis,
+                radius_mm: self.radius_mm,
+            },
+            "cone" => Surface::Cone {
+                apex_mm: point_mm,
+                axis,
+                half_angle_rad: self.half_angle_rad,
+            },
+            "sphere" => Surface::Sphere {
+                centre_mm: point_mm,
+                radius_mm: self.radius_mm,
+            },
+            "torus" => {
+                return Ok(Some(FaceSurface::Torus {
+                    centre_mm: point_mm,
+                    axis,
+                    radius_mm: self.radius_mm,
+                    tube_mm: self.tube_mm,
+                }));
+            }
+            "free-form" => return Ok(None),
+            other => anyhow::bail!("no kind of surface is called {other}"),
+        };
+        Ok(Some(FaceSurface::Surface(surface)))
+    }
+}
+
+/// Reads a part: its scene, and how it is scanned.
+pub(crate) fn read(folder: &Path, name: &str) -> Result<(Scene, usize, Conditions)> {
+    let told = folder.join(format!("{name}.json"));
+    let text = fs::read_to_string(&told).with_context(|| told.display().to_string())?;
+    let told: Told = serde_json::from_str(&text).with_context(|| told.display().to_string())?;
+    let stl = folder.join(format!("{name}.stl"));
+    let bytes = fs::read(&stl).with_context(|| stl.display().to_string())?;
+    let triangles = triangles(&bytes).with_context(|| stl.display().to_string())?;
+    let mut meshes = Vec::new();
+    for face in &told.faces {
+        let own = face.first_triangle..face.first_triangle + face.triangles;
+        let own = triangles.get(own).context("a face has no triangles")?;
+        meshes.push(MeshFace {
+            triangles_mm: own.to_vec(),
+            surface: face.surface()?,
+        });
+    }
+    let mesh = Mesh::of_faces(&meshes)?;
+    let mut scene = Scene::new(vec![Body::Mesh(Box::new(mesh))], Material::PAPER);
+    if let Some(z_mm) = told.scan.table_z_mm {
+        scene = scene.with_back_plane(z_mm, Material::PAPER);
+    }
+    let [low, high] = told.scan.view_mm;
+    let scene = scene.with_view_mm(Vec3::from_array(low), Vec3::from_array(high));
+    Ok((scene, told.faces.len(), told.scan))
+}
+
+/// Corners of the triangles of a binary STL file, in the order of the file.
+fn triangles(bytes: &[u8]) -> Result<Vec<[Vec3; 3]>> {
+    const HEADER: usize = 84;
+    const EACH: usize = 50;
+    let count = bytes.get(80..HEADER).context("it is cut short")?;
+    let count = u32::from_le_bytes(count.try_into()?) as usize;
+    let body = bytes.get(HEADER..).unwrap_or_default();
+    ensure!(
+        body.len() == count * EACH,
+        "it is cut short, or no binary STL"
+    );
+    let number = |of: &[u8], k: usize| {
+        let bytes = [of[4 * k], of[4 * k + 1], of[4 * k + 2], of[4 * k + 3]];
+        f64::from(f32::from_le_bytes(bytes))
+    };
+    let corner =
+        |of: &[u8], k: usize| Vec3::new(number(of, k), number(of, k + 1), number(of, k + 2));
+    // The normal comes first.
+    let each = body.chunks_exact(EACH);
+    Ok(each
+        .map(|t| [corner(t, 3), corner(t, 6), corner(t, 9)])
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_are_read_in_their_order() {
+        let mut bytes = vec![0; 80];
+        bytes.extend(2_u32.to_le_bytes());
+        for triangle in 0..2_u8 {
+            for k in 0..12_u8 {
+                bytes.extend(f32::from(triangle * 100 + k).to_le_bytes());
+            }
+            bytes.extend([0, 0]);
+        }
+        let read = triangles(&bytes).unwrap();
+        assert_eq!(read.len(), 2);
+        assert_eq!(read[1][0], Vec3::new(103.0, 104.0, 105.0));
+        assert!(triangles(&bytes[..100]).is_err());
+    }
+
+    #[test]
+    fn surfaces_are_those_of_their_names() {
+        let face = |kind: &str| ToldFace {
+            kind: kind.into(),
+            point_mm: [0.0, 0.0, 3.0],
+            direction: Some([0.0, 0.0, 2.0]),
+            radius_mm: 1.0,
+            tube_mm: 0.0,
+            half_angle_rad: 0.0,
+            first_triangle: 0,
+            triangles: 0,
+        };
+        let plane = face("plane").surface().unwrap().unwrap();
+        assert!((plane.signed_distance_mm(Vec3::new(7.0, 8.0, 5.0)) - 2.0).abs() < 1e-12);
+        assert!(face("free-form").surface().unwrap().is_none());
+        assert!(face("hyperboloid").surface().is_err());
+    }
+}
