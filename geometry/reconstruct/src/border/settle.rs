@@ -135,6 +135,7 @@ mod tests {
             add(9, -0.7, Seen::Lost);
         }
         let outlines = Outlines {
+            levels: Vec::new(),
             samples,
             regions: regions.to_vec(),
             steps: vec![is_step],
