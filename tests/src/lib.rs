@@ -22,4 +22,6 @@ pub mod outline;
 pub mod rig;
 pub mod scenes;
 pub mod score;
+pub mod seeds;
+pub mod stl;
 pub mod trimming;

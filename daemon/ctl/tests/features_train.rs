@@ -33,7 +33,7 @@ form = "open"
 "#;
 
 fn train(folder: &Path, more: &[&str]) -> Output {
-    let small = ["features", "train", "--per-class", "60", "--epochs", "60"];
+    let small = ["features", "train", "--per-class", "120", "--epochs", "80"];
     relief(folder, &[&small[..], more].concat())
 }
 

@@ -70,6 +70,7 @@ fn the_schemas_are_schemas() {
         "laser",
         "toolpath",
         "webhooks",
+        "features",
         "features_train",
     ] {
         let reference = format!("commands.schema.json#/$defs/{command}");

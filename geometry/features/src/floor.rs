@@ -6,7 +6,7 @@ use nurbs::{BSplineSurface, KnotVector, Observation, TensorSpline};
 
 use crate::candidate::Candidate;
 use crate::outline::Shape;
-use crate::outline::witnesses::Sight;
+use crate::sight::Sight;
 
 /// Sample distances to a span of the knots, and most spans.
 const PITCHES: f64 = 8.0;

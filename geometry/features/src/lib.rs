@@ -28,4 +28,5 @@ pub mod recognise;
 pub mod reduce;
 pub mod regions;
 pub mod section;
+pub mod sight;
 pub mod treatment;

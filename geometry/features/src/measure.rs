@@ -5,9 +5,9 @@ use nalgebra::Vector3;
 use crate::candidate::{Candidate, Lie};
 use crate::class::Class;
 use crate::feature::Dimension;
-use crate::outline::witnesses::Sight;
 use crate::outline::{Outline, Rectangle, Shape};
 use crate::plane::Plane;
+use crate::sight::Sight;
 
 /// What is measured of a candidate.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,8 +37,7 @@ const CONTRADICTED: f64 = 0.08;
 /// A hollow whose floor lies within so many steps of the table goes through.
 const THROUGH_STEPS: f64 = 2.0;
 
-/// Measures a candidate as a feature of a class; `host` is the plane of what it goes into, `table`
-/// of what the part stands on.
+/// Measures a candidate as a feature of a class; `host` is the plane of what it goes into or stands on.
 #[must_use]
 pub fn measured(
     sight: &Sight<'_>,
@@ -53,10 +52,7 @@ pub fn measured(
         .levels
         .first()
         .and_then(|level| sight.levels.levels[usize::from(*level)].plane);
-    let middle = match candidate.outline.shape {
-        Shape::Circle(circle) => circle.centre_mm,
-        Shape::Rectangle(rectangle) => rectangle.middle_mm(),
-    };
+    let middle = candidate.outline.shape.middle_mm();
     // Where the axis through the middle meets a plane.
     let on = |plane: &Plane| {
         let mut w = 0.0;
@@ -122,7 +118,9 @@ pub fn measured(
         warnings.push(format!(
             "its bottom is a cone of about {angle:.0} degrees; the depth is that of its edge"
         ));
-    } else if is_free && candidate.lie == Lie::Hollow {
+    } else if is_free && candidate.lie != Lie::Hollow {
+        warnings.push("its top is no plane: heights are those of the plane through it".to_owned());
+    } else if is_free {
         warnings
             .push("its floor is no plane: the depth is that of the plane through it".to_owned());
     }

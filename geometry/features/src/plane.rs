@@ -53,6 +53,9 @@ impl Plane {
 /// Neighbouring samples stray alike (speckle), so that a mean of many is less sure than of as many
 /// that do not: by this factor on scans of parts with known levels, at most of the noises tried.
 const ALIKE: f64 = 1.2;
+/// Samples on a line, or nearly so, span no plane: the product of their spreads along and across it is
+/// at most this share of the square of their sum.
+const THIN: f64 = 1e-4;
 /// Rounds of leaving out what strays.
 const ROUNDS: usize = 4;
 /// Samples further off than so many deviations are left out.
@@ -93,6 +96,15 @@ fn least_squares(
     }
     let count = kept.len() as f64;
     let middle = [0, 1].map(|axis| kept.iter().map(|s| s[axis]).sum::<f64>() / count);
+    let spread = |a: usize, b: usize| {
+        let products = kept.iter().map(|s| (s[a] - middle[a]) * (s[b] - middle[b]));
+        products.sum::<f64>() / count
+    };
+    let (along, across, both) = (spread(0, 0), spread(1, 1), spread(0, 1));
+    let total = along + across;
+    if along * across - both * both <= THIN * total * total {
+        return None;
+    }
     let mut normal = Matrix3::zeros();
     let mut right = Vector3::zeros();
     for s in &kept {
@@ -124,4 +136,34 @@ fn least_squares(
         .iter()
         .all(|v| v.is_finite())
         .then_some(fitted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::plane;
+
+    #[test]
+    fn outliers_do_not_move_a_plane() {
+        let mut samples = Vec::new();
+        for i in 0..20 {
+            for j in 0..20 {
+                let (x, y) = (f64::from(i), f64::from(j));
+                let wrong = if (i * 7 + j * 3) % 11 == 0 { 9.0 } else { 0.0 };
+                samples.push([x, y, 1.0 + 0.1 * x - 0.2 * y + wrong]);
+            }
+        }
+        let found = plane(&samples, 0.01).unwrap();
+        assert!((found.z_mm(0.0, 0.0) - 1.0).abs() < 1e-9);
+        assert!((found.z_mm(10.0, 5.0) - 1.0).abs() < 1e-9);
+        assert!((found.share - 0.91).abs() < 0.01);
+    }
+
+    #[test]
+    fn samples_on_a_line_span_none() {
+        for tilt in [0.0, 1e-9, 1e-3] {
+            let line = |k: u32| [f64::from(k), 19.93 + tilt * f64::from(k % 2), -30.0];
+            let samples: Vec<[f64; 3]> = (0..73).map(line).collect();
+            assert_eq!(plane(&samples, 0.02), None);
+        }
+    }
 }

@@ -16,10 +16,9 @@ use crate::levels::levels;
 use crate::measure::measured;
 use crate::network::Classifier;
 use crate::outline::Shape;
-use crate::outline::witnesses::Sight;
-use crate::plane::Plane;
 use crate::regions::{least_step_mm, regions};
 use crate::section::section;
+use crate::sight::Sight;
 use crate::treatment::{Kind, Treatment, treatments};
 
 /// Class of what the network has no answer for.
@@ -42,7 +41,7 @@ pub struct Settings<'a> {
     /// Seed of the random walks over outlines.
     pub seed: u64,
     /// Smaller features than this, in pitches across, are left out; at least 3.
-    pub fewest_pitches: f64,
+    pub least_pitches: f64,
 }
 
 impl Settings<'_> {
@@ -61,8 +60,6 @@ pub struct Recognition {
     pub frame: Frame,
     /// The range image that they were found in.
     pub image: RangeImage,
-    /// Plane of what the part stands on, where that is seen.
-    pub table: Option<Plane>,
     /// Standard deviation of z of samples, millimetres.
     pub noise_mm: f64,
     /// Distance of samples, millimetres.
@@ -116,9 +113,8 @@ pub fn recognise(
         levels: &levels,
         frame: &frame,
     };
-    let across = settings.fewest_pitches.max(3.0) * field.pitch_mm() / field.image.pitch_mm();
-    let fewest = (0.5 * across * across) as usize;
-    let found = candidates(&sight, &top, step_mm, settings.seed, fewest.max(9), monitor)?;
+    let least = settings.least_pitches;
+    let found = candidates(&sight, &top, step_mm, settings.seed, least, monitor)?;
     if found.first().is_none_or(|first| first.lie != Lie::Body) {
         return Err(RecogniseError::NoTop);
     }
@@ -152,7 +148,6 @@ pub fn recognise(
     Ok(Recognition {
         patterns,
         features,
-        table: levels.levels[0].plane,
         frame,
         noise_mm: field.noise_mm,
         pitch_mm: field.pitch_mm(),

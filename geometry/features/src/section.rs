@@ -4,7 +4,7 @@ use crate::candidate::{Candidate, Lie};
 use crate::code::{End, Section};
 use crate::levels::AROUND;
 use crate::outline::Shape;
-use crate::outline::witnesses::Sight;
+use crate::sight::Sight;
 
 /// Lines tried beside each other, over the middle half of the candidate.
 const LINES: usize = 7;
@@ -122,7 +122,7 @@ fn cut(sight: &Sight<'_>, candidate: &Candidate, across: &Across, beside_mm: f64
                 floor(sight, candidate, point.x, point.y)
             }
             Some(node) => face(sight, node, point.x, point.y)
-                .or_else(|| crate::levels::height(image, sight.regions, node))
+                .or_else(|| sight.regions.height_mm(image, node))
                 .or_else(|| unseen(sight, candidate)),
             None => unseen(sight, candidate),
         };

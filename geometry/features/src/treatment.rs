@@ -5,7 +5,7 @@ use crate::candidate::{Candidate, Lie};
 use crate::field::median;
 use crate::levels::Strip;
 use crate::outline::Shape;
-use crate::outline::witnesses::Sight;
+use crate::sight::Sight;
 
 /// What a strip is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -62,7 +62,9 @@ const ROUND_HOLE: f64 = 0.6;
 /// Radii and starts of arcs that are tried.
 const RADII: usize = 60;
 const STARTS: usize = 24;
-/// Fewest nodes that make a treatment.
+/// Of so many samples at most arcs are told.
+const MOST: usize = 4000;
+/// Fewest samples that make a treatment.
 const FEWEST: usize = 24;
 
 /// The treatments that the strips make, for each candidate and kind one.
@@ -153,8 +155,12 @@ fn treatment(
         return None;
     }
     let width = -at_outline / slope;
-    let arc = arc(&places);
-    let straight = cost_of(&places, &|distance| (at_outline + slope * distance, slope));
+    let few: Vec<(f64, f64)> = {
+        let stride = places.len().div_ceil(MOST).max(1);
+        places.iter().copied().step_by(stride).collect()
+    };
+    let arc = arc(&few);
+    let straight = cost_of(&few, &|distance| (at_outline + slope * distance, slope));
     let share = match candidate.outline.shape {
         Shape::Circle(_) if candidate.lie == Lie::Hollow => ROUND_HOLE,
         _ => ROUND,
@@ -168,10 +174,7 @@ fn treatment(
             _ => Kind::Chamfer,
         },
     };
-    let middle = match candidate.outline.shape {
-        Shape::Circle(circle) => circle.centre_mm,
-        Shape::Rectangle(rectangle) => rectangle.middle_mm(),
-    };
+    let middle = candidate.outline.shape.middle_mm();
     let at = sight.frame.world([middle[0], middle[1], 0.0]);
     let level_mm = (plane.z_mm(at.x, at.y) - at.z) * sight.frame.axes[2].z;
     let score = fitted.count as f64 / places.len() as f64;

@@ -19,6 +19,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{Args, Parser, Subcommand};
+use relief_tests::seeds::parse_seeds;
 
 /// Hold recognised machining features against what parts really have
 #[derive(Debug, Parser)]
@@ -80,18 +81,6 @@ pub(crate) struct JudgeOptions {
     pub(crate) check: bool,
 }
 
-fn parse_seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
-    let parse = |number: &str| number.trim().parse::<u64>().ok();
-    let ends = match text.split_once("..=") {
-        Some((first, last)) => (parse(first), parse(last)),
-        None => (parse(text), parse(text)),
-    };
-    match ends {
-        (Some(first), Some(last)) if first <= last => Ok(first..=last),
-        _ => Err("a seed, or the first and last as in 1001..=1010".to_owned()),
-    }
-}
-
 fn main() -> ExitCode {
     match run(&Options::parse()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -117,13 +106,5 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Options::command().debug_assert();
-    }
-
-    #[test]
-    fn seeds_are_one_or_a_range() {
-        assert_eq!(parse_seeds("7"), Ok(7..=7));
-        assert_eq!(parse_seeds("1001..=1010"), Ok(1001..=1010));
-        assert!(parse_seeds("1010..=1001").is_err());
-        assert!(parse_seeds("a few").is_err());
     }
 }

@@ -38,6 +38,7 @@ use clap::Parser;
 use deliverables::{CadOptions, write_iges, write_step};
 use jiff::Timestamp;
 use pipeline::{Regularize, RegularizeSettings, Settings, SmoothJoins};
+use relief_tests::seeds::parse_seeds;
 
 use crate::judge::Python;
 use crate::measure::{Measured, measure};
@@ -112,18 +113,6 @@ const REGULAR: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../../docs/studies/parts-regularized.md"
 );
-
-fn parse_seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
-    let parse = |number: &str| number.trim().parse::<u64>().ok();
-    let ends = match text.split_once("..=") {
-        Some((first, last)) => (parse(first), parse(last)),
-        None => (parse(text), parse(text)),
-    };
-    match ends {
-        (Some(first), Some(last)) if first <= last => Ok(first..=last),
-        _ => Err("a seed, or the first and last as in 201..=210".to_owned()),
-    }
-}
 
 fn main() -> ExitCode {
     match run(&Options::parse()) {
@@ -270,13 +259,5 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Options::command().debug_assert();
-    }
-
-    #[test]
-    fn seeds_are_one_or_a_range() {
-        assert_eq!(parse_seeds("7"), Ok(7..=7));
-        assert_eq!(parse_seeds("201..=210"), Ok(201..=210));
-        assert!(parse_seeds("210..=201").is_err());
-        assert!(parse_seeds("a few").is_err());
     }
 }

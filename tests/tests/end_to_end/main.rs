@@ -3,6 +3,7 @@
 mod abort;
 mod bad_input;
 mod errors;
+mod features;
 mod further;
 mod line;
 mod pause;

@@ -2,6 +2,7 @@
 
 use std::io::Write;
 
+use features::feature::Feature;
 use features::recognise::Recognition;
 use range_image::RangeImage;
 
@@ -27,14 +28,10 @@ pub fn write_features_picture(
         .iter()
         .map(|feature| {
             let w = feature.heights_mm.0;
-            let sizes: Vec<String> = feature
-                .dimensions
-                .iter()
-                .map(|d| format!("{} {:.3}", d.name.replace('_', " "), d.value_mm))
-                .collect();
+            let sizes = sizes(feature);
             OutlineNote {
                 number: feature.id.to_string(),
-                text: format!("{} {}", feature.class.replace('_', " "), sizes.join(", ")),
+                text: format!("{} {sizes}", feature.class.replace('_', " ")),
                 is_doubtful: !feature.warnings.is_empty(),
                 loop_mm: outline(feature.outline)
                     .into_iter()
@@ -48,6 +45,31 @@ pub fn write_features_picture(
         })
         .collect();
     write_outlines(image, &notes, name, sink)
+}
+
+/// The dimensions in few words: length x width, then the others by name.
+fn sizes(feature: &Feature) -> String {
+    let value = |name: &str| {
+        feature
+            .dimension(name)
+            .map(|d| format!("{:.3}", d.value_mm))
+    };
+    let mut told: Vec<String> = Vec::new();
+    if let (Some(length), Some(width)) = (value("length"), value("width")) {
+        told.push(format!("{length} x {width}"));
+    } else {
+        told.extend(value("width").map(|width| format!("width {width}")));
+    }
+    for (name, short) in [
+        ("diameter", "d"),
+        ("depth", "depth"),
+        ("height", "height"),
+        ("corner_radius", "r"),
+        ("radius", "r"),
+    ] {
+        told.extend(value(name).map(|value| format!("{short} {value}")));
+    }
+    told.join(", ")
 }
 
 /// An outline as a polygon in the plan.

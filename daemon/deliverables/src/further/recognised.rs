@@ -52,7 +52,7 @@ pub(crate) fn recognised(inputs: &Inputs<'_>, watch: &dyn Observer) -> Result<Re
     let settings = Settings {
         teller: Teller::Network(Classifier::shipped()),
         seed: inputs.settings.regrid.seed,
-        fewest_pitches: Settings::USUAL_PITCHES,
+        least_pitches: Settings::USUAL_PITCHES,
     };
     threaded(inputs, || {
         Ok(recognise(&columns, points.0.camera_mm(), &settings, watch)?)

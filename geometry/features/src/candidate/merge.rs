@@ -3,7 +3,7 @@
 use super::top::Top;
 use crate::border::border;
 use crate::levels::{AROUND, Sense};
-use crate::outline::witnesses::Sight;
+use crate::sight::Sight;
 
 /// Two floors lie in one plane where they are no further apart than this share of a step.
 const ONE_PLANE: f64 = 0.3;

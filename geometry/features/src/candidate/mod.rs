@@ -11,8 +11,8 @@ use range_image::{Cancelled, Monitor};
 use crate::border::{Border, border};
 use crate::frame::Frame;
 use crate::levels::{AROUND, Levels, Sense};
-use crate::outline::witnesses::Sight;
 use crate::outline::{Outline, Shape};
+use crate::sight::Sight;
 
 pub use tip::Tip;
 pub use top::{Top, top};
@@ -39,18 +39,15 @@ pub struct Candidate {
     pub outline: Outline,
     /// The level that it goes into or stands on.
     pub host: u16,
-    /// Share of its outermost border that rises, falls, and lies at the frame of the scan.
-    pub rises: f64,
-    /// See `rises`.
-    pub falls: f64,
     /// Whether the scan ends in it.
     pub is_cut: bool,
-    /// Nodes of it.
-    pub nodes: usize,
     /// The cone that its floor is, of a drilled hole.
     pub tip: Option<Tip>,
 }
 
+/// No candidate is narrower than so many sample distances, nor of fewer nodes.
+const LEAST_PITCHES: f64 = 3.0;
+const FEWEST: usize = 9;
 /// Outermost pairs of which at least this share rises are a hollow's.
 const HOLLOW: f64 = 0.2;
 /// Of which at least this share falls, what stands out.
@@ -60,7 +57,8 @@ const HOST: f64 = 0.12;
 /// Where more than this share of the border lies at the frame of the scan, that cuts it.
 const CUT: f64 = 0.06;
 
-/// Candidates of all levels; the body first. Smaller ones than `fewest` nodes are left out.
+/// Candidates of all levels; the body first. Those that are narrower than so many sample distances are
+/// left out.
 ///
 /// # Errors
 /// Cancelled.
@@ -69,7 +67,7 @@ pub fn candidates(
     top: &Top,
     step_mm: f64,
     seed: u64,
-    fewest: usize,
+    least_pitches: f64,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Candidate>, Cancelled> {
     let image = &sight.field.image;
@@ -83,18 +81,16 @@ pub fn candidates(
             lie: Lie::Body,
             outline,
             host: AROUND,
-            rises: 0.0,
-            falls: 1.0,
             is_cut: body.at_frame as f64 > CUT * (body.pairs.len() + body.at_frame) as f64,
-            nodes: body.nodes,
             tip: None,
         });
     }
+    let least_mm = least_pitches.max(LEAST_PITCHES) * sight.field.pitch_mm();
     let mut sets = merge::sets(sight, top, step_mm);
     let mut others: Vec<Candidate> = Vec::new();
     while let Some(set) = (!sets.is_empty()).then(|| sets.remove(0)) {
         monitor.check()?;
-        let Some(own) = candidate(sight, set, step_mm, seed, fewest) else {
+        let Some(own) = candidate(sight, set, step_mm, seed, least_mm) else {
             continue;
         };
         // Pieces of one floor, of which the rest is hidden, have one outline.
@@ -143,15 +139,13 @@ fn are_one(sight: &Sight<'_>, one: &Candidate, other: &Candidate) -> bool {
 const FILLED: f64 = 0.12;
 
 /// Whether an outline is narrower than features are, or hardly filled: the rest of a slanting edge.
-fn is_scrap(sight: &Sight<'_>, outline: &Outline, nodes: usize, fewest: usize) -> bool {
+fn is_scrap(sight: &Sight<'_>, outline: &Outline, nodes: usize, least_mm: f64) -> bool {
     let pitch = sight.field.image.pitch_mm();
     let [a, b] = match outline.shape {
         Shape::Circle(circle) => [2.0 * circle.radius_mm; 2],
         Shape::Rectangle(rectangle) => rectangle.sizes_mm(),
     };
-    // `fewest` is half the square of the least width in nodes.
-    let least = (2.0 * fewest as f64).sqrt() * pitch;
-    a.min(b) < least || (nodes as f64) * pitch * pitch < FILLED * a * b
+    a.min(b) < least_mm || (nodes as f64) * pitch * pitch < FILLED * a * b
 }
 
 /// The candidate of a set of levels, if they are one.
@@ -160,7 +154,7 @@ fn candidate(
     set: Vec<u16>,
     step_mm: f64,
     seed: u64,
-    fewest: usize,
+    least_mm: f64,
 ) -> Option<Candidate> {
     let own = border(
         &sight.field.image,
@@ -169,7 +163,9 @@ fn candidate(
         step_mm,
         &|level| set.contains(&level),
     );
-    if own.nodes < fewest {
+    // Half of a square of the least width.
+    let across = least_mm / sight.field.image.pitch_mm();
+    if own.nodes < ((0.5 * across * across) as usize).max(FEWEST) {
         return None;
     }
     let [rises, falls, level] =
@@ -185,7 +181,7 @@ fn candidate(
     let host = host(sight.levels, &own, lie)?;
     let seed = seed ^ (u64::from(*set.first()?) << 32);
     let outline = outlined::outlined(sight, &own, lie, seed)?;
-    if is_scrap(sight, &outline, own.nodes, fewest) {
+    if is_scrap(sight, &outline, own.nodes, least_mm) {
         return None;
     }
     let tip = (lie == Lie::Hollow)
@@ -197,10 +193,7 @@ fn candidate(
         lie,
         outline,
         host,
-        rises: rises / all,
-        falls: falls / all,
         is_cut: own.at_frame as f64 > CUT * all,
-        nodes: own.nodes,
     })
 }
 

@@ -4,8 +4,9 @@ use super::Lie;
 use super::border_sides::{side_of, walls};
 use crate::border::{Border, Pair};
 use crate::levels::Sense;
-use crate::outline::witnesses::{Sight, witnesses};
+use crate::outline::witnesses::witnesses;
 use crate::outline::{Outline, Rectangle, Shape, circle, log_likelihood, outline, rectangle};
+use crate::sight::Sight;
 
 /// Fewest pairs that make an outline.
 const FEWEST: usize = 12;
@@ -91,7 +92,7 @@ fn place(sight: &Sight<'_>, pair: &Pair) -> Option<[f64; 2]> {
         Sense::Falls => pair.inner,
         Sense::Rises | Sense::Level => pair.outer,
     };
-    let z_mm = crate::levels::height(image, sight.regions, upper)?;
+    let z_mm = sight.regions.height_mm(image, upper)?;
     let point = nalgebra::Vector3::new(
         0.5 * (inner[0] + outer[0]),
         0.5 * (inner[1] + outer[1]),

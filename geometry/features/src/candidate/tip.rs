@@ -1,7 +1,7 @@
 //! The cone that a drill leaves at the bottom of a hole.
 
 use crate::outline::Shape;
-use crate::outline::witnesses::Sight;
+use crate::sight::Sight;
 
 /// A cone that is deepest in the middle, as heights over the distance from there.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,9 +16,9 @@ pub struct Tip {
 
 /// Drills end in 90 to 150 degrees.
 const SLOPES: core::ops::Range<f64> = 0.2..1.2;
-/// Nodes stray from the cone by at most this share of its height.
+/// Samples stray from the cone by at most this share of its height, and their noise.
 const STRAYS: f64 = 0.12;
-/// Fewest nodes.
+/// Fewest samples.
 const FEWEST: usize = 12;
 
 /// The cone that the nodes of a level make about the middle of a circle, if they do.
@@ -39,22 +39,15 @@ pub(super) fn tip(sight: &Sight<'_>, level: u16, shape: &Shape) -> Option<Tip> {
             ((du * du + dv * dv).sqrt(), *w)
         })
         .collect();
-    let Line {
-        at_zero,
-        slope,
-        rms_mm,
-        count,
-        ..
-    } = line(&places, sight.field.noise_mm)?;
-    let height = slope * circle.radius_mm;
-    let is_cone = SLOPES.contains(&slope)
-        && count >= FEWEST
-        && rms_mm <= STRAYS * height + 1.5 * sight.field.noise_mm;
+    let side = line(&places, sight.field.noise_mm)?;
+    let height = side.slope * circle.radius_mm;
+    let is_cone = SLOPES.contains(&side.slope)
+        && side.count >= FEWEST
+        && side.rms_mm <= STRAYS * height + 1.5 * sight.field.noise_mm;
     is_cone.then(|| Tip {
-        shoulder_mm: at_zero + height,
-        sigma_mm: line(&places, sight.field.noise_mm)
-            .map_or(0.0, |line| line.sigma_mm(circle.radius_mm)),
-        slope,
+        shoulder_mm: side.at_zero + height,
+        sigma_mm: side.sigma_mm(circle.radius_mm),
+        slope: side.slope,
     })
 }
 

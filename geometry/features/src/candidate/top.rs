@@ -33,7 +33,18 @@ pub fn top(regions: &Regions, levels: &Levels, step_mm: f64) -> Option<Top> {
         contact[usize::from(own)] += usize::from(ends);
     }
     let all: usize = contact.iter().sum();
-    let seen = |index: &usize| *index != usize::from(AROUND) && levels.levels[*index].is_seen();
+    let table = levels.levels.first().and_then(|level| level.plane);
+    // The table as it is seen through holes, or between the parts of one, is no top.
+    let is_table = |index: usize| match (table, levels.levels[index].plane) {
+        (Some(table), Some(own)) => {
+            let [x, y] = own.middle_mm;
+            (own.z_mm(x, y) - table.z_mm(x, y)).abs() <= step_mm
+        }
+        _ => false,
+    };
+    let seen = |index: &usize| {
+        *index != usize::from(AROUND) && levels.levels[*index].is_seen() && !is_table(*index)
+    };
     let height = |index: usize| {
         let plane = levels.levels[index].plane.as_ref();
         plane.map_or(f64::NEG_INFINITY, |p| {

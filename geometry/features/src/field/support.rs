@@ -69,3 +69,34 @@ fn of_column(columns: &[Column], index: usize, noise_mm: f64) -> Vec<bool> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stands_alone_is_not_borne_out_and_both_sides_of_a_step_are() {
+        let column = |i: i32| {
+            let samples = (0..20).map(|j| Sample {
+                y_mm: f64::from(j),
+                z_mm: match (i, j) {
+                    (5, 7) => 20.0,
+                    (9, 12) => -25.0,
+                    _ if j >= 10 => -5.0,
+                    _ => 0.0,
+                },
+                intensity: 255,
+            });
+            Column::new(f64::from(i), samples.collect())
+        };
+        let columns: Vec<Column> = (0..12).map(column).collect();
+        let kept = supported(&columns, 0.05);
+        for (i, own) in kept.iter().enumerate() {
+            for (j, kept) in own.iter().enumerate() {
+                let alone = (i, j) == (5, 7) || (i, j) == (9, 12);
+                let at_corner = (i == 0 || i == 11) && (j == 0 || j == 19);
+                assert!(at_corner || *kept != alone, "column {i}, sample {j}");
+            }
+        }
+    }
+}

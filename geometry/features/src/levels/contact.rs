@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use range_image::RangeImage;
 
-use crate::regions::{Region, Regions};
+use crate::regions::Regions;
 
 /// Which way z goes from one node to its neighbour of another region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,19 +19,19 @@ pub enum Sense {
 
 /// What the border of two regions consists of, in pairs of neighbouring nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Contact {
+pub(super) struct Contact {
     /// Pairs where the second region is higher by a step.
-    pub rises: usize,
+    pub(super) rises: usize,
     /// Pairs where it is lower by a step.
-    pub falls: usize,
+    pub(super) falls: usize,
     /// Pairs without a step.
-    pub level: usize,
+    pub(super) level: usize,
 }
 
 impl Contact {
     /// All pairs.
     #[must_use]
-    pub fn all(&self) -> usize {
+    pub(super) fn all(&self) -> usize {
         self.rises + self.falls + self.level
     }
 }
@@ -69,10 +69,12 @@ pub(crate) fn sense(
     (node, other): (usize, usize),
     step_mm: f64,
 ) -> Sense {
-    let (Some(here), Some(there)) = (height(image, regions, node), height(image, regions, other))
-    else {
+    let (Some(here), Some(there)) = (
+        regions.height_mm(image, node),
+        regions.height_mm(image, other),
+    ) else {
         // What is not seen lies below what is.
-        return match height(image, regions, node) {
+        return match regions.height_mm(image, node) {
             None => Sense::Rises,
             Some(_) => Sense::Falls,
         };
@@ -104,18 +106,4 @@ fn run(image: &RangeImage, regions: &Regions, from: usize, at: usize) -> f64 {
     let z = image.raw_z_mm();
     let rise = z[next] - z[at];
     if rise.is_nan() { 0.0 } else { rise }
-}
-
-/// Height at a node, millimetres: as measured, else of its region's plane; `None` where nothing
-/// is known of it.
-pub(crate) fn height(image: &RangeImage, regions: &Regions, node: usize) -> Option<f64> {
-    let z_mm = image.raw_z_mm()[node];
-    let (column, row) = (node / regions.rows, node % regions.rows);
-    let at = |plane: &crate::plane::Plane| plane.z_mm(image.x_mm(column), image.y_mm(row));
-    match &regions.regions[usize::from(regions.labels[node])] {
-        Region::Void => None,
-        _ if !z_mm.is_nan() => Some(z_mm),
-        Region::Part(surface) => Some(at(&surface.plane)),
-        Region::Outside(plane) => plane.as_ref().map(at),
-    }
 }

@@ -8,8 +8,8 @@ use range_image::RangeImage;
 use crate::plane::Plane;
 use crate::regions::{OUTSIDE, Region, Regions};
 
-pub use contact::{Contact, Sense};
-pub(crate) use contact::{height, sense};
+pub use contact::Sense;
+pub(crate) use contact::sense;
 
 /// The index of what surrounds the part.
 pub const AROUND: u16 = 0;
@@ -46,8 +46,6 @@ pub struct Levels {
     pub labels: Vec<u16>,
     /// The first is what surrounds the part.
     pub levels: Vec<Level>,
-    /// Level of each region.
-    pub of_region: Vec<u16>,
     /// The slanting strips, with the level that they are part of.
     pub strips: Vec<Strip>,
 }
@@ -115,7 +113,6 @@ pub fn levels(image: &RangeImage, regions: &Regions, step_mm: f64) -> Levels {
         rows: regions.rows,
         labels,
         levels,
-        of_region,
         strips,
     }
 }

@@ -37,6 +37,9 @@ pub struct Outline {
     pub witnesses: usize,
 }
 
+/// Most witnesses that a walk goes by: more make an outline that is known to a few micrometres no
+/// surer, and cost time.
+const MOST_WITNESSES: usize = 6000;
 /// The stream of draws of the walks.
 const WALK: u64 = 0x0071_11e5;
 /// How sharp the edge is in the end, pitches: places, rays and spots are that exact.
@@ -161,8 +164,19 @@ impl<'a> Walk<'a> {
             current: 0.0,
             dice: Chance::new(seed, WALK),
         };
+        walk.thin();
         walk.soften(pitch_mm);
         walk
+    }
+
+    /// Leaves every so many witnesses where there are more than are needed.
+    fn thin(&mut self) {
+        let stride = self.witnesses.len().div_ceil(MOST_WITNESSES).max(1);
+        let mut index = 0;
+        self.witnesses.retain(|_| {
+            index += 1;
+            (index - 1) % stride == 0
+        });
     }
 
     /// Leaves out the witnesses that always say the same from here on.
@@ -171,6 +185,7 @@ impl<'a> Walk<'a> {
         let within = NARROW * self.pitch_mm;
         self.witnesses
             .retain(|w| shape.distance_mm(w.place).abs() <= within);
+        self.thin();
     }
 
     fn soften(&mut self, sharpness_mm: f64) {

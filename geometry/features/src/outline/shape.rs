@@ -115,6 +115,15 @@ impl Shape {
         found
     }
 
+    /// Its middle in the plan.
+    #[must_use]
+    pub fn middle_mm(&self) -> [f64; 2] {
+        match self {
+            Self::Circle(circle) => circle.centre_mm,
+            Self::Rectangle(rectangle) => rectangle.middle_mm(),
+        }
+    }
+
     /// Its numbers: centre and radius, or angle, sides and corner radius.
     #[must_use]
     pub fn numbers(&self) -> [f64; 6] {

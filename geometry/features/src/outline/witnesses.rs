@@ -9,12 +9,10 @@ use range_image::{Column, RangeImage};
 
 use super::posterior::Witness;
 use crate::border::Pair;
-use crate::field::Field;
-use crate::frame::Frame;
-use crate::levels::{Levels, Sense};
+use crate::levels::Sense;
 use crate::plane::Plane;
 use crate::ray::{passes, ray};
-use crate::regions::Regions;
+use crate::sight::Sight;
 
 /// Nodes to either side of the border whose samples are asked.
 const REACH: usize = 3;
@@ -34,53 +32,10 @@ const NEAR_SLACKS: f64 = 4.0;
 /// How often a missing sample was on the upper surface nevertheless.
 const DOUBT_OF_MISSING: f64 = 0.25;
 
-/// What is looked at.
-#[derive(Debug, Clone, Copy)]
-pub struct Sight<'a> {
-    /// The columns of the field.
-    pub columns: &'a [Column],
-    /// Where rays come from in their own planes, y and z in millimetres, if that is known.
-    pub camera_mm: Option<[f64; 2]>,
-    /// The field.
-    pub field: &'a Field,
-    /// Its regions.
-    pub regions: &'a Regions,
-    /// Their levels.
-    pub levels: &'a Levels,
-    /// The plan.
-    pub frame: &'a Frame,
-}
-
-impl Sight<'_> {
-    /// The samples that are borne out, in the plan, of the nodes whose region is asked for and that
-    /// have none of another beside them.
-    pub(crate) fn samples(&self, is_wanted: &dyn Fn(u16) -> bool) -> Vec<[f64; 3]> {
-        let image = &self.field.image;
-        let labels = &self.regions.labels;
-        let is_inner: Vec<bool> = (0..labels.len())
-            .map(|node| {
-                let mut beside = self.regions.neighbours(node);
-                is_wanted(labels[node]) && beside.all(|other| is_wanted(labels[other]))
-            })
-            .collect();
-        let mut found = Vec::new();
-        for (column, kept) in self.columns.iter().zip(&self.field.supported) {
-            for (sample, _) in column.samples().iter().zip(kept).filter(|(_, k)| **k) {
-                let node = self.regions.node(image, column.x_mm(), sample.y_mm);
-                if node.is_some_and(|node| is_inner[node]) {
-                    let point = nalgebra::Vector3::new(column.x_mm(), sample.y_mm, sample.z_mm);
-                    found.push(self.frame.local(point));
-                }
-            }
-        }
-        found
-    }
-}
-
 /// Witnesses beside these pairs. Inside is where the pairs' inner nodes are.
 #[must_use]
 pub fn witnesses(sight: &Sight<'_>, pairs: &[Pair]) -> Vec<Witness> {
-    let Zone { node, columns } = Zone::of(sight, pairs);
+    let zone = Zone::of(sight, pairs);
     let image = &sight.field.image;
     let (first, _) = image.origin();
     let mut found = Vec::new();
@@ -95,13 +50,12 @@ pub fn witnesses(sight: &Sight<'_>, pairs: &[Pair]) -> Vec<Witness> {
     let beyond: Vec<Column> = before.chain(behind).collect();
     for column in sight.columns.iter().chain(&beyond) {
         let at = (column.x_mm() / image.pitch_mm()).round() as i64 - first;
-        if !usize::try_from(at).is_ok_and(|at| columns.contains(&at)) {
+        if !usize::try_from(at).is_ok_and(|at| zone.columns.contains(&at)) {
             continue;
         }
         let pair_at = |y_mm: f64| {
             let at = sight.regions.node(image, column.x_mm(), y_mm)?;
-            let pair = *node.get(&at)?;
-            pairs.get(pair)
+            pairs.get(zone.pair(at)?)
         };
         of_column(sight, column, &pair_at, &mut found);
     }
@@ -110,38 +64,44 @@ pub fn witnesses(sight: &Sight<'_>, pairs: &[Pair]) -> Vec<Witness> {
 
 /// Which pair speaks for which node.
 struct Zone {
-    node: std::collections::BTreeMap<usize, usize>,
+    /// Index of a pair for each node, and its squared distance in nodes.
+    node: Vec<(u32, u32)>,
     columns: core::ops::RangeInclusive<usize>,
 }
+
+/// No pair.
+const NOBODY: u32 = u32::MAX;
 
 impl Zone {
     fn of(sight: &Sight<'_>, pairs: &[Pair]) -> Self {
         let (columns, rows) = (sight.regions.columns, sight.regions.rows);
-        let mut nearest: std::collections::BTreeMap<usize, (usize, usize)> =
-            std::collections::BTreeMap::new();
+        let mut nearest = vec![(NOBODY, u32::MAX); columns * rows];
         let (mut low, mut high) = (usize::MAX, 0);
-        for (index, pair) in pairs.iter().enumerate() {
+        for (index, pair) in (0_u32..).zip(pairs) {
             for node in [pair.inner, pair.outer] {
                 let (column, row) = (node / rows, node % rows);
                 for c in column.saturating_sub(REACH)..=(column + REACH).min(columns - 1) {
                     (low, high) = (low.min(c), high.max(c));
                     for r in row.saturating_sub(REACH)..=(row + REACH).min(rows - 1) {
                         let far = c.abs_diff(column).pow(2) + r.abs_diff(row).pow(2);
-                        let entry = nearest.entry(c * rows + r).or_insert((usize::MAX, 0));
-                        if far < entry.0 {
-                            *entry = (far, index);
+                        let far = u32::try_from(far).unwrap_or(u32::MAX);
+                        let entry = &mut nearest[c * rows + r];
+                        if far < entry.1 {
+                            *entry = (index, far);
                         }
                     }
                 }
             }
         }
         Self {
-            node: nearest
-                .into_iter()
-                .map(|(n, (_, pair))| (n, pair))
-                .collect(),
+            node: nearest,
             columns: low..=high.max(low),
         }
+    }
+
+    fn pair(&self, node: usize) -> Option<usize> {
+        let (index, _) = *self.node.get(node)?;
+        (index != NOBODY).then_some(index as usize)
     }
 }
 
@@ -354,7 +314,7 @@ fn height(sight: &Sight<'_>, node: usize, x_mm: f64, y_mm: f64) -> Option<(f64, 
         if surface.is_plane {
             return Some(at(&surface.plane));
         }
-        let z_mm = crate::levels::height(image, sight.regions, node)?;
+        let z_mm = sight.regions.height_mm(image, node)?;
         let slack = libm::tan(surface.slope_rad.min(1.4)) * image.pitch_mm() * REACH as f64;
         return Some((z_mm, slack));
     }

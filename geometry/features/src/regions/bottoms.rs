@@ -1,9 +1,12 @@
 //! The table as it is seen through holes.
 
+use super::pieces::pieces;
 use super::{OUTSIDE, Region, Regions, Surface};
 
 /// Regions within so many deviations of it are scraps of it.
 const DEVIATIONS: f64 = 3.0;
+/// What is seen of it through a hole is less than this share of the part.
+const LARGEST: f64 = 0.4;
 /// Fewest nodes of a place where it is.
 const FEWEST: usize = 9;
 
@@ -32,26 +35,11 @@ pub(super) fn bottoms(divided: &mut Regions, noise_mm: f64) {
             *label = OUTSIDE;
         }
     }
-    let mut seen = vec![false; divided.labels.len()];
-    for start in 0..divided.labels.len() {
-        if seen[start] || divided.labels[start] != OUTSIDE {
-            continue;
-        }
-        seen[start] = true;
-        let mut piece = vec![start];
-        let mut next = 0;
-        let mut is_open = false;
-        while next < piece.len() {
-            is_open |= divided.at_frame(piece[next]);
-            for other in divided.neighbours(piece[next]) {
-                if !seen[other] && divided.labels[other] == OUTSIDE {
-                    seen[other] = true;
-                    piece.push(other);
-                }
-            }
-            next += 1;
-        }
-        if is_open {
+    let part = divided.labels.iter().filter(|l| **l != OUTSIDE).count();
+    let outside = |node: usize| divided.labels[node] == OUTSIDE;
+    for piece in pieces(divided.columns, divided.rows, &outside, &|_, _| true) {
+        let is_open = piece.iter().any(|node| divided.at_frame(*node));
+        if is_open || piece.len() as f64 > LARGEST * part as f64 {
             continue;
         }
         let region = match table.filter(|_| piece.len() >= FEWEST) {

@@ -3,6 +3,7 @@
 use range_image::RangeImage;
 
 use super::NONE;
+use super::pieces::{neighbours, pieces};
 
 /// Fewest nodes of such a piece, and fewest of them with four neighbours in it.
 const FEWEST: usize = 16;
@@ -14,42 +15,26 @@ pub(super) fn kept(image: &RangeImage, labels: &mut [u16], next: &mut u16, step_
     let z = image.raw_z_mm();
     let (rows, columns) = (image.rows(), image.columns());
     let within = 0.5 * step_mm + 1.75 * image.pitch_mm();
-    let beside = |node: usize| {
-        let (column, row) = (node / rows, node % rows);
-        [
-            (column > 0).then(|| node - rows),
-            (column + 1 < columns).then(|| node + rows),
-            (row > 0).then(|| node - 1),
-            (row + 1 < rows).then(|| node + 1),
-        ]
+    let is_crumb = |node: usize| labels[node] == NONE && !z[node].is_nan();
+    let is_near = |node: usize, other: usize| (z[other] - z[node]).abs() <= within;
+    let found = pieces(columns, rows, &is_crumb, &is_near);
+    let is_inside = |node: &&usize| {
+        let same = |other: &usize| is_crumb(*other) && is_near(**node, *other);
+        neighbours(columns, rows, **node).filter(same).count() == 4
     };
-    let mut seen = vec![false; labels.len()];
-    for start in 0..labels.len() {
-        if seen[start] || labels[start] != NONE || z[start].is_nan() {
-            continue;
+    let kept: Vec<Vec<usize>> = found
+        .into_iter()
+        .filter(|piece| {
+            piece.len() >= FEWEST && piece.iter().filter(is_inside).count() >= FEWEST_INSIDE
+        })
+        .collect();
+    for piece in kept {
+        if *next >= NONE - 2 {
+            break;
         }
-        seen[start] = true;
-        let mut piece = vec![start];
-        let (mut at, mut inside) = (0, 0);
-        while at < piece.len() {
-            let node = piece[at];
-            at += 1;
-            let mut around = 0;
-            for other in beside(node).into_iter().flatten() {
-                let same = labels[other] == NONE && (z[other] - z[node]).abs() <= within;
-                around += usize::from(same);
-                if same && !seen[other] {
-                    seen[other] = true;
-                    piece.push(other);
-                }
-            }
-            inside += usize::from(around == 4);
-        }
-        if piece.len() >= FEWEST && inside >= FEWEST_INSIDE && *next < NONE - 2 {
-            *next += 1;
-            for node in piece {
-                labels[node] = *next;
-            }
+        *next += 1;
+        for node in piece {
+            labels[node] = *next;
         }
     }
 }

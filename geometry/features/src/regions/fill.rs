@@ -2,7 +2,8 @@
 
 use range_image::RangeImage;
 
-use super::{NONE, OUTSIDE, Region, Regions};
+use super::pieces::pieces;
+use super::{NONE, OUTSIDE, Region, Regions, UNKNOWN_MM};
 
 /// A void that is at most so many nodes from the nearest region everywhere is a gap between
 /// samples or the dust beside a step, and no hollow.
@@ -12,7 +13,8 @@ const THIN: u32 = 2;
 /// highest where they are of different heights; makes it a void where it is wide and all around
 /// it is of one height.
 pub(super) fn fill(image: &RangeImage, divided: &mut Regions, step_mm: f64) {
-    let pieces = pieces(divided);
+    let unlabelled = |node: usize| divided.labels[node] == NONE;
+    let pieces = pieces(divided.columns, divided.rows, &unlabelled, &|_, _| true);
     for piece in pieces {
         let is_framed = piece.iter().any(|node| divided.at_frame(*node));
         let mut around: Vec<(u16, f64)> = Vec::new();
@@ -20,7 +22,7 @@ pub(super) fn fill(image: &RangeImage, divided: &mut Regions, step_mm: f64) {
             for other in divided.neighbours(node) {
                 let label = divided.labels[other];
                 if label != NONE {
-                    let z_mm = height(image, divided, label, other);
+                    let z_mm = divided.height_mm(image, other).unwrap_or(UNKNOWN_MM);
                     match around.iter_mut().find(|(l, _)| *l == label) {
                         Some((_, z)) => *z = z.min(z_mm),
                         None => around.push((label, z_mm)),
@@ -59,45 +61,6 @@ fn give(divided: &mut Regions, piece: &[usize], label: u16) {
     for node in piece {
         divided.labels[*node] = label;
     }
-}
-
-/// Height of a region at a node, millimetres: of the node itself where it was measured.
-pub(super) fn height(image: &RangeImage, divided: &Regions, label: u16, node: usize) -> f64 {
-    let z_mm = image.raw_z_mm()[node];
-    if !z_mm.is_nan() {
-        return z_mm;
-    }
-    let (column, row) = (node / divided.rows, node % divided.rows);
-    match &divided.regions[usize::from(label)] {
-        Region::Part(surface) => surface.plane.z_mm(image.x_mm(column), image.y_mm(row)),
-        Region::Outside(Some(plane)) => plane.z_mm(image.x_mm(column), image.y_mm(row)),
-        Region::Outside(None) | Region::Void => f64::NEG_INFINITY,
-    }
-}
-
-/// Connected pieces of unlabelled nodes, in the order of their first nodes.
-fn pieces(divided: &Regions) -> Vec<Vec<usize>> {
-    let mut seen = vec![false; divided.labels.len()];
-    let mut pieces = Vec::new();
-    for start in 0..divided.labels.len() {
-        if seen[start] || divided.labels[start] != NONE {
-            continue;
-        }
-        seen[start] = true;
-        let mut piece = vec![start];
-        let mut next = 0;
-        while next < piece.len() {
-            for other in divided.neighbours(piece[next]) {
-                if !seen[other] && divided.labels[other] == NONE {
-                    seen[other] = true;
-                    piece.push(other);
-                }
-            }
-            next += 1;
-        }
-        pieces.push(piece);
-    }
-    pieces
 }
 
 /// Steps from the border of a piece to its innermost node.

@@ -2,8 +2,7 @@
 
 use range_image::RangeImage;
 
-use super::fill::height;
-use super::{NONE, OUTSIDE, Regions};
+use super::{NONE, OUTSIDE, Regions, UNKNOWN_MM};
 
 /// Gives each unlabelled node to the lower of the regions at the two ends of its run along the
 /// column, or along the row if that is shorter, where these are of different heights: a ray that
@@ -46,10 +45,10 @@ fn runs(
         }
         let at = |index: Option<usize>| match index.and_then(|k| line.get(k)) {
             Some(&node) => {
-                let label = divided.labels[node];
-                (label, height(image, divided, label, node))
+                let z_mm = divided.height_mm(image, node);
+                (divided.labels[node], z_mm.unwrap_or(UNKNOWN_MM))
             }
-            None => (OUTSIDE, f64::NEG_INFINITY),
+            None => (OUTSIDE, UNKNOWN_MM),
         };
         let (one, other) = (at(start.checked_sub(1)), at(Some(end)));
         let length = u32::try_from(end - start).unwrap_or(u32::MAX);

@@ -9,6 +9,7 @@ mod crumbs;
 mod fill;
 mod hidden;
 mod margin;
+mod pieces;
 mod strays;
 mod surface;
 mod table;
@@ -50,6 +51,8 @@ pub struct Regions {
 pub const OUTSIDE: u16 = 0;
 /// Nodes of the margin, on each side.
 pub(crate) const MARGIN: usize = 6;
+/// What is not known lies below all that is, millimetres.
+const UNKNOWN_MM: f64 = f64::NEG_INFINITY;
 /// No label yet.
 const NONE: u16 = u16::MAX;
 /// A step of z between regions is at least so many deviations of single samples ...
@@ -173,15 +176,22 @@ impl Regions {
 
     /// Neighbours of a node along columns and rows.
     pub fn neighbours(&self, node: usize) -> impl Iterator<Item = usize> + use<> {
-        let (rows, columns) = (self.rows, self.columns);
-        let (column, row) = (node / rows, node % rows);
-        let beside = [
-            (column > 0).then(|| node - rows),
-            (column + 1 < columns).then(|| node + rows),
-            (row > 0).then(|| node - 1),
-            (row + 1 < rows).then(|| node + 1),
-        ];
-        beside.into_iter().flatten()
+        pieces::neighbours(self.columns, self.rows, node)
+    }
+
+    /// Height at a node, millimetres: as measured, else of its region's plane; `None` where nothing
+    /// is known of it.
+    #[must_use]
+    pub fn height_mm(&self, image: &RangeImage, node: usize) -> Option<f64> {
+        let z_mm = image.raw_z_mm()[node];
+        let (column, row) = (node / self.rows, node % self.rows);
+        let at = |plane: &Plane| plane.z_mm(image.x_mm(column), image.y_mm(row));
+        match self.regions.get(usize::from(self.labels[node]))? {
+            Region::Void => None,
+            _ if !z_mm.is_nan() => Some(z_mm),
+            Region::Part(surface) => Some(at(&surface.plane)),
+            Region::Outside(plane) => plane.as_ref().map(at),
+        }
     }
 
     /// Whether a node lies where the scan ends, or beyond.

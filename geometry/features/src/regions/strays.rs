@@ -49,7 +49,6 @@ pub(super) fn unlabel(
 const FLAT_SHARE: f64 = 0.25;
 /// ... while the rest slants by more than this, rise over run: 15 degrees.
 const SLANT: f64 = 0.27;
-
 /// And the share itself by less: 8 degrees.
 const LEVEL: f64 = 0.14;
 

@@ -3,7 +3,7 @@
 use range_image::{RangeImage, RegionMap};
 
 /// Of the frame of the image the table takes at least this share ...
-const LEAST_OF_FRAME: f64 = 0.4;
+const LEAST_OF_FRAME: f64 = 0.3;
 /// ... and of its borders with others at least this share rises from it.
 const LEAST_RISING: f64 = 0.9;
 

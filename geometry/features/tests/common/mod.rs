@@ -8,15 +8,15 @@ use range_image::{Column, Sample};
 
 /// How a part is scanned.
 #[derive(Debug, Clone, Copy)]
-pub struct Bench {
-    pub camera_mm: [f64; 2],
-    pub x_mm: (f64, f64),
-    pub y_mm: (f64, f64),
-    pub pitch_mm: f64,
-    pub noise_mm: f64,
-    pub outliers: f64,
-    pub dropouts: f64,
-    pub seed: u64,
+pub(crate) struct Bench {
+    pub(crate) camera_mm: [f64; 2],
+    pub(crate) x_mm: (f64, f64),
+    pub(crate) y_mm: (f64, f64),
+    pub(crate) pitch_mm: f64,
+    pub(crate) noise_mm: f64,
+    pub(crate) outliers: f64,
+    pub(crate) dropouts: f64,
+    pub(crate) seed: u64,
 }
 
 impl Default for Bench {
@@ -35,7 +35,7 @@ impl Default for Bench {
 }
 
 /// Columns of a scan of the heights.
-pub fn scan(bench: &Bench, height_mm: &dyn Fn(f64, f64) -> f64) -> Vec<Column> {
+pub(crate) fn scan(bench: &Bench, height_mm: &dyn Fn(f64, f64) -> f64) -> Vec<Column> {
     let mut dice = Xoshiro256PlusPlus::seed_from_u64(bench.seed);
     let mut even = move || (dice.next_u64() >> 11) as f64 / 9_007_199_254_740_992.0;
     let [cy, cz] = bench.camera_mm;

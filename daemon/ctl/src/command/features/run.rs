@@ -64,7 +64,7 @@ fn of_file(args: &Args, shown: &Shown) -> Result<Recognised, Failure> {
             None => Teller::Network(&network),
         },
         seed: args.seed,
-        fewest_pitches: args.least_pitches,
+        least_pitches: args.least_pitches,
     };
     shown.begin("features");
     let began = Instant::now();

@@ -1,0 +1,141 @@
+//! Treated edges, drilled and through holes, and rows of them.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+mod common;
+
+use common::{Bench, scan};
+use features::feature::{Bottom, Feature};
+use features::network::Classifier;
+use features::recognise::{Recognition, Settings, Teller, recognise};
+use range_image::Unmonitored;
+
+const TABLE_MM: f64 = -12.0;
+
+fn found(height_mm: &dyn Fn(f64, f64) -> f64) -> Recognition {
+    let bench = Bench {
+        pitch_mm: 0.35,
+        noise_mm: 0.03,
+        // Rays run nearly along the holes.
+        camera_mm: [0.0, 900.0],
+        y_mm: (-35.0, 35.0),
+        x_mm: (-50.0, 50.0),
+        ..Bench::default()
+    };
+    let settings = Settings {
+        teller: Teller::Network(Classifier::shipped()),
+        seed: 1,
+        least_pitches: Settings::USUAL_PITCHES,
+    };
+    let columns = scan(&bench, height_mm);
+    recognise(&columns, Some(bench.camera_mm), &settings, &Unmonitored).unwrap()
+}
+
+fn turned(x: f64, y: f64) -> (f64, f64) {
+    let (sin, cos) = libm::sincos(7f64.to_radians());
+    (cos * x + sin * y, cos * y - sin * x)
+}
+
+fn off(u: f64, v: f64) -> f64 {
+    (u * u + v * v).sqrt()
+}
+
+fn of<'a>(found: &'a Recognition, class: &str) -> Vec<&'a Feature> {
+    found.features.iter().filter(|f| f.class == class).collect()
+}
+
+fn size(feature: &Feature, name: &str) -> f64 {
+    feature.dimension(name).unwrap().value_mm
+}
+
+#[test]
+fn holes_through_in_a_row_and_one_with_the_tip_of_a_drill() {
+    let part = |x: f64, y: f64| {
+        let (u, v) = turned(x, y);
+        if u.abs() > 40.0 || v.abs() > 25.0 {
+            return TABLE_MM;
+        }
+        for k in [-1.0, 0.0, 1.0] {
+            if off(u - 18.0 * k, v - 10.0) < 4.0 {
+                return TABLE_MM;
+            }
+        }
+        let from_drilled = off(u + 10.0, v + 10.0);
+        if from_drilled < 6.0 {
+            return -5.0 - 0.6 * (6.0 - from_drilled);
+        }
+        0.0
+    };
+    let found = found(&part);
+    let holes = of(&found, "hole");
+    assert_eq!(holes.len(), 4, "{:?}", found.features);
+    assert_eq!(found.features.len(), 5);
+    let (drilled, row): (Vec<&Feature>, Vec<&Feature>) =
+        holes.iter().partition(|hole| size(hole, "diameter") > 10.0);
+    for hole in &row {
+        assert!(hole.through);
+        assert!((size(hole, "diameter") - 8.0).abs() < 0.1);
+        assert!((size(hole, "depth") + TABLE_MM).abs() < 0.05);
+    }
+    // The depth is that of the shoulder.
+    assert!((size(drilled[0], "depth") - 5.0).abs() < 0.1);
+    assert!(matches!(drilled[0].bottom, Bottom::Tip(slope) if (slope - 0.6).abs() < 0.05));
+    let [pattern] = &found.patterns[..] else {
+        panic!("{:?}", found.patterns);
+    };
+    assert_eq!(pattern.members.len(), 3);
+    assert!((pattern.step_mm - 18.0).abs() < 0.05);
+}
+
+#[test]
+fn a_countersunk_hole_a_chamfered_pocket_and_a_rounded_boss() {
+    let part = |x: f64, y: f64| {
+        let (u, v) = turned(x, y);
+        if u.abs() > 40.0 || v.abs() > 25.0 {
+            return TABLE_MM;
+        }
+        let from_hole = off(u - 25.0, v - 8.0);
+        if from_hole < 7.0 {
+            return if from_hole < 4.0 {
+                -8.0
+            } else {
+                from_hole - 7.0
+            };
+        }
+        // 18 x 14, widened by a chamfer of 2.5.
+        let (a, b) = ((u + 22.0).abs() - 9.0, v.abs() - 7.0);
+        let from_pocket = a.max(b);
+        if from_pocket < 2.5 {
+            return if from_pocket < 0.0 {
+                -6.0
+            } else {
+                from_pocket - 2.5
+            };
+        }
+        let from_boss = 7.0 - off(u - 8.0, v + 10.0);
+        if from_boss > 0.0 {
+            let along = (2.5 - from_boss).max(0.0);
+            return 6.0 - 2.5 + (2.5 * 2.5 - along * along).sqrt();
+        }
+        0.0
+    };
+    let found = found(&part);
+    let classes: Vec<&str> = found.features.iter().map(|f| f.class.as_str()).collect();
+    let one = |class: &str| {
+        let own = of(&found, class);
+        assert_eq!(own.len(), 1, "{class} among {classes:?}");
+        own[0]
+    };
+    let (hole, pocket, boss) = (one("hole"), one("pocket"), one("boss"));
+    assert!((size(hole, "diameter") - 8.0).abs() < 0.1);
+    assert!((size(pocket, "length") - 18.0).abs() < 0.1);
+    assert!((size(pocket, "width") - 14.0).abs() < 0.1);
+    let (cone, chamfer, round) = (one("countersink"), one("chamfer"), one("round"));
+    assert_eq!(cone.parent, Some(hole.id));
+    assert_eq!(chamfer.parent, Some(pocket.id));
+    assert_eq!(round.parent, Some(boss.id));
+    assert!((size(cone, "diameter") - 14.0).abs() < 0.3);
+    assert!((size(chamfer, "width") - 2.5).abs() < 0.15);
+    assert!((size(round, "radius") - 2.5).abs() < 0.4);
+    assert!((size(boss, "diameter") - 14.0).abs() < 0.5);
+}
