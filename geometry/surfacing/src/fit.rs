@@ -10,6 +10,7 @@ use range_image::Monitor;
 use rayon::prelude::*;
 
 use crate::axis::{Axis, DEGREE};
+use crate::normal::Normal;
 
 /// What a masked node's residual counts, where a node with a value counts 1. Lower weights make
 /// conjugate gradients slow; since masked nodes are filled from the surface itself, they hardly
@@ -18,6 +19,8 @@ const MASKED_WEIGHT: f64 = 1e-4;
 /// Most steps of conjugate gradients, and the drop of the residual at which they end.
 const MOST_STEPS: usize = 400;
 const DROP: f64 = 1e-9;
+/// Times that coefficients are eliminated for: the second mends what the first has lost in digits.
+const ELIMINATIONS: usize = 2;
 /// Columns that a task takes at once.
 const CHUNK: usize = 16;
 
@@ -132,11 +135,10 @@ pub(crate) fn masked(
     start: Vec<f64>,
     monitor: &dyn Monitor,
 ) -> Vec<f64> {
+    let weight = |n: usize| if is_data[n] { 1.0 } else { MASKED_WEIGHT };
     let weighted = |mut z: Vec<f64>| {
-        for (z, &is_data) in z.iter_mut().zip(is_data) {
-            if !is_data {
-                *z *= MASKED_WEIGHT;
-            }
+        for (n, z) in z.iter_mut().enumerate() {
+            *z *= weight(n);
         }
         z
     };
@@ -162,9 +164,19 @@ pub(crate) fn masked(
         out
     };
     let mut x = start;
-    let fitted = values(u, v, &x);
-    let off = filled.iter().zip(&fitted).map(|(z, f)| z - f).collect();
-    let mut residual = project(&weighted(off));
+    let left = |x: &[f64]| {
+        let fitted = values(u, v, x);
+        let off = filled.iter().zip(&fitted).map(|(z, f)| z - f).collect();
+        project(&weighted(off))
+    };
+    if let Some(normal) = Normal::new(u, v, weight) {
+        for _ in 0..ELIMINATIONS {
+            let step = normal.solve(left(&x));
+            x.iter_mut().zip(step).for_each(|(x, step)| *x += step);
+        }
+        return x;
+    }
+    let mut residual = left(&x);
     let mut preconditioned = precondition(&residual);
     let mut direction = preconditioned.clone();
     let mut size = dot(&residual, &preconditioned);

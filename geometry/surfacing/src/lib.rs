@@ -25,6 +25,7 @@ mod fit;
 pub mod grid;
 mod infill;
 pub mod knots;
+mod normal;
 mod optimal;
 mod parted;
 mod problem;

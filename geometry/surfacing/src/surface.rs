@@ -22,7 +22,8 @@ use crate::problem::Problem;
 use crate::within::fit_within;
 
 /// Trimmed pieces must take no more than this share of the control points that pieces along the grid
-/// do, and do so without doubt at this share of what those take before their knots are polished.
+/// do, and do so without doubt at this share of what one surface is estimated to take: then that need
+/// not be made.
 const PAYS: f64 = 0.75;
 const CLEARLY_PAYS: f64 = 0.2;
 
@@ -40,10 +41,13 @@ pub struct Settings {
     /// Greatest distance by which fairing may move a data point, millimetres; `None`: no
     /// fairing.
     pub fair_mm: Option<f64>,
+    /// Whether, with optimal knots, pieces may be trimmed at lines across the grid where that pays
+    /// ([`Made::trimmed`]); else the knots follow such lines.
+    pub may_trim: bool,
 }
 
 impl Settings {
-    /// Optimal knots for a tolerance, without fairing.
+    /// Optimal knots for a tolerance, without fairing; trimmed where that pays.
     #[must_use]
     pub fn new(tolerance_mm: f64) -> Self {
         Self {
@@ -51,6 +55,7 @@ impl Settings {
             placement: Placement::Optimal,
             thresholds: JumpThresholds::default(),
             fair_mm: None,
+            may_trim: true,
         }
     }
 
@@ -198,54 +203,43 @@ pub fn make(
         fairing = Some(report);
         from = 0.3;
     }
-    let is_optimal = settings.placement == Placement::Optimal;
+    let may_trim = settings.may_trim && settings.placement == Placement::Optimal;
     let part = |share: f64, size: f64| Part {
         monitor,
         from: from + (1.0 - from) * share,
         size: (1.0 - from) * size,
     };
-    let parted = match is_optimal {
+    let parted = match may_trim {
         true => parted(&data, settings.tolerance_mm, &part(0.0, 0.5))?,
         false => None,
     };
-    let pays = |parted: &Parted, whole: &Result<Made, SurfaceError>, share: f64| {
-        whole.as_ref().map_or(true, |whole| {
-            parted.control_points as f64 <= share * whole.report.control_points as f64
-        })
-    };
-    let mut made = None;
-    let mut parted = parted;
-    if let Some(found) = &parted {
-        // What takes many times as many before it is polished need not be polished.
-        let rough = whole(&data, settings, 0, &part(0.5, 0.1));
-        if let Err(SurfaceError::Cancelled(cancelled)) = rough {
-            return Err(cancelled.into());
-        }
-        // Pieces along the grid may be as few once they are polished.
-        let is_along = rough
-            .as_ref()
-            .is_ok_and(|rough| !rough.report.lines.is_empty());
-        if !is_along && pays(found, &rough, CLEARLY_PAYS) {
-            made = parted.take();
-        }
+    let mut is_clear = false;
+    // Pieces along the grid may be as few.
+    if let Some(found) = &parted
+        && grid_lines(&data, settings.tolerance_mm).is_empty()
+    {
+        let estimate = optimal::estimate(&data, settings.tolerance_mm, monitor)?;
+        is_clear = found.control_points as f64 <= CLEARLY_PAYS * estimate as f64;
     }
-    let made = match made {
-        Some(parted) => Ok(of_parted(data, parted, settings)),
-        None => {
-            let whole = whole(&data, settings, optimal::MOST_VISITS, &part(0.6, 0.4));
-            match parted.filter(|parted| pays(parted, &whole, PAYS)) {
-                Some(parted) if !matches!(whole, Err(SurfaceError::Cancelled(_))) => {
-                    Ok(of_parted(data, parted, settings))
-                }
-                _ => whole,
+    let mut made = match parted {
+        Some(found) if is_clear => of_parted(data, found, settings),
+        parted => match (parted, whole(&data, settings, &part(0.5, 0.5))) {
+            (_, Err(SurfaceError::Cancelled(cancelled))) => return Err(cancelled.into()),
+            (Some(found), Err(_)) => of_parted(data, found, settings),
+            (Some(found), Ok(whole)) if pays(&found, &whole.report) => {
+                of_parted(data, found, settings)
             }
-        }
+            (_, whole) => whole?,
+        },
     };
-    let mut made = made?;
     made.report.noise_mm = noise_mm;
     made.report.fairing = fairing;
     monitor.progress(1.0);
     Ok(made)
+}
+
+fn pays(parted: &Parted, whole: &SurfaceReport) -> bool {
+    parted.control_points as f64 <= PAYS * whole.control_points as f64
 }
 
 /// In pieces that lines in any direction bound.
@@ -273,11 +267,10 @@ fn of_parted(data: HeightGrid, parted: Parted, settings: &Settings) -> Made {
     }
 }
 
-/// One surface, or several that lines along the grid part; `visits` as [`optimal::place`] has it.
+/// One surface, or several that lines along the grid part.
 fn whole(
     data: &HeightGrid,
     settings: &Settings,
-    visits: usize,
     monitor: &dyn Monitor,
 ) -> Result<Made, SurfaceError> {
     let lines = grid_lines(data, settings.tolerance_mm);
@@ -297,7 +290,7 @@ fn whole(
             continue;
         };
         let mut problem = Problem::new(&block, settings.tolerance_mm, &part);
-        let knots = placed(&mut problem, &block, settings, visits, &part)?;
+        let knots = placed(&mut problem, &block, settings, &part)?;
         let (u, v) = (
             Axis::new(&knots.u).ok_or(SurfaceError::Singular)?,
             Axis::new(&knots.v).ok_or(SurfaceError::Singular)?,
@@ -361,7 +354,6 @@ fn placed(
     problem: &mut Problem,
     block: &HeightGrid,
     settings: &Settings,
-    visits: usize,
     monitor: &dyn Monitor,
 ) -> Result<Knots, SurfaceError> {
     Ok(match settings.placement {
@@ -375,7 +367,7 @@ fn placed(
                     fixed[usize::from(!line.is_at_x)].extend([line.at; 3]);
                 }
             }
-            optimal::place(problem, &fixed, visits, monitor)?
+            optimal::place(problem, &fixed, optimal::MOST_VISITS, monitor)?
         }
     })
 }

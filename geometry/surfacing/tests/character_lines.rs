@@ -10,7 +10,7 @@
 #[allow(dead_code, reason = "shared with tests that need more of it")]
 mod common;
 
-use common::waves;
+use common::{draws_from, waves};
 use range_image::Unmonitored;
 use reconstruct::{Surface, check};
 use surfacing::{HeightGrid, Made, Settings, make};
@@ -19,25 +19,14 @@ const SIDE: usize = 81;
 const TOLERANCE_MM: f64 = 0.1;
 const NOISE_MM: f64 = 0.02;
 
-/// Normal draws of one standard deviation.
-fn draws(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    let mut uniform = move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
-    };
-    move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-}
-
 /// At a pitch of 1 mm; x and y as shares of the side.
 fn made(z: impl Fn(f64, f64) -> f64, seed: u64, first_mm: [f64; 2]) -> Made {
     spaced(z, 1.0, seed, first_mm)
 }
 
 fn spaced(z: impl Fn(f64, f64) -> f64, pitch_mm: f64, seed: u64, first_mm: [f64; 2]) -> Made {
-    let mut draw = draws(seed);
+    // Seeds that are near to each other begin far apart.
+    let mut draw = draws_from(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
     let share = |k: usize| k as f64 / (SIDE - 1) as f64;
     let z = (0..SIDE * SIDE)
         .map(|n| z(share(n / SIDE), share(n % SIDE)) + NOISE_MM * draw())

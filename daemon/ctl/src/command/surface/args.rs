@@ -51,6 +51,9 @@ pub(crate) struct Args {
     /// lines stay sharp
     #[arg(long, value_name = "MM")]
     pub(super) fair_mm: Option<f64>,
+    /// Trim nothing: knots follow lines across the grid, too, however many that takes
+    #[arg(long)]
+    untrimmed: bool,
     /// Also tell what each placement of knots comes to
     #[arg(long)]
     pub(super) compare: bool,
@@ -162,6 +165,7 @@ impl Args {
             },
             thresholds: JumpThresholds(thresholds),
             fair_mm: self.fair_mm,
+            may_trim: !self.untrimmed,
         };
         settings.validate().map_err(|error| {
             let option = match &error {
