@@ -8,7 +8,8 @@ use shapes::Form;
 use crate::accept::is_as_good;
 use crate::account::{Freedom, residuals, tally};
 use crate::assemble::{Carrier, Placement, domains, kinds, model, steps};
-use crate::border::cracks::{Chain, CrackMap, trace};
+use crate::border::closeness::levels;
+use crate::border::cracks::trace;
 use crate::border::intersection::intersections;
 use crate::border::map::{BorderSettings, PlanarMap, build};
 use crate::border::settle::{Outlines, Placed};
@@ -20,7 +21,7 @@ use crate::metrics::{Metrics, compare, psnr_db};
 use crate::model::{EdgeOrigin, Model, Surface};
 use crate::noise::ImageNoise;
 use crate::origins::met;
-use crate::pieces::{PieceLimits, PieceMap};
+use crate::pieces::{PieceLimits, PieceMap, names};
 use crate::settings::{Method, ReconstructError, ReconstructSettings};
 use crate::trim::Trim;
 
@@ -83,10 +84,6 @@ pub(crate) const FAR: f64 = 2.0;
 /// Narrowest span of a fitted spline, pitches: halving brings spans as near to two pitches as it
 /// can.
 const LEAST_SPAN: f64 = core::f64::consts::SQRT_2;
-
-/// Borders that pass a node within so many nodes are followed as closely as is asked for it: they may
-/// be drawn past it by more than a pitch.
-const ASKED_NODES: i64 = 2;
 
 /// A node with its place and height in millimetres.
 #[derive(Debug, Clone, Copy)]
@@ -227,28 +224,6 @@ impl<'a> Fitted<'a> {
         self
     }
 
-    /// How closely each border is to be followed.
-    fn levels(&self, cracks: &CrackMap) -> Vec<usize> {
-        let (columns, rows) = (self.image.columns() as i64, self.image.rows() as i64);
-        let near = |middle: &[f64; 2]| {
-            let [i, j] = middle.map(|at| at.floor() as i64);
-            let around = (i - ASKED_NODES + 1..=i + ASKED_NODES)
-                .flat_map(move |i| (j - ASKED_NODES + 1..=j + ASKED_NODES).map(move |j| (i, j)));
-            let within = around.filter(|(i, j)| (0..columns).contains(i) && (0..rows).contains(j));
-            within
-                .filter_map(|(i, j)| self.closeness.get((i * rows + j) as usize))
-                .max()
-        };
-        let of_chain = |chain: &Chain| {
-            let most = chain.middles.iter().filter_map(near).max();
-            most.map_or(0, |most| usize::from(*most))
-        };
-        match self.closeness.is_empty() {
-            true => Vec::new(),
-            false => cracks.chains.iter().map(of_chain).collect(),
-        }
-    }
-
     /// Draws the borders, and makes the model. Regions of which a form is known get that in
     /// place of the free-form surface, where their nodes are met by it as well, and outlines run
     /// where the samples beside them say.
@@ -288,7 +263,11 @@ impl<'a> Fitted<'a> {
                 })
                 .collect(),
             regions: self.pieces.regions.clone(),
-            levels: self.levels(&cracks),
+            levels: levels(
+                &cracks.chains,
+                &self.closeness,
+                (image.columns(), image.rows()),
+            ),
         };
         let mut planar = build(&cracks, &placed, &outlines, &borders, monitor)?;
 
@@ -536,20 +515,6 @@ fn surface(
             patches_through_nodes(image, member, domain, settings.patch_third_nodes)
         }
     }
-}
-
-fn names(regions: &[u16]) -> Vec<String> {
-    let mut names = Vec::with_capacity(regions.len());
-    for (k, &region) in regions.iter().enumerate() {
-        let first = regions.partition_point(|&r| r < region);
-        let alone = regions.partition_point(|&r| r <= region) == first + 1;
-        names.push(if alone {
-            format!("Region {region}")
-        } else {
-            format!("Region {region} part {}", k - first + 1)
-        });
-    }
-    names
 }
 
 /// z of the trimmed faces at the nodes of the image, and which face that is; their areas go to

@@ -110,7 +110,7 @@ pub(crate) fn estimate(
     tolerance_mm: f64,
     monitor: &dyn Monitor,
 ) -> Result<usize, Cancelled> {
-    let mut problem = Problem::new(grid, tolerance_mm, monitor);
+    let mut problem = Problem::of_part(grid, tolerance_mm, monitor);
     let target = ESTIMATED_SHARE * tolerance_mm;
     let mut u = Direction::new(problem.columns, Vec::new());
     let mut v = Direction::new(problem.rows, Vec::new());

@@ -73,7 +73,7 @@ impl Lines {
 pub(crate) struct Parted {
     pub(crate) pieces: Vec<Piece>,
     pub(crate) model: Model,
-    /// Data minus the surface of the node's own piece, millimetres.
+    /// Data minus the face where the node is, millimetres.
     pub(crate) deviations_mm: Vec<f64>,
     pub(crate) lines: Lines,
     pub(crate) control_points: usize,
@@ -129,12 +129,16 @@ pub(crate) fn parted(
             model,
             lines,
             open,
+            elsewhere,
             across,
         }) = trimmed
         else {
             return Ok(None);
         };
         if lines.hold() {
+            for (n, off_mm) in elsewhere {
+                deviations_mm[n] = off_mm;
+            }
             return Ok(Some(Parted {
                 control_points: pieces.iter().map(|p| p.knots.control_points()).sum(),
                 pieces,
@@ -178,7 +182,7 @@ fn fitted(
     let Some(block) = Block::of(grid, |n| is_own(n) || region.band.contains(&n)) else {
         return Ok(None);
     };
-    let mut problem = Problem::new(&block.grid, tolerance_mm, monitor);
+    let mut problem = Problem::of_part(&block.grid, tolerance_mm, monitor);
     let share = block.grid.raw_z_mm().len() as f64 / grid.raw_z_mm().len() as f64;
     let visits = (optimal::MOST_VISITS as f64 * share.min(1.0)) as usize;
     let knots = optimal::place(&mut problem, &[Vec::new(), Vec::new()], visits, monitor)?;

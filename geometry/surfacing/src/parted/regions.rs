@@ -12,10 +12,12 @@ use crate::optimal;
 use crate::parted::block::Block;
 use crate::parted::settle::settle;
 
-/// Regions begin where the direction changes by this, radians, and z jumps by this many pitches:
-/// lower than what parts a surface in the end, so that lines that run out do so between regions.
+/// Regions begin where the direction changes by this, radians, and z jumps by this many pitches, or by
+/// this many tolerances where that is less: lower than what parts a surface in the end, so that lines
+/// that run out do so between regions.
 const CREASE_RAD: f64 = 0.1;
 const STEP_PITCHES: f64 = 1.0;
+const STEP_TOLERANCES: f64 = 2.0;
 /// Noise that there is to be for the segmentation, one standard deviation, in pitches, and as a share
 /// of the tolerance.
 const ROUGH_PITCHES: f64 = 0.01;
@@ -75,7 +77,7 @@ pub(super) fn regions(
 ) -> Result<Option<(RangeImage, RegionMap)>, SurfaceError> {
     let settings = SegmentSettings {
         crease_angle_rad: CREASE_RAD,
-        step_factor: STEP_PITCHES,
+        step_factor: STEP_PITCHES.min(STEP_TOLERANCES * tolerance_mm / grid.pitch_mm()),
         minimum_nodes: FEWEST_NODES,
         ..SegmentSettings::default()
     };
@@ -341,32 +343,21 @@ impl<'a> Merging<'a> {
         }
     }
 
-    /// The labels, with pieces that are too small or too thin for a face given to a neighbour.
+    /// The labels, with pieces that are too small or too thin for a face given to neighbours, or to
+    /// none where there is none.
     fn finished(self) -> Vec<u16> {
         let mut labels = self.labels;
         settle(self.grid, &mut labels);
         let (columns, rows) = (self.grid.columns(), self.grid.rows());
-        loop {
-            let pieces = components(&labels, columns, rows);
-            let small: Vec<&Vec<usize>> = pieces
-                .iter()
-                .filter(|piece| piece.len() < FEWEST_NODES || !is_broad(&labels, piece, rows))
-                .collect();
-            let mut lone = vec![false; labels.len()];
-            for n in small.into_iter().flatten() {
-                lone[*n] = true;
-            }
-            let before = labels.clone();
-            for (label, is_lone) in labels.iter_mut().zip(&lone) {
-                if *is_lone {
-                    *label = 0;
+        for piece in components(&labels, columns, rows) {
+            if piece.len() < FEWEST_NODES || !is_broad(&labels, &piece, rows) {
+                for n in piece {
+                    labels[n] = 0;
                 }
             }
-            take_in(self.grid, &mut labels);
-            if labels == before {
-                return labels;
-            }
         }
+        take_in(self.grid, &mut labels);
+        labels
     }
 }
 
@@ -481,8 +472,9 @@ pub(super) struct Link {
     pub(super) labels: [u16; 2],
     /// How far z, carried on straight from both, is apart in their middle.
     pub(super) jump_mm: f64,
-    /// Change of slope from one to the other, over one pitch.
-    turn_mm: f64,
+    /// Change of slope from one to the other, over one pitch. At a crease between them, wherever it
+    /// is, z so carried on jumps by half of it at most.
+    pub(super) turn_mm: f64,
 }
 
 /// All of them.

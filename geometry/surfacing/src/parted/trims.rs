@@ -17,8 +17,8 @@ use crate::surface::Piece;
 
 /// Fewest nodes of a connected part of a region that becomes a face.
 const FEWEST_NODES: usize = 4;
-/// Nodes so near to a line tell whether z steps there, and how far z, carried on straight from both
-/// sides, is apart at a step, in tolerances.
+/// Nodes so near to a line tell whether z steps there, and by how much more than at a crease z, carried
+/// on straight from both sides, is apart at a step, in tolerances.
 const BESIDE_NODES: usize = 2;
 const LEAST_STEP: f64 = 0.5;
 /// Nodes so near to a place on a line far from all nodes have the borders beside them drawn anew.
@@ -36,6 +36,8 @@ pub(super) struct Trimmed {
     pub(super) lines: Lines,
     /// Labels of pieces that part where there is no step.
     pub(super) open: BTreeSet<u16>,
+    /// Nodes on the face of another region than their own, and data minus that, millimetres.
+    pub(super) elsewhere: Vec<(usize, f64)>,
     /// Nodes that no face passes, and the label of the face that is there.
     pub(super) across: Vec<(usize, Option<u16>)>,
 }
@@ -87,7 +89,14 @@ pub(super) fn trimmed(
         if check::model(&made.model).is_err() {
             return Ok(None);
         }
-        let across = across(grid, image, map, &made, tolerance_mm);
+        let elsewhere = elsewhere(grid, map, &made);
+        let is_across =
+            |(_, off_mm): &&(usize, f64)| off_mm.is_nan() || off_mm.abs() > tolerance_mm;
+        let across: Vec<usize> = elsewhere
+            .iter()
+            .filter(is_across)
+            .map(|(n, _)| *n)
+            .collect();
         let foreign = made.model.faces.iter().filter(|face| !is_own(face));
         let foreign: BTreeSet<u16> = foreign.map(|face| face.region).collect();
         let (lines, open) = meetings(grid, image, map, &made.model, tolerance_mm);
@@ -111,9 +120,10 @@ pub(super) fn trimmed(
         if !foreign.is_empty() {
             return Ok(None);
         }
-        let face_at = |n: usize| (made.face_at[n] as usize).checked_sub(1);
-        let region_at = |n: usize| Some(made.model.faces.get(face_at(n)?)?.region);
-        let across: Vec<_> = across.into_iter().map(|n| (n, region_at(n))).collect();
+        let across: Vec<_> = across
+            .into_iter()
+            .map(|n| (n, region_at(&made, n)))
+            .collect();
         let mut model = made.model;
         move_model(&mut model, off_mm.map(|mm| -mm));
         return Ok(Some(Trimmed {
@@ -123,39 +133,27 @@ pub(super) fn trimmed(
                 ..lines
             },
             open: open.iter().flat_map(|open| open.regions).collect(),
+            elsewhere,
             across,
         }));
     }
     Ok(None)
 }
 
-/// Nodes that no face passes within the tolerance.
-fn across(
-    grid: &HeightGrid,
-    image: &RangeImage,
-    map: &RegionMap,
-    made: &Reconstruction,
-    tolerance_mm: f64,
-) -> Vec<usize> {
-    let mut across = Vec::new();
-    for (n, (label, face)) in map.raw_labels().iter().zip(&made.face_at).enumerate() {
-        let z_mm = grid.raw_z_mm()[n];
-        let face = (*face as usize)
-            .checked_sub(1)
-            .and_then(|k| made.model.faces.get(k));
-        if z_mm.is_nan() || face.is_some_and(|face| face.region == *label) {
-            continue;
-        }
-        let (i, j) = (n / grid.rows(), n % grid.rows());
-        let is_near = face.is_some_and(|face| {
-            let Surface::Patches(patches) = &face.surface;
-            (patches.z(image.x_mm(i), image.y_mm(j)) - z_mm).abs() <= tolerance_mm
-        });
-        if !is_near {
-            across.push(n);
-        }
-    }
-    across
+/// The region of the face that is at a node.
+fn region_at(made: &Reconstruction, n: usize) -> Option<u16> {
+    let face = (made.face_at[n] as usize).checked_sub(1)?;
+    Some(made.model.faces.get(face)?.region)
+}
+
+/// Nodes on the face of another region, or on none, with their distance from it.
+fn elsewhere(grid: &HeightGrid, map: &RegionMap, made: &Reconstruction) -> Vec<(usize, f64)> {
+    let faces_mm = made.restored.raw_z_mm();
+    let nodes = grid.raw_z_mm().iter().zip(map.raw_labels()).enumerate();
+    nodes
+        .filter(|(n, (z_mm, label))| !z_mm.is_nan() && region_at(made, *n) != Some(**label))
+        .map(|(n, (z_mm, _))| (n, z_mm - faces_mm[n]))
+        .collect()
 }
 
 /// A place on a line where two pieces part though there is no step.
@@ -233,7 +231,7 @@ fn meetings(
             let is_step = beside.any(|link| {
                 let [n, m] = link.nodes;
                 let is_as_high = (z[n] - z[m]).abs() + 2.0 * tolerance_mm >= gap_mm;
-                is_as_high && link.jump_mm > LEAST_STEP * tolerance_mm
+                is_as_high && link.jump_mm > LEAST_STEP * tolerance_mm + link.turn_mm / 2.0
             });
             if gap_mm <= tolerance_mm {
                 lines.meeting_mm += part_mm;
