@@ -208,7 +208,7 @@ impl Surfaced {
             let format = SurfaceFormat::Iges(Entities::Rational128);
             let author = &inputs.cad.author;
             let written = write_made(made, inputs.name, inputs.timestamp, author, format, sink);
-            Ok(written.map_err(SurfacesError::into_write)?)
+            written.map_err(SurfacesError::into_write)
         })?;
         if !is_written {
             return Ok(None);
