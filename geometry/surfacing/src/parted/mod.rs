@@ -47,7 +47,7 @@ pub struct Lines {
     pub meeting_mm: f64,
     /// Length of those on which z steps from one piece to the other: by no more than it does between
     /// data points within two nodes but for twice the tolerance, and there, carried on straight from
-    /// both sides, by more than half of it.
+    /// both sides, by half of it more than a crease explains.
     pub step_mm: f64,
     /// Length of the others, on which pieces part by more than the tolerance though the data beside
     /// have no such step: none, or pieces are not trimmed.

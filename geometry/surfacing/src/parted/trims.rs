@@ -165,6 +165,53 @@ struct Open {
     is_far: bool,
 }
 
+/// Neighbouring nodes of different regions, by the column and row of the first.
+struct Beside(BTreeMap<[usize; 2], Vec<Link>>);
+
+impl Beside {
+    fn of(grid: &HeightGrid, labels: &[u16]) -> Self {
+        let mut beside: BTreeMap<[usize; 2], Vec<Link>> = BTreeMap::new();
+        for link in links(grid, labels) {
+            let [n, _] = link.nodes;
+            let at = [n / grid.rows(), n % grid.rows()];
+            beside.entry(at).or_default().push(link);
+        }
+        Self(beside)
+    }
+
+    /// Those of two regions near to a node.
+    fn links(&self, at: [usize; 2], regions: [u16; 2]) -> impl Iterator<Item = &Link> {
+        let around = |at: usize| at.saturating_sub(BESIDE_NODES)..=at + BESIDE_NODES;
+        let nodes = around(at[0]).flat_map(move |i| around(at[1]).map(move |j| [i, j]));
+        nodes
+            .filter_map(|node| self.0.get(&node))
+            .flatten()
+            .filter(move |link| regions.iter().all(|region| link.labels.contains(region)))
+    }
+}
+
+/// Whether the data step as high as a gap between two pieces, each of which may be off by the
+/// tolerance, and by more than a crease explains.
+fn is_step(link: &Link, z: &[f64], gap_mm: f64, tolerance_mm: f64) -> bool {
+    let [n, m] = link.nodes;
+    let is_as_high = (z[n] - z[m]).abs() + 2.0 * tolerance_mm >= gap_mm;
+    is_as_high && link.jump_mm > LEAST_STEP * tolerance_mm + link.turn_mm / 2.0
+}
+
+/// The faces on each edge.
+fn sides(model: &Model) -> Vec<Vec<&Face>> {
+    let mut sides: Vec<Vec<&Face>> = vec![Vec::new(); model.edges.len()];
+    for face in &model.faces {
+        let loops = core::iter::once(&face.outer).chain(&face.inner);
+        for coedge in loops.flat_map(|of_loop| &of_loop.coedges) {
+            if let Some(sides) = sides.get_mut(coedge.edge.0) {
+                sides.push(face);
+            }
+        }
+    }
+    sides
+}
+
 /// How pieces meet on the edges of the model, which is where the image is.
 fn meetings(
     grid: &HeightGrid,
@@ -186,53 +233,24 @@ fn meetings(
         nodes_across: 0,
         left_out: left_out.count(),
     };
-    let mut near: BTreeMap<[usize; 2], Vec<Link>> = BTreeMap::new();
-    for link in links(grid, labels) {
-        let [n, _] = link.nodes;
-        near.entry([n / grid.rows(), n % grid.rows()])
-            .or_default()
-            .push(link);
-    }
-    let mut sides: Vec<Vec<&Face>> = vec![Vec::new(); model.edges.len()];
-    for face in &model.faces {
-        let loops = core::iter::once(&face.outer).chain(&face.inner);
-        for coedge in loops.flat_map(|of_loop| &of_loop.coedges) {
-            if let Some(sides) = sides.get_mut(coedge.edge.0) {
-                sides.push(face);
-            }
-        }
-    }
+    let beside = Beside::of(grid, labels);
     let mut open = Vec::new();
     let pitch_mm = grid.pitch_mm();
-    for (edge, sides) in model.edges.iter().zip(&sides) {
+    for (edge, sides) in model.edges.iter().zip(sides(model)) {
         let &[a, b] = sides.as_slice() else { continue };
         let (Surface::Patches(over), Surface::Patches(under)) = (&a.surface, &b.surface);
+        let regions = [a.region, b.region];
         let (first, last) = edge.path.domain();
         let count = ((last - first) / pitch_mm * PER_PITCH).ceil().max(1.0) as usize;
         let part_mm = (last - first) / count as f64;
         for k in 0..count {
             let [x, y] = edge.path.evaluate(first + part_mm * (k as f64 + 0.5));
             let gap_mm = (over.z(x, y) - under.z(x, y)).abs();
-            let at = [
-                (x - image.x_mm(0)) / pitch_mm,
-                (y - image.y_mm(0)) / pitch_mm,
-            ]
-            .map(|nodes| nodes.max(0.0) as usize);
-            let cells = (at[0].saturating_sub(BESIDE_NODES)..=at[0] + BESIDE_NODES).flat_map(|i| {
-                (at[1].saturating_sub(BESIDE_NODES)..=at[1] + BESIDE_NODES).map(move |j| [i, j])
-            });
-            let mut beside = cells
-                .filter_map(|cell| near.get(&cell))
-                .flatten()
-                .filter(|link| link.labels.contains(&a.region) && link.labels.contains(&b.region))
-                .peekable();
-            let is_far = beside.peek().is_none();
-            // A step is where the data beside have one as high; each side may be off by the tolerance.
-            let is_step = beside.any(|link| {
-                let [n, m] = link.nodes;
-                let is_as_high = (z[n] - z[m]).abs() + 2.0 * tolerance_mm >= gap_mm;
-                is_as_high && link.jump_mm > LEAST_STEP * tolerance_mm + link.turn_mm / 2.0
-            });
+            let at =
+                [x - image.x_mm(0), y - image.y_mm(0)].map(|mm| (mm / pitch_mm).max(0.0) as usize);
+            let mut links = beside.links(at, regions).peekable();
+            let is_far = links.peek().is_none();
+            let is_step = links.any(|link| is_step(link, z, gap_mm, tolerance_mm));
             if gap_mm <= tolerance_mm {
                 lines.meeting_mm += part_mm;
                 lines.greatest_gap_mm = lines.greatest_gap_mm.max(gap_mm);
@@ -241,7 +259,7 @@ fn meetings(
             } else {
                 open.push(Open {
                     at,
-                    regions: [a.region, b.region],
+                    regions,
                     is_far,
                 });
                 lines.open_mm += part_mm;
