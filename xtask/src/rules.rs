@@ -95,6 +95,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "nurbs",
             "range-image",
+            "reconstruct",
             "regrid",
             "scan-files",
             "skin",
