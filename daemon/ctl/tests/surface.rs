@@ -92,6 +92,8 @@ fn entities_and_pieces_across_the_grid() {
         assert_eq!(parted["surface"]["control_points"], 32);
         assert_eq!(parted["trimmed"]["nodes_across"], 0);
     }
+    let words = ["terrace.xyz", "--tolerance-mm", "0.05", "--untrimmed"];
+    assert!(run(at, &words)["trimmed"].is_null());
     let words = [
         "surface",
         "hill.xyz",
