@@ -39,7 +39,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("compare", &["range-image"]),
     ("skin", &["nurbs", "range-image"]),
-    ("surfacing", &["nurbs", "range-image"]),
+    (
+        "surfacing",
+        &["nurbs", "range-image", "reconstruct", "segment"],
+    ),
     ("toolpath", &["range-image"]),
     ("terraces", &["nurbs"]),
     ("features", &["nurbs", "range-image", "segment", "terraces"]),
@@ -92,6 +95,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "nurbs",
             "range-image",
+            "reconstruct",
             "regrid",
             "scan-files",
             "skin",

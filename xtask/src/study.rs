@@ -179,7 +179,15 @@ fn surfaces(short: bool, scan: Option<&Path>, write: bool) -> Result<()> {
     if write {
         check.extend(["--append", SURFACES_PAGE]);
     }
-    shell::run(&python, &check)
+    shell::run(&python, &check)?;
+    // Surfaces that are parted at lines across the grid, as files.
+    shell::run("cargo", &["build", "--release", "--bin", "relief"])?;
+    let relief = place.join("release/relief").display().to_string();
+    let scans = place.join("studies/surfaces/lines").display().to_string();
+    let seeds = if short { "1" } else { "3" };
+    let lines = "tests/judges/surfacing/lines.py";
+    let words = ["-B", lines, &relief, &scans, "--seeds", seeds];
+    shell::run(&python, &words)
 }
 
 // Programs are named without their packages: so they are built with the features that all members of

@@ -42,6 +42,74 @@ fn run(at: &Path, arguments: &[&str]) -> Value {
 }
 
 #[test]
+fn entities_and_pieces_across_the_grid() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("hill.xyz"), text(&hill())).unwrap();
+    // A plane with a terrace beyond an oblique line.
+    let terrace: Vec<[f64; 3]> = (0..40 * 40)
+        .map(|n| {
+            let (x, y) = (f64::from(n / 40), f64::from(n % 40));
+            [
+                x,
+                y,
+                0.1 * x + if 0.8 * x + 0.6 * y > 25.3 { 6.0 } else { 0.0 },
+            ]
+        })
+        .collect();
+    fs::write(at.join("terrace.xyz"), text(&terrace)).unwrap();
+    // Entities by number, from the directory's first lines.
+    let counts = |path: &str, entity: usize| {
+        let text = fs::read_to_string(at.join(path)).unwrap();
+        let of_directory = text.lines().filter(|line| line.get(72..73) == Some("D"));
+        let first = of_directory.step_by(2);
+        first
+            .filter(|line| line[..8].trim() == entity.to_string())
+            .count()
+    };
+    for (entities, other) in [(114, 128), (128, 114)] {
+        let words = [
+            "--tolerance-mm",
+            "0.05",
+            "--entities",
+            &entities.to_string(),
+            "-o",
+        ];
+        let whole = run(at, &[&["hill.xyz"], &words[..], &["hill.igs"]].concat());
+        // Two pieces on either side of the ridge.
+        assert_eq!(counts("hill.igs", entities), 2);
+        assert_eq!((counts("hill.igs", other), counts("hill.igs", 144)), (0, 0));
+        assert!(whole["trimmed"].is_null());
+        let parted = run(
+            at,
+            &[&["terrace.xyz"], &words[..], &["terrace.igs"]].concat(),
+        );
+        assert_eq!(
+            (counts("terrace.igs", entities), counts("terrace.igs", 144)),
+            (2, 2)
+        );
+        assert_eq!(parted["trimmed"]["faces"], 2);
+        assert_eq!(parted["surface"]["control_points"], 32);
+        assert_eq!(parted["trimmed"]["nodes_across"], 0);
+    }
+    let words = ["terrace.xyz", "--tolerance-mm", "0.05", "--untrimmed"];
+    assert!(run(at, &words)["trimmed"].is_null());
+    let words = [
+        "surface",
+        "hill.xyz",
+        "--tolerance-mm",
+        "1",
+        "--entities",
+        "114",
+        "-o",
+        "a.step",
+    ];
+    let output = relief(at, &words);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(told(&output).1.contains("--entities is about IGES files"));
+}
+
+#[test]
 fn points_on_a_grid_become_a_surface_within_the_tolerance() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

@@ -119,22 +119,26 @@ pub fn write_iges(
     Ok(())
 }
 
-/// Writes whole surfaces as IGES.
+/// Writes whole surfaces as IGES, as entities 114 or, whatever else is asked for, 128.
 ///
 /// # Errors
-/// As [`iges::write_surfaces`].
+/// As [`iges::write_surfaces`] and [`iges::write_parametric_surfaces`].
 pub fn write_surfaces(
     surfaces: &[iges::NamedSurface<'_>],
     name: &str,
     timestamp: Timestamp,
     author: &str,
+    entities: Entities,
     mut sink: impl Write,
 ) -> Result<iges::Summary, WriteError> {
     let stem = file_stem(name);
     let mut options = iges::WriteOptions::new(stem.clone(), iges_time(timestamp));
     options.file_name = format!("{stem}.igs");
     author.clone_into(&mut options.author);
-    Ok(iges::write_surfaces(surfaces, &options, &mut sink)?)
+    Ok(match entities {
+        Entities::Parametric114 => iges::write_parametric_surfaces(surfaces, &options, &mut sink)?,
+        _ => iges::write_surfaces(surfaces, &options, &mut sink)?,
+    })
 }
 
 fn iges_time(timestamp: Timestamp) -> String {

@@ -33,12 +33,12 @@ pub use export::{
 pub use file::{hexadecimal, sha256_of, write_atomically};
 pub use filed::{PageFormat, PageFormats, comparison_page, scan_page};
 pub use further::{
-    CharacterLineFigures, FairingFigures, Further, HeightSurface, MachineFile, MachineFileError,
-    MillError, MillOf, Milled, OperationFigures, SectionFigures, SimulationFigures, SkinCounts,
-    SkinDeviation, SkinFigures, SkinOptions, SkinReport, SkinSettingsReport, SurfaceFigures,
+    CharacterLineFigures, FairingFigures, Further, MachineFile, MachineFileError, MillError,
+    MillOf, Milled, OperationFigures, SectionFigures, SimulationFigures, SkinCounts, SkinDeviation,
+    SkinFigures, SkinOptions, SkinReport, SkinSettingsReport, SurfaceFigures, SurfaceFormat,
     SurfaceReport, SurfaceSettingsReport, SurfaceWords, SurfacesError, ToolpathOptions,
-    ToolpathReport, ToolpathSettingsReport, cut_remark, mill, rows_of, skin_pictures,
-    surface_pictures, surface_remarks, write_height_surfaces,
+    ToolpathReport, ToolpathSettingsReport, TrimmedFigures, cut_remark, mill, rows_of,
+    skin_pictures, surface_pictures, surface_remarks, write_made,
 };
 pub use manifest::{MANIFEST_NAME, Manifest, ManifestFile};
 pub use meshes::{

@@ -26,7 +26,10 @@ pub(crate) fn met(
     let mut rounds = 0..LOOSENINGS;
     loop {
         let kinds = kinds(planar, carriers, placement);
-        let is_crease: Vec<bool> = kinds.iter().map(|kind| *kind == EdgeKind::Crease).collect();
+        let asked = kinds.iter().zip(&planar.edges);
+        let is_crease: Vec<bool> = asked
+            .map(|(kind, edge)| *kind == EdgeKind::Crease && !edge.is_kept)
+            .collect();
         let mut moved = planar.clone();
         let meeting = meet(&mut moved, &surfaces, &is_crease, placement, monitor)?;
         if rounds.next().is_some() && loosen(planar, &surfaces, &is_crease, &meeting, placement) {

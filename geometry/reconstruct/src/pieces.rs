@@ -290,6 +290,21 @@ impl Sets {
     }
 }
 
+/// Names of faces by the regions of their pieces, which are in order.
+pub(crate) fn names(regions: &[u16]) -> Vec<String> {
+    let mut names = Vec::with_capacity(regions.len());
+    for (k, &region) in regions.iter().enumerate() {
+        let first = regions.partition_point(|&r| r < region);
+        let alone = regions.partition_point(|&r| r <= region) == first + 1;
+        names.push(if alone {
+            format!("Region {region}")
+        } else {
+            format!("Region {region} part {}", k - first + 1)
+        });
+    }
+    names
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,6 +8,7 @@ use shapes::Form;
 use crate::accept::is_as_good;
 use crate::account::{Freedom, residuals, tally};
 use crate::assemble::{Carrier, Placement, domains, kinds, model, steps};
+use crate::border::closeness::levels;
 use crate::border::cracks::trace;
 use crate::border::intersection::intersections;
 use crate::border::map::{BorderSettings, PlanarMap, build};
@@ -20,7 +21,7 @@ use crate::metrics::{Metrics, compare, psnr_db};
 use crate::model::{EdgeOrigin, Model, Surface};
 use crate::noise::ImageNoise;
 use crate::origins::met;
-use crate::pieces::{PieceLimits, PieceMap};
+use crate::pieces::{PieceLimits, PieceMap, names};
 use crate::settings::{Method, ReconstructError, ReconstructSettings};
 use crate::trim::Trim;
 
@@ -120,6 +121,8 @@ pub struct Fitted<'a> {
     surfaces: Vec<PatchSurface>,
     /// Of each of these, as [`RegionFit::parameters`].
     parameters: Vec<usize>,
+    /// How closely borders are to follow each node; of none where there are no numbers.
+    closeness: Vec<u8>,
 }
 
 impl<'a> Fitted<'a> {
@@ -129,6 +132,56 @@ impl<'a> Fitted<'a> {
     /// [`ReconstructError`] when a setting is out of range, the map does not belong to the
     /// image, no region can become a face, or the caller cancels.
     pub fn of(
+        image: &'a RangeImage,
+        map: &'a RegionMap,
+        settings: &'a ReconstructSettings,
+        monitor: &dyn Monitor,
+    ) -> Result<Self, ReconstructError> {
+        let mut all = Self::unfitted(image, map, settings, monitor)?;
+        if settings.method == Method::Relief {
+            let fitted = (0..all.nodes.len()).into_par_iter().map(|piece| {
+                monitor.check()?;
+                let domain = around(image, &all.nodes[piece]);
+                all.free_form(piece, domain)
+            });
+            // Of several errors the first, as without threads.
+            let fitted: Vec<Result<_, ReconstructError>> = fitted.collect();
+            let fitted: Vec<_> = fitted.into_iter().collect::<Result<_, _>>()?;
+            (all.surfaces, all.parameters) = fitted.into_iter().unzip();
+        }
+        monitor.progress(0.3);
+        Ok(all)
+    }
+
+    /// Takes surfaces that are there already, of each region by label from 1 on, with the numbers that
+    /// each was given. They are to reach three pitches beyond the nodes of their region, so that
+    /// borders stay on them; where a border does not, a free-form surface comes in their place.
+    ///
+    /// # Errors
+    /// As [`Self::of`], and [`ReconstructError::Surfaces`] when there are not as many as regions.
+    pub fn given(
+        image: &'a RangeImage,
+        map: &'a RegionMap,
+        surfaces: &[(PatchSurface, usize)],
+        settings: &'a ReconstructSettings,
+        monitor: &dyn Monitor,
+    ) -> Result<Self, ReconstructError> {
+        if surfaces.len() != usize::from(map.regions()) {
+            return Err(ReconstructError::Surfaces {
+                regions: usize::from(map.regions()),
+                surfaces: surfaces.len(),
+            });
+        }
+        let mut all = Self::unfitted(image, map, settings, monitor)?;
+        let of_pieces = all.pieces.regions.iter();
+        let own = of_pieces.filter_map(|region| surfaces.get(usize::from(*region) - 1).cloned());
+        (all.surfaces, all.parameters) = own.unzip();
+        monitor.progress(0.3);
+        Ok(all)
+    }
+
+    /// The pieces, without surfaces.
+    fn unfitted(
         image: &'a RangeImage,
         map: &'a RegionMap,
         settings: &'a ReconstructSettings,
@@ -148,7 +201,7 @@ impl<'a> Fitted<'a> {
             });
         }
         monitor.check()?;
-        let mut all = Self {
+        Ok(Self {
             nodes: nodes_of(image, map, &pieces),
             noise: ImageNoise::of(image),
             surfaces: Vec::new(),
@@ -157,20 +210,18 @@ impl<'a> Fitted<'a> {
             map,
             settings,
             pieces,
-        };
-        if settings.method == Method::Relief {
-            let fitted = (0..all.nodes.len()).into_par_iter().map(|piece| {
-                monitor.check()?;
-                let domain = around(image, &all.nodes[piece]);
-                all.free_form(piece, domain)
-            });
-            // Of several errors the first, as without threads.
-            let fitted: Vec<Result<_, ReconstructError>> = fitted.collect();
-            let fitted: Vec<_> = fitted.into_iter().collect::<Result<_, _>>()?;
-            (all.surfaces, all.parameters) = fitted.into_iter().unzip();
-        }
-        monitor.progress(0.3);
-        Ok(all)
+            closeness: Vec::new(),
+        })
+    }
+
+    /// Has the borders near some nodes follow the nodes more closely than they need be smooth:
+    /// `closeness` is by node, column by column, 0 where nothing is asked, up to 3 where they run in
+    /// the middle between nodes, as a line of short straight pieces. A border is drawn in one way
+    /// throughout.
+    #[must_use]
+    pub fn closely(mut self, closeness: Vec<u8>) -> Self {
+        self.closeness = closeness;
+        self
     }
 
     /// Draws the borders, and makes the model. Regions of which a form is known get that in
@@ -212,6 +263,11 @@ impl<'a> Fitted<'a> {
                 })
                 .collect(),
             regions: self.pieces.regions.clone(),
+            levels: levels(
+                &cracks.chains,
+                &self.closeness,
+                (image.columns(), image.rows()),
+            ),
         };
         let mut planar = build(&cracks, &placed, &outlines, &borders, monitor)?;
 
@@ -459,20 +515,6 @@ fn surface(
             patches_through_nodes(image, member, domain, settings.patch_third_nodes)
         }
     }
-}
-
-fn names(regions: &[u16]) -> Vec<String> {
-    let mut names = Vec::with_capacity(regions.len());
-    for (k, &region) in regions.iter().enumerate() {
-        let first = regions.partition_point(|&r| r < region);
-        let alone = regions.partition_point(|&r| r <= region) == first + 1;
-        names.push(if alone {
-            format!("Region {region}")
-        } else {
-            format!("Region {region} part {}", k - first + 1)
-        });
-    }
-    names
 }
 
 /// z of the trimmed faces at the nodes of the image, and which face that is; their areas go to

@@ -191,6 +191,14 @@ pub enum ReconstructError {
         /// The limit in force.
         min_nodes: usize,
     },
+    /// Not as many surfaces as regions were given.
+    #[error("{surfaces} surfaces were given for {regions} regions")]
+    Surfaces {
+        /// Number of regions.
+        regions: usize,
+        /// Number of surfaces.
+        surfaces: usize,
+    },
     /// A surface could not be fitted.
     #[error("no surface fits region {label}: {reason}")]
     Fit {

@@ -3,7 +3,7 @@
 //! Those that run along the grid from one side to the other are found here: a crease gets
 //! triple knots, on which pieces of the surface meet ([`split_at_creases`]), and a step parts
 //! the grid. Lines in other directions are found node by node ([`Features`]), so that fairing
-//! leaves them sharp; no surface is split along them.
+//! leaves them sharp; surfaces are parted on them where that pays ([`crate::parted`]).
 
 use nurbs::{BSplineSurface, KnotVector};
 

@@ -2,14 +2,16 @@
 //! 4.4, equations (5) and (6)).
 //!
 //! Over a full grid the normal equations separate into one banded system along x and one
-//! along y. With masked nodes they do not; then the full grid's equations precondition
-//! conjugate gradients. Masked nodes count with a small weight, and with what was filled in
-//! there, so that no control point is left undetermined.
+//! along y. With masked nodes they do not; then small systems may be eliminated ([`Normal`]),
+//! and the full grid's equations precondition conjugate gradients for others. Masked nodes count
+//! with a small weight, and with what was filled in there, so that no control point is left
+//! undetermined.
 
 use range_image::Monitor;
 use rayon::prelude::*;
 
 use crate::axis::{Axis, DEGREE};
+use crate::normal::Normal;
 
 /// What a masked node's residual counts, where a node with a value counts 1. Lower weights make
 /// conjugate gradients slow; since masked nodes are filled from the surface itself, they hardly
@@ -18,6 +20,8 @@ const MASKED_WEIGHT: f64 = 1e-4;
 /// Most steps of conjugate gradients, and the drop of the residual at which they end.
 const MOST_STEPS: usize = 400;
 const DROP: f64 = 1e-9;
+/// Times that coefficients are eliminated for: the second mends what the first has lost in digits.
+const ELIMINATIONS: usize = 2;
 /// Columns that a task takes at once.
 const CHUNK: usize = 16;
 
@@ -125,18 +129,20 @@ pub(crate) fn at(line: &[f64], node: &crate::axis::AtNode) -> f64 {
 
 /// Least squares over the nodes of which `is_data` holds; the others draw weakly to what
 /// `filled` has there. `start` is where the iteration begins; cancelled, it ends where it is.
+/// `may_eliminate`: exactly, where that is little work. Iterations end before what the data hardly
+/// hold has settled, and so leave it nearer to what was filled in.
 pub(crate) fn masked(
     u: &Axis,
     v: &Axis,
     (filled, is_data): (&[f64], &[bool]),
     start: Vec<f64>,
+    may_eliminate: bool,
     monitor: &dyn Monitor,
 ) -> Vec<f64> {
+    let weight = |n: usize| if is_data[n] { 1.0 } else { MASKED_WEIGHT };
     let weighted = |mut z: Vec<f64>| {
-        for (z, &is_data) in z.iter_mut().zip(is_data) {
-            if !is_data {
-                *z *= MASKED_WEIGHT;
-            }
+        for (n, z) in z.iter_mut().enumerate() {
+            *z *= weight(n);
         }
         z
     };
@@ -162,9 +168,20 @@ pub(crate) fn masked(
         out
     };
     let mut x = start;
-    let fitted = values(u, v, &x);
-    let off = filled.iter().zip(&fitted).map(|(z, f)| z - f).collect();
-    let mut residual = project(&weighted(off));
+    let left = |x: &[f64]| {
+        let fitted = values(u, v, x);
+        let off = filled.iter().zip(&fitted).map(|(z, f)| z - f).collect();
+        project(&weighted(off))
+    };
+    let normal = may_eliminate.then(|| Normal::new(u, v, weight));
+    if let Some(normal) = normal.flatten() {
+        for _ in 0..ELIMINATIONS {
+            let step = normal.solve(left(&x));
+            x.iter_mut().zip(step).for_each(|(x, step)| *x += step);
+        }
+        return x;
+    }
+    let mut residual = left(&x);
     let mut preconditioned = precondition(&residual);
     let mut direction = preconditioned.clone();
     let mut size = dot(&residual, &preconditioned);
@@ -252,7 +269,14 @@ mod tests {
             .collect();
         let start = full(&u, &v, &filled);
         let before = values(&u, &v, &start);
-        let coefficients = masked(&u, &v, (&filled, &is_data), start, &Unmonitored);
+        let masked = |start: Vec<f64>, may_eliminate: bool| {
+            let data = (&filled[..], &is_data[..]);
+            masked(&u, &v, data, start, may_eliminate, &Unmonitored)
+        };
+        let eliminated = masked(start.clone(), true);
+        let coefficients = masked(start, false);
+        let pairs = eliminated.iter().zip(&coefficients);
+        assert!(pairs.clone().all(|(a, b)| (a - b).abs() < 1e-6));
         let after = values(&u, &v, &coefficients);
         let worst = |values: &[f64]| {
             let off = values.iter().enumerate().filter(|(n, _)| is_data[*n]);

@@ -40,6 +40,9 @@ pub(crate) struct Problem<'a> {
     pub(crate) is_full: bool,
     /// Greatest deviation wanted, millimetres.
     pub(crate) tolerance: f64,
+    /// Whether small systems of grids with holes are eliminated: far faster where little of the grid has
+    /// data. Over the whole of a scan more control points come of it, or fewer.
+    may_eliminate: bool,
     /// Who may end the work. Fits end early then, and are worth nothing.
     monitor: &'a dyn Monitor,
 }
@@ -54,7 +57,16 @@ impl<'a> Problem<'a> {
             is_data: raw.iter().map(|z| !z.is_nan()).collect(),
             is_full: grid.is_full(),
             tolerance,
+            may_eliminate: false,
             monitor,
+        }
+    }
+
+    /// For a part of a grid that has few data within its rectangle.
+    pub(crate) fn of_part(grid: &HeightGrid, tolerance: f64, monitor: &'a dyn Monitor) -> Self {
+        Self {
+            may_eliminate: true,
+            ..Self::new(grid, tolerance, monitor)
         }
     }
 
@@ -72,7 +84,14 @@ impl<'a> Problem<'a> {
     pub(crate) fn fit_axes(&self, u: &Axis, v: &Axis) -> Fit {
         let mut coefficients = fit::full(u, v, &self.z);
         if !self.is_full {
-            coefficients = fit::masked(u, v, (&self.z, &self.is_data), coefficients, self.monitor);
+            coefficients = fit::masked(
+                u,
+                v,
+                (&self.z, &self.is_data),
+                coefficients,
+                self.may_eliminate,
+                self.monitor,
+            );
         }
         Fit {
             score: self.score(u, v, &coefficients),

@@ -4,6 +4,7 @@ use core::ops::Range;
 
 use nurbs::BSplineSurface;
 use range_image::{Monitor, Unmonitored};
+use reconstruct::Model;
 
 use crate::axis::{Axis, Breaks};
 use crate::character::{CharacterLine, LineKind, grid_lines, split_at_creases};
@@ -16,8 +17,15 @@ use crate::knots::{
     JumpThresholds, Knots, Placement, derivative, longest_sections, polyline, uniform,
 };
 use crate::optimal;
+use crate::parted::{Lines, Parted, parted};
 use crate::problem::Problem;
 use crate::within::fit_within;
+
+/// Trimmed pieces must take no more than this share of the control points that pieces along the grid
+/// do, and do so without doubt at this share of what one surface is estimated to take: then that need
+/// not be made.
+const PAYS: f64 = 0.75;
+const CLEARLY_PAYS: f64 = 0.2;
 
 /// What is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,10 +41,13 @@ pub struct Settings {
     /// Greatest distance by which fairing may move a data point, millimetres; `None`: no
     /// fairing.
     pub fair_mm: Option<f64>,
+    /// Whether, with optimal knots, pieces may be trimmed at lines across the grid where that pays
+    /// ([`Made::trimmed`]); else the knots follow such lines.
+    pub may_trim: bool,
 }
 
 impl Settings {
-    /// Optimal knots for a tolerance, without fairing.
+    /// Optimal knots for a tolerance, without fairing; trimmed where that pays.
     #[must_use]
     pub fn new(tolerance_mm: f64) -> Self {
         Self {
@@ -44,6 +55,7 @@ impl Settings {
             placement: Placement::Optimal,
             thresholds: JumpThresholds::default(),
             fair_mm: None,
+            may_trim: true,
         }
     }
 
@@ -66,7 +78,8 @@ impl Settings {
     }
 }
 
-/// A surface over a part of the grid that no step crosses.
+/// A surface over a part of the grid that no step crosses: over all of its nodes, or over those of a
+/// region with an outline of its own, trimmed by that ([`Made::trimmed`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Piece {
     /// The surface, over x and y in millimetres.
@@ -108,8 +121,28 @@ pub struct SurfaceReport {
     pub noise_mm: f64,
     /// Character lines along the grid that were found.
     pub lines: Vec<CharacterLine>,
+    /// Where trimmed pieces meet.
+    pub trimmed: Option<Lines>,
     /// What fairing did, if it was asked for.
     pub fairing: Option<FairingReport>,
+}
+
+impl SurfaceReport {
+    fn new(placement: Placement, lines: Vec<CharacterLine>) -> Self {
+        Self {
+            placement,
+            control_points: 0,
+            of_pieces: Vec::new(),
+            max_mm: 0.0,
+            rms_mm: 0.0,
+            nodes: 0,
+            within_tolerance: 0,
+            noise_mm: 0.0,
+            lines,
+            trimmed: None,
+            fairing: None,
+        }
+    }
 }
 
 /// Surfaces, and what they were made of.
@@ -117,6 +150,9 @@ pub struct SurfaceReport {
 pub struct Made {
     /// One, or several that steps part.
     pub pieces: Vec<Piece>,
+    /// The pieces with their trims, one face for each connected part of a piece, where character
+    /// lines run across the grid; then the surfaces of [`Self::pieces`] go on beyond their nodes.
+    pub trimmed: Option<Model>,
     /// The data points after fairing.
     pub data: HeightGrid,
     /// Data minus surface at each node, millimetres; NaN where masked. Column by column.
@@ -126,13 +162,13 @@ pub struct Made {
 }
 
 /// Part of an operation's progress.
-struct Share<'a> {
-    monitor: &'a dyn Monitor,
-    from: f64,
-    size: f64,
+pub(crate) struct Part<'a> {
+    pub(crate) monitor: &'a dyn Monitor,
+    pub(crate) from: f64,
+    pub(crate) size: f64,
 }
 
-impl Monitor for Share<'_> {
+impl Monitor for Part<'_> {
     fn is_cancelled(&self) -> bool {
         self.monitor.is_cancelled()
     }
@@ -157,7 +193,7 @@ pub fn make(
     let (mut data, mut fairing) = (grid.clone(), None);
     let mut from = 0.0;
     if let Some(bound_mm) = settings.fair_mm {
-        let part = Share {
+        let part = Part {
             monitor,
             from,
             size: 0.3,
@@ -167,28 +203,87 @@ pub fn make(
         fairing = Some(report);
         from = 0.3;
     }
+    let may_trim = settings.may_trim && settings.placement == Placement::Optimal;
+    let part = |share: f64, size: f64| Part {
+        monitor,
+        from: from + (1.0 - from) * share,
+        size: (1.0 - from) * size,
+    };
+    let parted = match may_trim {
+        true => parted(&data, settings.tolerance_mm, &part(0.0, 0.5))?,
+        false => None,
+    };
+    let mut is_clear = false;
+    // Pieces along the grid may be as few.
+    if let Some(found) = &parted
+        && grid_lines(&data, settings.tolerance_mm).is_empty()
+    {
+        let estimate = optimal::estimate(&data, settings.tolerance_mm, monitor)?;
+        is_clear = found.control_points as f64 <= CLEARLY_PAYS * estimate as f64;
+    }
+    let mut made = match parted {
+        Some(found) if is_clear => of_parted(data, found, settings),
+        parted => match (parted, whole(&data, settings, &part(0.5, 0.5))) {
+            (_, Err(SurfaceError::Cancelled(cancelled))) => return Err(cancelled.into()),
+            (Some(found), Err(_)) => of_parted(data, found, settings),
+            (Some(found), Ok(whole)) if pays(&found, &whole.report) => {
+                of_parted(data, found, settings)
+            }
+            (_, whole) => whole?,
+        },
+    };
+    made.report.noise_mm = noise_mm;
+    made.report.fairing = fairing;
+    monitor.progress(1.0);
+    Ok(made)
+}
+
+fn pays(parted: &Parted, whole: &SurfaceReport) -> bool {
+    parted.control_points as f64 <= PAYS * whole.control_points as f64
+}
+
+/// In pieces that lines in any direction bound.
+fn of_parted(data: HeightGrid, parted: Parted, settings: &Settings) -> Made {
     let lines = grid_lines(&data, settings.tolerance_mm);
-    let blocks = blocks(&data, settings, &lines);
+    let mut report = SurfaceReport::new(settings.placement, lines);
+    report.control_points = parted.control_points;
+    let counts = |piece: &Piece| [&piece.knots.u, &piece.knots.v].map(Breaks::control_count);
+    report.of_pieces = parted.pieces.iter().map(counts).collect();
+    report.trimmed = Some(parted.lines);
+    let mut sum_of_squares = 0.0;
+    for off in parted.deviations_mm.iter().filter(|off| !off.is_nan()) {
+        report.nodes += 1;
+        report.max_mm = report.max_mm.max(off.abs());
+        report.within_tolerance += usize::from(off.abs() <= settings.tolerance_mm);
+        sum_of_squares += off * off;
+    }
+    report.rms_mm = (sum_of_squares / report.nodes.max(1) as f64).sqrt();
+    Made {
+        pieces: parted.pieces,
+        trimmed: Some(parted.model),
+        data,
+        deviations_mm: parted.deviations_mm,
+        report,
+    }
+}
+
+/// One surface, or several that lines along the grid part.
+fn whole(
+    data: &HeightGrid,
+    settings: &Settings,
+    monitor: &dyn Monitor,
+) -> Result<Made, SurfaceError> {
+    let lines = grid_lines(data, settings.tolerance_mm);
+    let blocks = blocks(data, settings, &lines);
     let mut deviations_mm = vec![f64::NAN; data.raw_z_mm().len()];
     let mut pieces = Vec::new();
-    let mut report = SurfaceReport {
-        placement: settings.placement,
-        control_points: 0,
-        of_pieces: Vec::new(),
-        max_mm: 0.0,
-        rms_mm: 0.0,
-        nodes: 0,
-        within_tolerance: 0,
-        noise_mm,
-        lines,
-        fairing,
-    };
+    let mut report = SurfaceReport::new(settings.placement, lines);
     let mut sum_of_squares = 0.0;
-    let size = (1.0 - from) / blocks.len().max(1) as f64;
+    let size = 1.0 / blocks.len().max(1) as f64;
     for (number, (columns, rows)) in blocks.into_iter().enumerate() {
-        let part = Share {
+        let part = Part {
             monitor,
-            from: from + size * number as f64,
+            from: size * number as f64,
             size,
         };
         let Some(block) = data.block(columns.clone(), rows.clone()) else {
@@ -230,10 +325,10 @@ pub fn make(
         });
     }
     report.rms_mm = (sum_of_squares / report.nodes.max(1) as f64).sqrt();
-    monitor.progress(1.0);
     Ok(Made {
         pieces,
-        data,
+        trimmed: None,
+        data: data.clone(),
         deviations_mm,
         report,
     })
@@ -272,7 +367,7 @@ fn placed(
                     fixed[usize::from(!line.is_at_x)].extend([line.at; 3]);
                 }
             }
-            optimal::place(problem, &fixed, monitor)?
+            optimal::place(problem, &fixed, optimal::MOST_VISITS, monitor)?
         }
     })
 }
@@ -340,7 +435,7 @@ fn out_of_reach(problem: &Problem, reached: f64) -> SurfaceError {
 
 /// Coefficients of z as a surface in space: x and y of a control point are the averages of
 /// its knots, so that the surface's x and y are its parameters.
-fn in_space(
+pub(crate) fn in_space(
     grid: &HeightGrid,
     knots: &Knots,
     coefficients: &[f64],

@@ -11,9 +11,11 @@ mod bound;
 #[allow(dead_code, reason = "shared with tests; one is not measured here")]
 #[path = "../../../geometry/surfacing/tests/common/mod.rs"]
 mod common;
+mod lines;
 mod paper;
 mod picture;
 mod placements;
+mod told;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -32,7 +34,7 @@ struct Options {
     /// A recorded scan to be measured, too (PLY in metres)
     #[arg(long, value_name = "FILE")]
     scan: Option<PathBuf>,
-    /// Measure only surfaces whose name has this in it; `fairing`: only that
+    /// Measure only surfaces whose name has this in it; `lines`, `fairing`: only that
     #[arg(long, value_name = "WORD")]
     only: Option<String>,
     /// Write what is measured to this page, too

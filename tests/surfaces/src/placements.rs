@@ -14,6 +14,8 @@ use surfacing::{
 
 use crate::bound;
 use crate::common::{draws, face, franke, grid, peaks};
+use crate::lines;
+use crate::told::Told;
 
 /// What fairing must bring the variation of curvature that is by noise down by.
 const LEAST_FALL: f64 = 10.0;
@@ -65,26 +67,6 @@ struct Ours {
     control_points: usize,
     max_mm: f64,
     rms_mm: f64,
-}
-
-/// What is printed as it comes, and kept for the page.
-#[derive(Default)]
-struct Told {
-    page: String,
-    missed: Vec<String>,
-}
-
-impl Told {
-    fn line(&mut self, line: &str) {
-        println!("{line}");
-        self.page.push_str(line);
-        self.page.push('\n');
-    }
-
-    fn head(&mut self, cells: &[&str]) {
-        self.line(&format!("| {} |", cells.join(" | ")));
-        self.line(&format!("|{}", " --- |".repeat(cells.len())));
-    }
 }
 
 type Surface = (&'static str, fn(f64, f64) -> f64, [f64; 3]);
@@ -151,6 +133,9 @@ pub(crate) fn measure(
             let case = compare(name, grid, tolerances, &mut told)?;
             leave(data, &case)?;
         }
+    }
+    if only.is_none_or(|word| word == "lines") {
+        lines::measure(short, &mut told)?;
     }
     if only.is_none_or(|word| word == "fairing") {
         fairings(short, surfaces, &mut told)?;

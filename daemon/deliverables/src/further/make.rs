@@ -4,7 +4,6 @@
 use cad_exchange::iges::NamedSurface;
 use features::field::FieldError;
 use features::recognise::RecogniseError;
-use nurbs::BSplineSurface;
 use pipeline::{Observer, Stage};
 use range_image::Cancelled;
 use reconstruct::Model;
@@ -19,12 +18,12 @@ use super::options::{MillOf, SkinOptions, ToolpathOptions};
 use super::recognised::{recognised, write_recognised};
 use super::report::{SkinReport, SurfaceReport, ToolpathReport};
 use super::skinned::{SkinFigures, cut_remark, rows_of, skin_pictures};
-use super::surface_file::{HeightSurface, surface_model};
+use super::surface_file::{SurfaceFormat, SurfacesError, made_model, write_made};
 use super::surface_pictures::surface_pictures;
 use super::surfaced::{
     CharacterLineFigures, FairingFigures, SurfaceFigures, SurfaceWords, surface_remarks,
 };
-use crate::export::{file_stem, write_surfaces};
+use crate::export::{Entities, file_stem, write_surfaces};
 use crate::extras::Extras;
 use crate::features::FEATURES_NAME;
 use crate::meshes::{TrianglesError, triangles};
@@ -120,15 +119,15 @@ pub(crate) fn write_further(
     let wanted = &inputs.cad.further;
     let stem = file_stem(inputs.name);
     let mut reports = FurtherReports::default();
-    let mut parts = Vec::new();
+    let mut made = None;
     if let Some(settings) = wanted.surface {
         watch.stage(Stage::Surface);
         let name = format!("{stem}.surface.igs");
         if !extras.lacks_room_for(&name) {
             match surface(inputs, &settings, watch) {
                 Ok(done) => {
-                    parts = done.parts();
                     reports.surface = done.write(extras, inputs, &name, &settings)?;
+                    made = Some(done.made);
                 }
                 Err(stop) => left_out(extras, &name, stop)?,
             }
@@ -150,7 +149,7 @@ pub(crate) fn write_further(
         watch.stage(Stage::Toolpath);
         let name = format!("{stem}.nc");
         if !extras.lacks_room_for(&name) {
-            match milled(extras, inputs, options, (&name, &parts), watch)? {
+            match milled(extras, inputs, options, (&name, made.as_ref()), watch)? {
                 Ok(report) => reports.toolpath = report,
                 Err(stop) => left_out(extras, &name, stop)?,
             }
@@ -197,10 +196,6 @@ fn surface(
 }
 
 impl Surfaced {
-    fn parts(&self) -> Vec<BSplineSurface> {
-        self.made.pieces.iter().flat_map(|p| p.parts()).collect()
-    }
-
     fn write(
         &self,
         extras: &mut Extras<'_>,
@@ -208,18 +203,14 @@ impl Surfaced {
         name: &str,
         settings: &surfacing::Settings,
     ) -> Result<Option<SurfaceReport>, DeliverError> {
-        let (made, parts) = (&self.made, self.parts());
-        let names = names(inputs.name, parts.len());
-        let named: Vec<NamedSurface<'_>> = parts
-            .iter()
-            .zip(&names)
-            .map(|(surface, name)| NamedSurface {
-                name,
-                surface,
-                is_closed: [false; 2],
-            })
-            .collect();
-        if !put_surfaces(extras, inputs, name, &named)? {
+        let made = &self.made;
+        let is_written = extras.put(name, &|sink| {
+            let format = SurfaceFormat::Iges(Entities::Rational128);
+            let author = &inputs.cad.author;
+            let written = write_made(made, inputs.name, inputs.timestamp, author, format, sink);
+            written.map_err(SurfacesError::into_write)
+        })?;
+        if !is_written {
             return Ok(None);
         }
         let remarks = surface_remarks(made, settings, SurfaceWords::KEYS);
@@ -246,14 +237,6 @@ impl Surfaced {
     }
 }
 
-/// Names of so many surfaces in a file.
-fn names(name: &str, count: usize) -> Vec<String> {
-    match count {
-        1 => vec![name.to_owned()],
-        _ => (1..=count).map(|k| format!("{name} {k}")).collect(),
-    }
-}
-
 fn put_surfaces(
     extras: &mut Extras<'_>,
     inputs: &Inputs<'_>,
@@ -262,7 +245,8 @@ fn put_surfaces(
 ) -> Result<bool, DeliverError> {
     extras.put(name, &|sink| {
         let author = &inputs.cad.author;
-        write_surfaces(named, inputs.name, inputs.timestamp, author, sink)?;
+        let entities = Entities::Rational128;
+        write_surfaces(named, inputs.name, inputs.timestamp, author, entities, sink)?;
         Ok(())
     })
 }
@@ -316,25 +300,20 @@ fn skinned(
 fn to_be_milled(
     inputs: &Inputs<'_>,
     of: MillOf,
-    parts: &[BSplineSurface],
+    made: Option<&Made>,
     watch: &dyn Observer,
 ) -> Result<Surface, Stop> {
     let whole: Model;
     let model = match of {
         MillOf::Model => &inputs.outcome.reconstruction.model,
-        MillOf::Surface if parts.is_empty() => {
-            return Err(Stop::Refused(
-                "it is to mill the B-spline surface, which there is none of".to_owned(),
-            ));
-        }
         MillOf::Surface => {
-            let names = names(inputs.name, parts.len());
-            let named: Vec<HeightSurface<'_>> = parts
-                .iter()
-                .zip(names)
-                .map(|(surface, name)| HeightSurface { name, surface })
-                .collect();
-            whole = surface_model(&named).map_err(|error| Stop::Refused(error.to_string()))?;
+            let Some(made) = made else {
+                return Err(Stop::Refused(
+                    "it is to mill the B-spline surface, which there is none of".to_owned(),
+                ));
+            };
+            whole =
+                made_model(made, inputs.name).map_err(|error| Stop::Refused(error.to_string()))?;
             &whole
         }
     };
@@ -359,12 +338,12 @@ fn milled(
     extras: &mut Extras<'_>,
     inputs: &Inputs<'_>,
     options: &ToolpathOptions,
-    (name, parts): (&str, &[BSplineSurface]),
+    (name, made): (&str, Option<&Made>),
     watch: &dyn Observer,
 ) -> Result<Result<Option<ToolpathReport>, Stop>, DeliverError> {
     let machine = &options.machine;
     let milled = threaded(inputs, || {
-        let surface = to_be_milled(inputs, options.of, parts, watch)?;
+        let surface = to_be_milled(inputs, options.of, made, watch)?;
         let simulating = || watch.progress(0.0);
         let milled = mill(
             &surface,

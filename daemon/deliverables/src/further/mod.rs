@@ -22,8 +22,9 @@ pub use report::{
 pub use skinned::{
     SectionFigures, SkinCounts, SkinDeviation, SkinFigures, cut_remark, rows_of, skin_pictures,
 };
-pub use surface_file::{HeightSurface, SurfacesError, write_height_surfaces};
+pub use surface_file::{SurfaceFormat, SurfacesError, write_made};
 pub use surface_pictures::surface_pictures;
 pub use surfaced::{
-    CharacterLineFigures, FairingFigures, SurfaceFigures, SurfaceWords, surface_remarks,
+    CharacterLineFigures, FairingFigures, SurfaceFigures, SurfaceWords, TrimmedFigures,
+    surface_remarks,
 };

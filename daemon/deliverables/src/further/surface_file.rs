@@ -10,15 +10,19 @@ use reconstruct::{
     Coedge, Edge, EdgeId, EdgeKind, EdgeOrigin, Face, Loop, Model, Surface, Vertex, VertexId,
 };
 
-use crate::export::{CadOptions, Schema, WriteError, write_step, write_surfaces};
+use surfacing::Made;
+
+use crate::export::{
+    CadOptions, Entities, Schema, WriteError, write_iges, write_step, write_surfaces,
+};
 
 /// A surface over x and y, with its name in the file.
 #[derive(Debug, Clone)]
-pub struct HeightSurface<'a> {
+struct HeightSurface<'a> {
     /// Its name.
-    pub name: String,
+    name: String,
     /// Over x and y in millimetres.
-    pub surface: &'a BSplineSurface,
+    surface: &'a BSplineSurface,
 }
 
 /// Why surfaces were not written.
@@ -35,42 +39,108 @@ pub enum SurfacesError {
     Io(#[from] std::io::Error),
 }
 
-/// Writes surfaces, as IGES entities 128 or as STEP.
+impl SurfacesError {
+    /// What the destination said, or the trouble in words as if it had.
+    pub(crate) fn into_write(self) -> WriteError {
+        match self {
+            Self::Write(error) => error,
+            Self::Piecewise(error) => WriteError::Io(std::io::Error::other(error)),
+            Self::Io(error) => WriteError::Io(error),
+        }
+    }
+}
+
+/// What a surface is written as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SurfaceFormat {
+    /// As IGES with these entities, of which 114 and 128 are known.
+    Iges(Entities),
+    /// As STEP.
+    Step,
+}
+
+/// Writes a surface over a grid: its pieces whole, or trimmed where character lines run across the
+/// grid. In IGES these are entities 144 on what is asked for, and that by itself where nothing is
+/// trimmed.
 ///
 /// # Errors
 /// Any [`SurfacesError`].
-pub fn write_height_surfaces(
-    named: &[HeightSurface<'_>],
+pub fn write_made(
+    made: &Made,
     name: &str,
     timestamp: Timestamp,
     author: &str,
-    is_step: bool,
+    format: SurfaceFormat,
     sink: &mut dyn Write,
 ) -> Result<(), SurfacesError> {
-    if !is_step {
-        let whole: Vec<iges::NamedSurface<'_>> = named
-            .iter()
-            .map(|own| iges::NamedSurface {
-                name: &own.name,
-                surface: own.surface,
-                is_closed: [false; 2],
-            })
-            .collect();
-        write_surfaces(&whole, name, timestamp, author, sink)?;
-        return Ok(());
-    }
-    let model = surface_model(named)?;
+    let entities = match format {
+        SurfaceFormat::Iges(entities) if made.trimmed.is_none() => {
+            let parts = made_parts(made);
+            let names = names(name, parts.len());
+            let whole: Vec<iges::NamedSurface<'_>> = parts
+                .iter()
+                .zip(&names)
+                .map(|(surface, name)| iges::NamedSurface {
+                    name,
+                    surface,
+                    is_closed: [false; 2],
+                })
+                .collect();
+            write_surfaces(&whole, name, timestamp, author, entities, sink)?;
+            return Ok(());
+        }
+        SurfaceFormat::Iges(entities) => entities,
+        SurfaceFormat::Step => Entities::default(),
+    };
     let cad = CadOptions {
         step: Some(Schema::Ap242),
         author: author.to_owned(),
+        entities,
         ..CadOptions::default()
     };
-    write_step(&model, name, timestamp, &cad, sink)?;
+    let model = made_model(made, name)?;
+    match format {
+        SurfaceFormat::Step => write_step(&model, name, timestamp, &cad, sink)?,
+        SurfaceFormat::Iges(_) => write_iges(&model, name, timestamp, &cad, sink)?,
+    }
     Ok(())
 }
 
+/// The pieces of a surface as they are, cut on lines along the grid.
+fn made_parts(made: &Made) -> Vec<BSplineSurface> {
+    made.pieces.iter().flat_map(|piece| piece.parts()).collect()
+}
+
+/// A surface as faces: with their trims, or rectangular ones.
+pub(crate) fn made_model(made: &Made, name: &str) -> Result<Model, PiecewiseError> {
+    if let Some(trimmed) = &made.trimmed {
+        let mut model = trimmed.clone();
+        let names = names(name, model.faces.len());
+        for (face, name) in model.faces.iter_mut().zip(names) {
+            face.name = name;
+        }
+        return Ok(model);
+    }
+    let parts = made_parts(made);
+    let names = names(name, parts.len());
+    let named: Vec<HeightSurface<'_>> = parts
+        .iter()
+        .zip(names)
+        .map(|(surface, name)| HeightSurface { name, surface })
+        .collect();
+    surface_model(&named)
+}
+
+/// Names of so many surfaces in a file.
+fn names(name: &str, count: usize) -> Vec<String> {
+    match count {
+        1 => vec![name.to_owned()],
+        _ => (1..=count).map(|k| format!("{name} {k}")).collect(),
+    }
+}
+
 /// Surfaces as rectangular faces, each within edges of its own.
-pub(crate) fn surface_model(named: &[HeightSurface<'_>]) -> Result<Model, PiecewiseError> {
+fn surface_model(named: &[HeightSurface<'_>]) -> Result<Model, PiecewiseError> {
     let mut model = Model::default();
     for (index, named) in named.iter().enumerate() {
         add_face(&mut model, named, index)?;

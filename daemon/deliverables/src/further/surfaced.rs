@@ -37,6 +37,42 @@ pub struct CharacterLineFigures {
     pub jump: f64,
 }
 
+/// How trimmed pieces meet, where character lines run across the grid.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TrimmedFigures {
+    /// Trimmed faces.
+    pub faces: usize,
+    /// Length of the lines on which pieces meet within the tolerance.
+    pub meeting_mm: f64,
+    /// Length of those on which z steps.
+    pub step_mm: f64,
+    /// Length of those on which pieces part though the data have no step.
+    pub open_mm: f64,
+    /// Greatest distance in z of two pieces, but on steps.
+    pub greatest_gap_mm: f64,
+    /// Grid points past the trim of their piece.
+    pub nodes_across: usize,
+    /// Grid points in no piece.
+    pub left_out: usize,
+}
+
+impl TrimmedFigures {
+    /// The figures, where pieces are trimmed.
+    #[must_use]
+    pub fn of(made: &Made) -> Option<Self> {
+        let (lines, model) = (made.report.trimmed?, made.trimmed.as_ref()?);
+        Some(Self {
+            faces: model.faces.len(),
+            meeting_mm: lines.meeting_mm,
+            step_mm: lines.step_mm,
+            open_mm: lines.open_mm,
+            greatest_gap_mm: lines.greatest_gap_mm,
+            nodes_across: lines.nodes_across,
+            left_out: lines.left_out,
+        })
+    }
+}
+
 /// What fairing did.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FairingFigures {

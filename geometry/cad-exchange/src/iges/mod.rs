@@ -4,7 +4,8 @@
 //! 114 and 112, on 128 and 126, or on 190 to 198), one per face, or into shells (514) of faces on
 //! common edges, with name, colour and level;
 //! [`read_points`] takes measured points (106, 116) from anybody's file; [`read_model`]
-//! reads back what [`write()`] writes. [`write_surfaces`] writes whole B-spline surfaces (128),
+//! reads back what [`write()`] writes. [`write_surfaces`] writes whole B-spline surfaces (128; as 114 by
+//! [`write_parametric_surfaces`]),
 //! [`read_surfaces`] reads them, and [`read_chains`] curves and chains of points (106, 112, 126).
 //!
 //! A file is sections of 80-column lines: Start, Global, Directory entry, Parameter
@@ -21,5 +22,5 @@ pub use read::{
 };
 pub use write::{
     DEFAULT_PALETTE, Entities, FaceDefect, NamedSurface, Summary, WriteError, WriteOptions, write,
-    write_surfaces,
+    write_parametric_surfaces, write_surfaces,
 };

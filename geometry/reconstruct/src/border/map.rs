@@ -40,6 +40,8 @@ pub(crate) struct MapEdge {
     pub(crate) path: PiecewiseCubic<2>,
     /// Samples have told where it runs.
     pub(crate) is_settled: bool,
+    /// It runs in the middle between nodes, as was asked, and stays there.
+    pub(crate) is_kept: bool,
 }
 
 /// Vertices, edges, and the loops of each piece, outer first; lengths in pitches.
@@ -99,6 +101,8 @@ struct Border<'a> {
     level: usize,
     /// Samples are not asked where it runs: it got into another's way where they said.
     as_drawn: bool,
+    /// It was asked for as it was traced.
+    is_kept: bool,
 }
 
 /// Builds the map. `placed[k]`, where given, are better samples of chain `k` than the
@@ -122,6 +126,7 @@ pub(crate) fn build(
                 points.rotate_left(start);
                 points.push(points[0]);
             }
+            let wanted = outlines.levels.get(k).copied().unwrap_or(SMOOTH);
             let mut border = Border {
                 chain,
                 samples: match placed {
@@ -129,8 +134,9 @@ pub(crate) fn build(
                     None => Samples::new(points),
                 },
                 segments: Vec::new(),
-                level: SMOOTH,
+                level: wanted.min(TRACED),
                 as_drawn: false,
+                is_kept: wanted >= TRACED,
             };
             border.divide(settings);
             border
@@ -468,6 +474,7 @@ fn assemble(
                     sides,
                     path,
                     is_settled: is_settled(n),
+                    is_kept: border.is_kept,
                 });
             }
         }

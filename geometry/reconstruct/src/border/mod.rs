@@ -2,6 +2,7 @@
 
 pub(crate) mod beam;
 pub(crate) mod beside;
+pub(crate) mod closeness;
 pub(crate) mod conic;
 pub(crate) mod course;
 pub(crate) mod cracks;

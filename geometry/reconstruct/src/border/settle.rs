@@ -23,6 +23,9 @@ pub(crate) struct Outlines {
     pub(crate) regions: Vec<u16>,
     /// Of each border, whether z jumps there from one surface to another.
     pub(crate) steps: Vec<bool>,
+    /// How closely each border is followed from the beginning, as [`super::map::build`] counts it;
+    /// those that are not there, as closely as is needed for none to cross.
+    pub(crate) levels: Vec<usize>,
 }
 
 /// Farthest that a corner is moved, pitches.
@@ -132,6 +135,7 @@ mod tests {
             add(9, -0.7, Seen::Lost);
         }
         let outlines = Outlines {
+            levels: Vec::new(),
             samples,
             regions: regions.to_vec(),
             steps: vec![is_step],

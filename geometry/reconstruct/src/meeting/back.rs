@@ -42,6 +42,7 @@ mod tests {
             sides: [1, 2],
             path: polyline(places).unwrap(),
             is_settled: true,
+            is_kept: false,
         }
     }
 

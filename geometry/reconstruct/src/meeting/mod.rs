@@ -436,6 +436,7 @@ mod tests {
                 sides,
                 path: polyline(&places).unwrap(),
                 is_settled: true,
+                is_kept: false,
             }
         };
         PlanarMap {
@@ -476,6 +477,7 @@ mod tests {
             sides,
             path: polyline(&[vertices[0], vertices[end]]).unwrap(),
             is_settled: true,
+            is_kept: false,
         };
         let edges = vec![edge(1, [1, 2]), edge(2, [1, 3])];
         let mut map = PlanarMap {
@@ -534,6 +536,7 @@ mod tests {
             sides: [1, 2],
             path: polyline(&[[10.0, 20.0], via, end]).unwrap(),
             is_settled: true,
+            is_kept: false,
         };
         let led = |edge: &MapEdge, end: [f64; 2]| {
             let from = edge.path.end();

@@ -152,6 +152,7 @@ mod tests {
                 sides,
                 path: line(places[start], places[end]).unwrap(),
                 is_settled: false,
+                is_kept: false,
             }
         };
         let mut map = PlanarMap {

@@ -34,6 +34,7 @@ pub(crate) fn crease_and_outline() -> PlanarMap {
         sides,
         path: polyline(&[vertices[start], vertices[start + 1]]).unwrap(),
         is_settled: false,
+        is_kept: false,
     };
     PlanarMap {
         edges: vec![edge(0, [1, 2]), edge(1, [1, 0])],

@@ -21,9 +21,11 @@ mod polish;
 use range_image::{Cancelled, Monitor};
 
 use crate::axis::{Axis, Breaks};
+use crate::grid::HeightGrid;
 use crate::knots::Knots;
 use crate::problem::Problem;
 use density::Direction;
+pub(crate) use polish::MOST_VISITS;
 
 /// Shares of the tolerance that each direction may take, tried from the largest.
 const SHARES: [f64; 8] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.42, 0.35];
@@ -36,23 +38,22 @@ const REFILLS: usize = 2;
 const PATIENT: usize = 12;
 const HASTE: f64 = 0.7;
 
-/// Places the knots. `fixed` are those that character lines ask for, along x and y.
+/// Places the knots. `fixed` are those that character lines ask for, along x and y; `visits` bounds
+/// the work, [`MOST_VISITS`] at most.
 ///
 /// # Errors
 /// [`Cancelled`] at the monitor's wish.
 pub(crate) fn place(
     problem: &mut Problem,
     fixed: &[Vec<f64>; 2],
+    visits: usize,
     monitor: &dyn Monitor,
 ) -> Result<Knots, Cancelled> {
     let mut u = Direction::new(problem.columns, fixed[0].clone());
     let mut v = Direction::new(problem.rows, fixed[1].clone());
     if !problem.is_full {
-        // A first surface, so that the holes are filled from more than their neighbours.
-        problem.refill(&Knots {
-            u: Breaks::uniform(problem.columns, 8).solvable(),
-            v: Breaks::uniform(problem.rows, 8).solvable(),
-        });
+        let first = first_knots(problem);
+        problem.refill(&first);
     }
     let mut knots = None;
     for (step, share) in SHARES.into_iter().enumerate() {
@@ -91,7 +92,46 @@ pub(crate) fn place(
     if !is_near {
         return Ok(every_node(problem));
     }
-    polish::polish(problem, knots, fixed, monitor)
+    polish::polish(problem, knots, fixed, visits, monitor)
+}
+
+/// Of the tolerance, what each direction may take where control points are only estimated, and how
+/// often what holes are filled with is found anew: they are to ask for none.
+const ESTIMATED_SHARE: f64 = 0.9;
+const ESTIMATES: usize = 2;
+
+/// About how many control points a surface over the grid takes: as many as each direction needs by
+/// itself.
+///
+/// # Errors
+/// [`Cancelled`] at the monitor's wish.
+pub(crate) fn estimate(
+    grid: &HeightGrid,
+    tolerance_mm: f64,
+    monitor: &dyn Monitor,
+) -> Result<usize, Cancelled> {
+    let mut problem = Problem::of_part(grid, tolerance_mm, monitor);
+    let target = ESTIMATED_SHARE * tolerance_mm;
+    let mut u = Direction::new(problem.columns, Vec::new());
+    let mut v = Direction::new(problem.rows, Vec::new());
+    let mut knots = first_knots(&problem);
+    let times = if problem.is_full { 1 } else { ESTIMATES };
+    for _ in 0..times {
+        problem.refill(&knots);
+        knots = Knots {
+            u: u.spread(target, |axis| problem.columns_off(axis), monitor)?,
+            v: v.spread(target, |axis| problem.rows_off(axis), monitor)?,
+        };
+    }
+    Ok(knots.control_points())
+}
+
+/// Those of a first surface, so that holes are filled from more than their neighbours.
+fn first_knots(problem: &Problem) -> Knots {
+    Knots {
+        u: Breaks::uniform(problem.columns, 8).solvable(),
+        v: Breaks::uniform(problem.rows, 8).solvable(),
+    }
 }
 
 /// Halves the spans that exceed the tolerance until none does, or all nodes have a knot.

@@ -10,7 +10,7 @@ use crate::problem::{Problem, Score};
 
 /// Nodes visited by all fits together, at most: a bound on the time that follows from the
 /// grid alone.
-const MOST_VISITS: usize = 600_000_000;
+pub(crate) const MOST_VISITS: usize = 600_000_000;
 /// Knots whose loss is tried in earnest, those that are missed least first.
 pub(super) const TRIED: usize = 8;
 /// Knots to either side of a lost one that make up for it.
@@ -54,9 +54,10 @@ pub(super) fn polish(
     problem: &mut Problem,
     knots: Knots,
     fixed: &[Vec<f64>; 2],
+    visits: usize,
     monitor: &dyn Monitor,
 ) -> Result<Knots, Cancelled> {
-    let fits = MOST_VISITS / problem.nodes().max(1);
+    let fits = visits / problem.nodes().max(1);
     let is_near = |problem: &Problem, knots: &Knots| {
         problem
             .fit(knots)

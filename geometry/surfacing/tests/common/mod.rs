@@ -63,14 +63,18 @@ pub(crate) fn waves(x: f64, y: f64) -> f64 {
 
 /// Normal draws of one standard deviation, from a fixed seed.
 pub(crate) fn draws(count: usize) -> Vec<f64> {
-    let mut state: u64 = 0x2545_f491_4f6c_dd1d;
-    let mut uniform = || {
+    let mut draw = draws_from(0x2545_f491_4f6c_dd1d);
+    (0..count).map(|_| draw()).collect()
+}
+
+/// The same from any seed.
+pub(crate) fn draws_from(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    let mut uniform = move || {
         state = state
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1_442_695_040_888_963_407);
         ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
     };
-    (0..count)
-        .map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0)
-        .collect()
+    move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use cad_exchange::iges::NamedSurface;
-use deliverables::{SkinFigures, skin_pictures, write_atomically};
+use deliverables::{Entities, SkinFigures, skin_pictures, write_atomically};
 use serde::Serialize;
 use skin::{Skin, SkinError};
 
@@ -86,7 +86,7 @@ fn skin_file(args: &Args, shown: &Shown) -> Result<Skinned, Failure> {
         is_closed: [found.is_closed, false],
     };
     write_atomically::<deliverables::DeliverError>(&output, |sink| {
-        deliverables::write_surfaces(&[named], &name, timestamp, "", sink)?;
+        deliverables::write_surfaces(&[named], &name, timestamp, "", Entities::Rational128, sink)?;
         Ok(())
     })
     .map_err(|error| Failure::at(format!("cannot write {}", output.display()), &error))?;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
+use deliverables::{Entities, SurfaceFormat};
 use jiff::Timestamp;
 use scan_files::Units;
 use surfacing::{JumpThresholds, Placement, Settings, SurfaceError};
@@ -19,7 +20,9 @@ use crate::failure::Failure;
 /// (uniform), at the vertices of the reference sections' polylines (polyline), or where derivatives
 /// of these sections break (derivative); the latter two do not promise the tolerance, and it is said
 /// when they exceed it. Where z jumps along a line of the grid, the surface comes in pieces; where
-/// the slope does, pieces meet on that line; so it is with optimal knots. Samples that lie on a uniform
+/// the slope does, pieces meet on that line; so it is with optimal knots. Where such lines run across
+/// the grid, oblique or curved, and pieces that end on them take fewer control points, these are
+/// trimmed surfaces. Samples that lie on a uniform
 /// grid already are taken as they are, unless --pitch-mm or a --roi is given.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
@@ -30,6 +33,10 @@ pub(crate) struct Args {
     /// .stp). Default: the scan's name with .igs, in the current directory
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
+    /// IGES entities of the surfaces: 128 (rational B-splines), or 114 (parametric splines of the
+    /// same shape); default: 128
+    #[arg(long, value_name = "TYPE", value_enum)]
+    entities: Option<EntityName>,
     /// Greatest distance in z between surface and grid, millimetres
     #[arg(long, value_name = "MM")]
     pub(super) tolerance_mm: f64,
@@ -44,6 +51,9 @@ pub(crate) struct Args {
     /// lines stay sharp
     #[arg(long, value_name = "MM")]
     pub(super) fair_mm: Option<f64>,
+    /// Trim nothing: knots follow lines across the grid, too, however many that takes
+    #[arg(long)]
+    untrimmed: bool,
     /// Also tell what each placement of knots comes to
     #[arg(long)]
     pub(super) compare: bool,
@@ -69,6 +79,14 @@ pub(crate) struct Args {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum EntityName {
+    #[value(name = "114")]
+    Parametric,
+    #[value(name = "128")]
+    Rational,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum KnotsName {
     Uniform,
     Polyline,
@@ -77,8 +95,8 @@ enum KnotsName {
 }
 
 impl Args {
-    /// Where the surface goes, and whether as STEP.
-    pub(super) fn output(&self) -> Result<(PathBuf, bool), Failure> {
+    /// Where the surface goes, and as what.
+    pub(super) fn output(&self) -> Result<(PathBuf, SurfaceFormat), Failure> {
         let path = match &self.output {
             Some(path) => path.clone(),
             None => PathBuf::from(format!("{}.igs", input_stem(&self.scan))),
@@ -86,9 +104,18 @@ impl Args {
         let ending = path
             .extension()
             .map(|e| e.to_string_lossy().to_ascii_lowercase());
-        let is_step = match ending.as_deref() {
-            Some("igs" | "iges") => false,
-            Some("step" | "stp") => true,
+        let format = match ending.as_deref() {
+            Some("igs" | "iges") => SurfaceFormat::Iges(match self.entities {
+                Some(EntityName::Parametric) => Entities::Parametric114,
+                Some(EntityName::Rational) | None => Entities::Rational128,
+            }),
+            Some("step" | "stp") if self.entities.is_some() => {
+                return Err(Failure::Usage(format!(
+                    "--entities is about IGES files, and {} is none",
+                    path.display()
+                )));
+            }
+            Some("step" | "stp") => SurfaceFormat::Step,
             _ => {
                 return Err(Failure::Usage(format!(
                     "the ending of {} names no format that a surface is written in; known: .igs, \
@@ -103,7 +130,7 @@ impl Args {
                 path.display()
             )));
         }
-        Ok((path, is_step))
+        Ok((path, format))
     }
 
     /// Name of the surface.
@@ -138,6 +165,7 @@ impl Args {
             },
             thresholds: JumpThresholds(thresholds),
             fair_mm: self.fair_mm,
+            may_trim: !self.untrimmed,
         };
         settings.validate().map_err(|error| {
             let option = match &error {

@@ -3,9 +3,8 @@
 use std::path::PathBuf;
 
 use deliverables::{
-    CharacterLineFigures, FairingFigures, HeightSurface, ManifestFile, SurfaceFigures,
-    SurfaceWords, SurfacesError, surface_pictures, surface_remarks, write_atomically,
-    write_height_surfaces,
+    CharacterLineFigures, FairingFigures, ManifestFile, SurfaceFigures, SurfaceWords,
+    SurfacesError, TrimmedFigures, surface_pictures, surface_remarks, write_atomically, write_made,
 };
 use serde::Serialize;
 use surfacing::{HeightGrid, Placement, Settings, SurfaceError};
@@ -30,6 +29,9 @@ pub(super) struct Surfaced {
     pub(super) surface: SurfaceFigures,
     /// Lines along the grid on which z or the slope jumps.
     pub(super) character_lines: Vec<CharacterLineFigures>,
+    /// How pieces meet that lines across the grid bound.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) trimmed: Option<TrimmedFigures>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) fairing: Option<FairingFigures>,
     /// Every placement beside the others, where that was asked for.
@@ -50,7 +52,7 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
 }
 
 fn surface_of_file(args: &Args, shown: &Shown) -> Result<Surfaced, Failure> {
-    let (output, is_step) = args.output()?;
+    let (output, format) = args.output()?;
     let settings = args.settings()?;
     places::check_file(&output)?;
     args.pictures
@@ -101,21 +103,9 @@ fn surface_of_file(args: &Args, shown: &Shown) -> Result<Surfaced, Failure> {
         }
     }
     shown.begin("write");
-    let parts: Vec<_> = made.pieces.iter().flat_map(|piece| piece.parts()).collect();
-    let named: Vec<HeightSurface<'_>> = parts
-        .iter()
-        .enumerate()
-        .map(|(index, surface)| HeightSurface {
-            name: match parts.len() {
-                1 => name.clone(),
-                _ => format!("{name} {}", index + 1),
-            },
-            surface,
-        })
-        .collect();
     let author = author.unwrap_or_default();
     let written = write_atomically::<SurfacesError>(&output, |sink| {
-        write_height_surfaces(&named, &name, timestamp, &author, is_step, sink)
+        write_made(&made, &name, timestamp, &author, format, sink)
     })
     .map_err(|error| Failure::at(format!("cannot write {}", output.display()), &error))?;
     let pictures = match &args.pictures {
@@ -140,6 +130,7 @@ fn surface_of_file(args: &Args, shown: &Shown) -> Result<Surfaced, Failure> {
         noise_mm: made.report.noise_mm,
         surface: SurfaceFigures::of(&made),
         character_lines: CharacterLineFigures::of(&made),
+        trimmed: TrimmedFigures::of(&made),
         fairing: FairingFigures::of(&made),
         placements,
         pictures,

@@ -48,6 +48,14 @@ pub(super) fn told(surfaced: &Surfaced) -> String {
             line.kind, line.at, line.at_mm, line.jump
         ));
     }
+    if let Some(trimmed) = &surfaced.trimmed {
+        lines.push(format!(
+            "trimmed      {}; pieces meet on {:.1} mm, z steps on {:.1} mm",
+            output::counted(trimmed.faces, "face"),
+            trimmed.meeting_mm,
+            trimmed.step_mm
+        ));
+    }
     if let Some(fairing) = &surfaced.fairing {
         lines.push(format!(
             "fairing      curvature variation {:.3e} to {:.3e} mm^-4 (1/{:.0}); moved {:.4} mm rms, \

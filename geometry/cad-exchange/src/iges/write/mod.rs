@@ -25,7 +25,7 @@ use reconstruct::{Face, Model, Surface};
 pub use crate::common::{DEFAULT_PALETTE, FaceDefect};
 pub use error::WriteError;
 pub use options::{Entities, WriteOptions};
-pub use plain::{NamedSurface, write_surfaces};
+pub use plain::{NamedSurface, write_parametric_surfaces, write_surfaces};
 
 use crate::brep::{Brep, Sharing};
 use crate::common::check;

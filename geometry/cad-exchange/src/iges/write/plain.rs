@@ -1,13 +1,13 @@
-//! Whole surfaces, without trims: entity 128 for each, with its name.
+//! Whole surfaces, without trims: entity 128 or 114 for each, with its name.
 
 use std::io;
 
-use nurbs::BSplineSurface;
+use nurbs::{BSplineSurface, PatchSurface};
 
 use super::error::WriteError;
 use super::options::WriteOptions;
-use super::shapes::{bspline_parameters, plain_entry};
-use super::sheet::{Entry, Sheet, Status};
+use super::shapes::{bspline_parameters, patch_parameters, plain_entry};
+use super::sheet::{Entry, Record, Sheet, Status};
 use super::{Summary, global_fields, write_name};
 
 /// A surface of a file.
@@ -22,7 +22,7 @@ pub struct NamedSurface<'a> {
 }
 
 /// Writes B-spline surfaces as an IGES 5.3 file, as they are: readers take each over its whole
-/// domain. Of the options those that concern trims and colours are not used.
+/// domain. Of the options those that concern entities, trims and colours are not used.
 ///
 /// # Errors
 /// [`WriteError::Option`] for an option that cannot stand in a file, or a control point that is not
@@ -31,6 +31,41 @@ pub fn write_surfaces(
     surfaces: &[NamedSurface<'_>],
     options: &WriteOptions,
     out: &mut impl io::Write,
+) -> Result<Summary, WriteError> {
+    whole(surfaces, 128, options, out, |record, own| {
+        bspline_parameters(record, own.surface, own.is_closed);
+        Ok(())
+    })
+}
+
+/// The same as parametric splines, entity 114: patches of polynomials in powers of their parameters,
+/// one for each span, which are the same surface but for rounding.
+///
+/// # Errors
+/// As [`write_surfaces`], and [`WriteError::Option`] for a surface of a degree above 3, or one whose
+/// parameters are not its x and y.
+pub fn write_parametric_surfaces(
+    surfaces: &[NamedSurface<'_>],
+    options: &WriteOptions,
+    out: &mut impl io::Write,
+) -> Result<Summary, WriteError> {
+    whole(surfaces, 114, options, out, |record, own| {
+        let patches = PatchSurface::from_bspline(own.surface).ok_or(WriteError::Option {
+            option: "surfaces",
+            value: own.name.to_owned(),
+            expected: "a surface over x and y of a degree of 3 at most",
+        })?;
+        patch_parameters(record, &patches);
+        Ok(())
+    })
+}
+
+fn whole(
+    surfaces: &[NamedSurface<'_>],
+    entity: u16,
+    options: &WriteOptions,
+    out: &mut impl io::Write,
+    parameters: impl Fn(&mut Record<'_>, &NamedSurface<'_>) -> Result<(), WriteError>,
 ) -> Result<Summary, WriteError> {
     options.validate()?;
     let coordinates = surfaces
@@ -54,9 +89,9 @@ pub fn write_surfaces(
         let mut record = sheet.begin(Entry {
             label: "SURFACE",
             subscript: index + 1,
-            ..plain_entry(128, level, Status::Independent)
+            ..plain_entry(entity, level, Status::Independent)
         });
-        bspline_parameters(&mut record, own.surface, own.is_closed);
+        parameters(&mut record, own)?;
         // No associativities, one property.
         record.integer(0);
         record.integer(1);

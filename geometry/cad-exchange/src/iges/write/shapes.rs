@@ -83,8 +83,14 @@ fn parametric_surface(
     level: u16,
     surface: &PatchSurface,
 ) -> Result<Pointer, WriteError> {
-    let (columns, rows) = (surface.u_breaks.len() - 1, surface.v_breaks.len() - 1);
     let mut record = sheet.begin(plain_entry(114, level, Status::Dependent));
+    patch_parameters(&mut record, surface);
+    record.finish()
+}
+
+/// The parameters of entity 114.
+pub(super) fn patch_parameters(record: &mut Record<'_>, surface: &PatchSurface) {
+    let (columns, rows) = (surface.u_breaks.len() - 1, surface.v_breaks.len() - 1);
     record.integer(CUBIC);
     // Patches of the full sixteen coefficients.
     record.integer(1);
@@ -95,19 +101,18 @@ fn parametric_surface(
     for (i, column) in surface.patches.chunks(rows).enumerate() {
         for (j, z) in column.iter().enumerate() {
             // x = u and y = v: a constant and a 1 at the power concerned.
-            coordinate(&mut record, surface.u_breaks[i], 1);
-            coordinate(&mut record, surface.v_breaks[j], 4);
+            coordinate(record, surface.u_breaks[i], 1);
+            coordinate(record, surface.v_breaks[j], 4);
             for row in z {
                 record.reals(row);
             }
         }
-        unused_patch(&mut record);
+        unused_patch(record);
     }
     // The standard reserves patches for the last breaks too, with values of no meaning.
     for _ in 0..=rows {
-        unused_patch(&mut record);
+        unused_patch(record);
     }
-    record.finish()
 }
 
 /// Sixteen coefficients of a coordinate that equals one parameter.
