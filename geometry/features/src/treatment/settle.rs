@@ -411,7 +411,7 @@ impl Edge {
                 let mut step = LEAST_STEP_MM;
                 while step < 0.3 * self.reach_mm {
                     let fall = 2.0 * centre - at(&[(index, step)]) - at(&[(index, -step)]);
-                    if !(fall < 4.0) {
+                    if fall.is_nan() || fall >= 4.0 {
                         break;
                     }
                     step *= 1.5;
