@@ -67,18 +67,17 @@ async fn a_scan_ends_in_features_where_they_are_asked_for() -> Result<()> {
     assert_eq!(step.matches("MANIFOLD_SOLID_BREP").count(), 1);
     assert!(result.file("features.png")?.starts_with(b"\x89PNG"));
 
-    let edit = json!([{ "id": 0, "length": 61.5 }]);
-    let edited = rig.rerun_to_result(&ended.scan.id, &[("deliverables.edit", edit)]);
-    let result = rig.result(&edited.await?.result).await?;
+    let edit = [("deliverables.edit", json!([{ "id": 0, "length": 61.5 }]))];
+    let edited = rig.rerun_to_result(&ended.scan.id, &edit).await?;
+    let result = rig.result(&edited.result).await?;
     let told = result.json("features.json")?;
     assert_eq!(told["features"][0]["dimensions_mm"]["length"], 61.5);
     assert_eq!(told["features"][0]["sigma_mm"]["length"], 0.0);
     let rebuilt = String::from_utf8(result.file("block.features.step")?.to_vec())?;
     assert_ne!(rebuilt, step);
 
-    let edit = json!([{ "id": 9, "length": 61.5 }]);
-    let of_none = rig.rerun_to_result(&ended.scan.id, &[("deliverables.edit", edit)]);
-    let of_none = of_none.await?;
+    let edit = [("deliverables.edit", json!([{ "id": 9, "length": 61.5 }]))];
+    let of_none = rig.rerun_to_result(&ended.scan.id, &edit).await?;
     assert!(
         of_none
             .left_out
