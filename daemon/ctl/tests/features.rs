@@ -90,8 +90,8 @@ fn a_block_with_a_hole_is_told_drawn_rebuilt_and_edited() {
         size("diameter")
     );
     assert!((size("depth") - 6.0).abs() < 0.02, "{}", size("depth"));
-    // Wider than the minor diameters of M14 go.
-    assert_eq!(hole["thread_guess"], Value::Null);
+    // 12 mm is what is drilled for M14.
+    assert_eq!(hole["thread_guess"], "M14");
     let fewer = fs::read_to_string(at.join("fewer.xyz")).unwrap();
     let left = told["reduced"]["left"].as_u64().unwrap();
     assert_eq!(fewer.lines().count() as u64, left);
