@@ -1,0 +1,260 @@
+//! Meshes as they come, mended where that is safe.
+
+use std::collections::{HashMap, HashSet};
+
+use super::edges::{Edges, is_down, side_of};
+use super::weld::{weld_equal, weld_near};
+use super::{NONE, TriangleMesh};
+use crate::error::FillError;
+
+/// What was found and done before holes were looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Mended {
+    /// Vertices with the coordinates of others, made one with them.
+    pub welded_equal: usize,
+    /// Vertices on borders so near to others that they are one with them; these moved.
+    pub welded_near: usize,
+    /// Triangles with one vertex twice, left out.
+    pub degenerate: usize,
+    /// Triangles without an area over three vertices, kept since their neighbours hold on to them.
+    pub slivers: usize,
+    /// Triangles over the same vertices as others, left out; pairs that face each other count twice.
+    pub duplicate: usize,
+    /// Triangles turned around so that neighbours agree.
+    pub turned: usize,
+    /// Edges that more than two triangles had.
+    pub non_manifold_edges: usize,
+    /// Triangles left out so that no edge has more than two.
+    pub left_out: usize,
+    /// Edges cut apart since they can be turned no way, as on a Moebius strip.
+    pub one_sided_edges: usize,
+    /// Vertices added so that every fan of triangles that met others only in one has its own; they are
+    /// split once holes are closed, since holes may touch in a vertex.
+    pub split_vertices: usize,
+}
+
+impl Mended {
+    /// Whether nothing but equal vertices was found.
+    #[must_use]
+    pub fn is_clean(&self) -> bool {
+        let own = Self {
+            welded_equal: 0,
+            ..*self
+        };
+        own == Self::default()
+    }
+}
+
+/// Units in the last place of single precision by which vertices of a border are taken for one.
+const NEAR_ULPS: f64 = 4.0;
+
+/// Mends a mesh in place; no vertex moves but those of borders that are welded.
+pub(crate) fn mend(mesh: &mut TriangleMesh, weld_mm: Option<f64>) -> Result<Mended, FillError> {
+    mesh.validate()?;
+    let mut done = Mended {
+        welded_equal: weld_equal(mesh),
+        ..Mended::default()
+    };
+    let given = mesh.triangles.len();
+    drop_degenerate(mesh, &mut done);
+    let within_mm = weld_mm.unwrap_or_else(|| {
+        let largest = mesh.vertices_mm.as_flattened().iter();
+        let largest = largest.fold(0.0_f64, |most, c| most.max(c.abs()));
+        NEAR_ULPS * f64::from(f32::EPSILON) * largest
+    });
+    done.welded_near = weld_near(mesh, within_mm);
+    drop_degenerate(mesh, &mut done);
+    let no_area = |t: &&[u32; 3]| mesh.doubled_area(**t).length_squared() == 0.0;
+    done.slivers = mesh.triangles.iter().filter(no_area).count();
+    if mesh.triangles.len() == done.slivers {
+        return Err(FillError::Degenerate { triangles: given });
+    }
+    drop_duplicates(mesh, &mut done);
+    part_edges(mesh, &mut done);
+    turn(mesh, &mut done);
+    Ok(done)
+}
+
+fn drop_degenerate(mesh: &mut TriangleMesh, done: &mut Mended) {
+    let before = mesh.triangles.len();
+    mesh.triangles
+        .retain(|&[a, b, c]| a != b && b != c && c != a);
+    done.degenerate += before - mesh.triangles.len();
+}
+
+/// Of triangles over the same vertices one is kept, and none of two that face each other: they are a
+/// fold without a volume.
+fn drop_duplicates(mesh: &mut TriangleMesh, done: &mut Mended) {
+    let key = |t: &[u32; 3]| {
+        let mut own = *t;
+        own.sort_unstable();
+        own
+    };
+    let is_even = |t: &[u32; 3]| {
+        let [a, b, c] = *t;
+        (a < b) ^ (b < c) ^ (c < a)
+    };
+    let mut seen: HashMap<[u32; 3], (u32, u32)> = HashMap::with_capacity(mesh.triangles.len());
+    for triangle in &mesh.triangles {
+        let count = seen.entry(key(triangle)).or_default();
+        if is_even(triangle) {
+            count.0 += 1;
+        } else {
+            count.1 += 1;
+        }
+    }
+    if seen.values().all(|own| own.0 + own.1 == 1) {
+        return;
+    }
+    let before = mesh.triangles.len();
+    let mut taken = HashSet::new();
+    mesh.triangles.retain(|triangle| {
+        let own = key(triangle);
+        match seen.get(&own) {
+            Some((even, odd)) if *even > 0 && *odd > 0 => false,
+            Some((even, odd)) if even + odd > 1 => taken.insert(own),
+            _ => true,
+        }
+    });
+    done.duplicate = before - mesh.triangles.len();
+}
+
+/// Leaves out triangles so that no edge has more than two: of those at such an edge the ones that hang
+/// on least, and where all do the same, all but the two that are most nearly one surface.
+fn part_edges(mesh: &mut TriangleMesh, done: &mut Mended) {
+    let mut is_first = true;
+    loop {
+        let edges = Edges::of(&mesh.triangles);
+        // How many edges of each triangle nobody else has.
+        let mut free = vec![0_u8; mesh.triangles.len()];
+        let mut crowded = Vec::new();
+        for group in edges.groups() {
+            match group {
+                [own] => free[side_of(own) as usize / 3] += 1,
+                [_, _] => {}
+                _ => crowded.push(group),
+            }
+        }
+        if is_first {
+            done.non_manifold_edges = crowded.len();
+            is_first = false;
+        }
+        if crowded.is_empty() {
+            return;
+        }
+        let mut is_out = vec![false; mesh.triangles.len()];
+        for group in crowded {
+            let own: Vec<usize> = group.iter().map(|s| side_of(s) as usize / 3).collect();
+            let left: Vec<usize> = own.into_iter().filter(|&t| !is_out[t]).collect();
+            if left.len() <= 2 {
+                continue;
+            }
+            let loosest = left.iter().map(|&t| free[t]).max().unwrap_or(0);
+            if loosest > 0 {
+                left.iter()
+                    .filter(|&&t| free[t] == loosest)
+                    .take(left.len() - 2)
+                    .for_each(|&t| is_out[t] = true);
+                continue;
+            }
+            let pair = flattest(mesh, &left, (group[0].0, group[0].1));
+            left.iter()
+                .filter(|t| !pair.contains(*t))
+                .for_each(|&t| is_out[t] = true);
+        }
+        let before = mesh.triangles.len();
+        let mut outs = is_out.into_iter();
+        mesh.triangles.retain(|_| !outs.next().unwrap_or(false));
+        done.left_out += before - mesh.triangles.len();
+    }
+}
+
+/// Of triangles at an edge the two that turn least across it.
+fn flattest(mesh: &TriangleMesh, triangles: &[usize], (a, b): (u32, u32)) -> [usize; 2] {
+    let axis = (mesh.place(b) - mesh.place(a)).normalize_or_zero();
+    // The direction in which each leaves the edge.
+    let leaves = |t: usize| {
+        let sum: glam::DVec3 = mesh.corners(mesh.triangles[t]).into_iter().sum();
+        let own = sum / 3.0 - mesh.place(a);
+        (own - own.dot(axis) * axis).normalize_or_zero()
+    };
+    let mut best = (f64::INFINITY, [triangles[0], triangles[1]]);
+    for (k, &t) in triangles.iter().enumerate() {
+        for &other in &triangles[k + 1..] {
+            let along = leaves(t).dot(leaves(other));
+            if along < best.0 {
+                best = (along, [t, other]);
+            }
+        }
+    }
+    best.1
+}
+
+/// Turns triangles around so that neighbours run along their edge in opposite senses. Of each component
+/// the fewer are turned. Where no turning will do, edges are cut apart.
+fn turn(mesh: &mut TriangleMesh, done: &mut Mended) {
+    let edges = Edges::of(&mesh.triangles);
+    let count = mesh.triangles.len();
+    // Neighbours across edges, and whether both run the same way along it.
+    let mut beside: Vec<[(u32, bool); 3]> = vec![[(NONE, false); 3]; count];
+    for group in edges.groups() {
+        if let [a, b] = group {
+            let (sa, sb) = (side_of(a), side_of(b));
+            let same = is_down(a) == is_down(b);
+            beside[sa as usize / 3][sa as usize % 3] = (sb / 3, same);
+            beside[sb as usize / 3][sb as usize % 3] = (sa / 3, same);
+        }
+    }
+    let mut turned: Vec<Option<bool>> = vec![None; count];
+    let mut is_torn = vec![false; count];
+    let mut queue = Vec::new();
+    for start in 0..count {
+        if turned[start].is_some() {
+            continue;
+        }
+        turned[start] = Some(false);
+        queue.push(start);
+        let mut next = 0;
+        while next < queue.len() {
+            let own = queue[next];
+            next += 1;
+            let is_turned = turned[own] == Some(true);
+            for &(other, same) in beside[own].iter().filter(|n| n.0 != NONE) {
+                let other = other as usize;
+                match turned[other] {
+                    None => {
+                        turned[other] = Some(is_turned ^ same);
+                        queue.push(other);
+                    }
+                    Some(its) if its != is_turned ^ same => {
+                        is_torn[own] = true;
+                        done.one_sided_edges += 1;
+                    }
+                    Some(_) => {}
+                }
+            }
+        }
+        let many = queue.iter().filter(|&&t| turned[t] == Some(true)).count();
+        if 2 * many > queue.len() {
+            queue.iter().for_each(|&t| turned[t] = turned[t].map(|own| !own));
+        }
+        queue.clear();
+    }
+    for (triangle, turned) in mesh.triangles.iter_mut().zip(&turned) {
+        if *turned == Some(true) {
+            triangle.swap(1, 2);
+            done.turned += 1;
+        }
+    }
+    // Both sides of an edge met it.
+    done.one_sided_edges /= 2;
+    if done.one_sided_edges > 0 {
+        // A triangle beside such an edge gets vertices of its own, which its neighbours do not have.
+        for (triangle, _) in mesh.triangles.iter_mut().zip(&is_torn).filter(|own| *own.1) {
+            for corner in triangle {
+                mesh.vertices_mm.push(mesh.vertices_mm[*corner as usize]);
+                *corner = (mesh.vertices_mm.len() - 1) as u32;
+            }
+        }
+    }
+}
