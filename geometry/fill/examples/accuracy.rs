@@ -19,8 +19,8 @@ fn main() {
     } else {
         vec![None]
     };
-    for shape in Shape::ALL {
-        for share in [0.01_f64, 0.03, 0.1, 0.2, 0.3, 0.4] {
+    for shape in Shape::ALL { if std::env::var("ONLY").is_ok_and(|o| !format!("{shape:?}").contains(&o)) { continue; }
+        for share in [0.01_f64, 0.05, 0.15, 0.25, 0.03, 0.1, 0.2, 0.3, 0.4] {
             for &kernel in &kernels {
                 let edge = (share * 100.0 / 20.0).clamp(0.5, 1.5);
                 let (mut mesh, across) = with_hole(shape, edge, share);

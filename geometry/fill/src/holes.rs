@@ -36,11 +36,13 @@ pub struct Hole {
     pub component: usize,
 }
 
-/// A loop as far across as this share of its part of the mesh is the border of an open sheet: holes of
-/// what is closed otherwise are smaller, and even a hemisphere is not.
-const BORDER_SHARE: f64 = 0.5;
-/// Loops nearly as large as the largest are borders, too: the two ends of a pipe.
-const AS_LARGE: f64 = 0.8;
+/// A loop is a border where the surface beside it does not lead into it: what it encloses as the
+/// surface goes on there, over the area that it spans, is 1 for a hole in a plane, the cosine of its
+/// angle for one in a sphere, 0 for the end of a pipe or the rim of a hemisphere, and -1 for the
+/// border of a flat sheet.
+const LEADS_IN: f64 = 0.3;
+/// A border is not much smaller than its part of the mesh is across.
+const BORDER_SHARE: f64 = 0.05;
 
 /// Connected parts: for each vertex its part, and how far each is across.
 struct Parts {
@@ -92,7 +94,7 @@ pub(crate) fn holes(mesh: &TriangleMesh, loops: Vec<Vec<u32>>, stars: &Stars) ->
         .enumerate()
         .map(|(k, vertices)| measured(mesh, stars, &parts, k + 1, vertices))
         .collect();
-    tell_borders(mesh, &parts, &mut holes);
+    tell_borders(mesh, stars, &parts, &mut holes);
     tell_islands(mesh, &mut holes);
     holes
 }
@@ -142,16 +144,27 @@ fn across(mesh: &TriangleMesh, vertices: &[u32]) -> f64 {
     own[0].distance(own[1])
 }
 
-/// The largest loop of each part that is open is its border.
-fn tell_borders(mesh: &TriangleMesh, parts: &Parts, holes: &mut [Hole]) {
-    let spans: Vec<f64> = holes.iter().map(|h| across(mesh, &h.vertices)).collect();
-    let mut largest = vec![0.0_f64; parts.across_mm.len()];
-    for (hole, span) in holes.iter().zip(&spans) {
-        largest[hole.component] = largest[hole.component].max(*span);
+/// How far the surface beside a loop leads into it, as [`LEADS_IN`] has it.
+fn leads_in(mesh: &TriangleMesh, stars: &Stars, hole: &Hole) -> f64 {
+    let (mut flux, mut area) = (0.0, DVec3::ZERO);
+    for (k, &own) in hole.vertices.iter().enumerate() {
+        let next = hole.vertices[(k + 1) % hole.vertices.len()];
+        let (a, b) = (mesh.place(own), mesh.place(next));
+        let normal = stars.beside(mesh, next, own).normalize_or_zero();
+        // As long as the edge, along the surface and away from the triangle.
+        let inward = normal.cross(b - a);
+        flux += 0.5 * inward.dot(hole.centre_mm - 0.5 * (a + b));
+        area += 0.5 * (a - hole.centre_mm).cross(b - hole.centre_mm);
     }
-    for (hole, span) in holes.iter_mut().zip(&spans) {
-        let is_open = *span >= BORDER_SHARE * parts.across_mm[hole.component];
-        if is_open && *span >= AS_LARGE * largest[hole.component] {
+    let area = area.length();
+    if area > 0.0 { flux / area } else { 1.0 }
+}
+
+fn tell_borders(mesh: &TriangleMesh, stars: &Stars, parts: &Parts, holes: &mut [Hole]) {
+    for hole in holes {
+        let is_large =
+            across(mesh, &hole.vertices) >= BORDER_SHARE * parts.across_mm[hole.component];
+        if is_large && leads_in(mesh, stars, hole) < LEADS_IN {
             hole.kind = HoleKind::Border;
         }
     }

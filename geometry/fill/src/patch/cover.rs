@@ -21,6 +21,9 @@ impl Cost {
     }
 }
 
+/// Twice the area of a triangle that has none, of its longest side's square.
+const SLIVER: f64 = 1e-3;
+
 /// Triangles of a polygon as places in its chain, such that the largest angle between neighbours, those
 /// outside included, is the least, and of these the area (Barequet & Sharir 1995; Liepa 2003).
 ///
@@ -69,7 +72,13 @@ pub(super) fn cover(
                 let doubled = (places[k] - places[i]).cross(places[j] - places[i]);
                 let area = doubled.length();
                 let normal = doubled.normalize_or_zero();
-                let mut most = left.bend.max(right.bend);
+                let longest = places[i]
+                    .distance_squared(places[j])
+                    .max(places[i].distance_squared(places[k]))
+                    .max(places[k].distance_squared(places[j]));
+                // What has no area bends as far as anything can.
+                let flat = if area <= SLIVER * longest { 2.0 } else { 0.0 };
+                let mut most = left.bend.max(right.bend).max(flat);
                 most = most.max(bend(normals[index(i, k)], normal));
                 most = most.max(bend(normals[index(k, j)], normal));
                 if is_whole {

@@ -8,9 +8,9 @@ use super::cover::cover;
 use super::fair::{Ghost, fair};
 use super::net::Net;
 use super::polygon::{Polygon, border_sizes};
-use super::relax::{foot, refine, relax};
+use super::relax::{foot, refine, relax, unfold};
 use crate::implicit::Implicit;
-use crate::mesh::{Stars, TriangleMesh};
+use crate::mesh::{NONE, Stars, TriangleMesh, ends};
 
 /// Elements over the vertices of a border and new ones.
 #[derive(Debug, Clone)]
@@ -82,8 +82,10 @@ pub(crate) fn grow(
     };
     let triangles = cover(&spots, &outside, never).ok_or(Trouble::NoCover)?;
     let triangles: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|k| chain[k])).collect();
+    let normal = |at: &DVec3| surface.map_or(DVec3::ZERO, |own| own.at(*at).1.normalize_or_zero());
     let mut net = Net {
         fixed: places.len(),
+        normals: places.iter().map(normal).collect(),
         sizes: coarse_sizes(&places, &chain, &sizes),
         places,
         triangles,
@@ -93,10 +95,36 @@ pub(crate) fn grow(
     insert_skipped(&mut net, polygon, &coarse);
     finish_sizes(&mut net, &sizes);
     refine(&mut net, surface, &is_forbidden);
-    if !net.is_manifold() {
+    if !(net.is_manifold() && has_sides(&net, polygon) && !has_forbidden(&net, &is_forbidden)) {
         return Err(Trouble::NotManifold);
     }
     Ok(Patch::of(polygon, net))
+}
+
+/// Whether all sides of the polygon are there; with a manifold net, nothing else is its border.
+fn has_sides(net: &Net, polygon: &Polygon) -> bool {
+    let sides = net.triangles.iter();
+    let sides: HashSet<(u32, u32)> = sides
+        .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)])
+        .collect();
+    let count = polygon.chain.len();
+    (0..count)
+        .filter(|&k| polygon.outside[k].is_some())
+        .all(|k| {
+            let (from, to) = (polygon.chain[k], polygon.chain[(k + 1) % count]);
+            sides.contains(&(from, to)) && !sides.contains(&(to, from))
+        })
+}
+
+/// Whether an inner edge runs where the mesh has one.
+fn has_forbidden(net: &Net, is_forbidden: &impl Fn(u32, u32) -> bool) -> bool {
+    let opposite = net.opposite();
+    (0..opposite.len() as u32).any(|side| {
+        let (a, b) = ends(&net.triangles, side);
+        let is_inner = opposite[side as usize] != NONE;
+        let is_fixed = (a.max(b) as usize) < net.fixed;
+        is_inner && is_fixed && is_forbidden(a, b)
+    })
 }
 
 /// Normals outside the edges of the coarse polygon: the mean over what each skips.
@@ -160,9 +188,11 @@ fn shape(
     surface: Option<&Implicit>,
     is_forbidden: &impl Fn(u32, u32) -> bool,
 ) {
+    // Normals of the surface say nothing as long as the net is not on it.
+    let normals = std::mem::replace(&mut net.normals, vec![DVec3::ZERO; net.places.len()]);
     for _ in 0..FAIR_ROUNDS {
         for _ in 0..8 {
-            let split = net.split(&|at, _| at);
+            let split = net.split(&|at, _| (at, DVec3::ZERO));
             net.flip(is_forbidden);
             if split == 0 {
                 break;
@@ -174,21 +204,24 @@ fn shape(
     if surface.is_none() {
         return;
     }
+    net.normals[..net.fixed].copy_from_slice(&normals[..net.fixed]);
     for v in net.fixed..net.places.len() {
         let reach = 4.0 * net.sizes[v];
-        net.places[v] = foot(surface, net.places[v], reach).unwrap_or(net.places[v]);
+        if let Some(found) = foot(surface, net.places[v], reach) {
+            (net.places[v], net.normals[v]) = found;
+        }
     }
     for _ in 0..RELAXED {
         net.flip(is_forbidden);
         relax(net, surface);
     }
+    unfold(net, surface, is_forbidden);
 }
 
 /// Puts the border vertices that the coarse polygon skips back in: a fan in place of the triangle at
 /// the edge that skips them.
 fn insert_skipped(net: &mut Net, polygon: &Polygon, coarse: &[usize]) {
     let count = polygon.chain.len();
-    let mut more = Vec::new();
     for k in 0..coarse.len() {
         let from = coarse[k];
         let to = coarse.get(k + 1).copied().unwrap_or(coarse[0] + count);
@@ -203,9 +236,10 @@ fn insert_skipped(net: &mut Net, polygon: &Polygon, coarse: &[usize]) {
         };
         let apex = own.iter().copied().find(|&v| v != a && v != b).unwrap_or(a);
         *own = [a, at(from + 1), apex];
-        more.extend((from + 1..to).map(|j| [at(j), at(j + 1), apex]));
+        // A later edge may be one of these triangles'.
+        net.triangles
+            .extend((from + 1..to).map(|j| [at(j), at(j + 1), apex]));
     }
-    net.triangles.extend(more);
 }
 
 /// Wanted lengths of the whole border, and of new vertices as their neighbours have them.

@@ -12,6 +12,8 @@ pub(crate) struct Net {
     pub(crate) places: Vec<DVec3>,
     /// Wanted length of edges at each vertex.
     pub(crate) sizes: Vec<f64>,
+    /// Unit normal of the surface at each vertex; zero where it is not known.
+    pub(crate) normals: Vec<DVec3>,
     /// Vertices of the border.
     pub(crate) fixed: usize,
     pub(crate) triangles: Vec<[u32; 3]>,
@@ -23,7 +25,13 @@ const SHORT: f64 = 0.55;
 /// Passes of flips.
 const MOST_FLIPS: usize = 12;
 
+/// Twice the area of a triangle that has none, of its longest side's square.
+const SLIVER: f64 = 1e-4;
+
 type Edge = (u32, u32);
+
+/// A place on the surface, and the unit normal there.
+pub(crate) type Placed = (DVec3, DVec3);
 
 fn sorted(a: u32, b: u32) -> Edge {
     (a.min(b), a.max(b))
@@ -58,6 +66,36 @@ impl Net {
         })
     }
 
+    /// Whether a triangle does not look the way that a normal does, or has no area.
+    pub(crate) fn faces_away(&self, triangle: [u32; 3], normal: DVec3) -> bool {
+        let [a, b, c] = triangle.map(|v| self.places[v as usize]);
+        let longest = a
+            .distance_squared(b)
+            .max(b.distance_squared(c))
+            .max(c.distance_squared(a));
+        let length = normal.length();
+        length > 0.0 && self.doubled_area(triangle).dot(normal) <= SLIVER * longest * length
+    }
+
+    /// The surface's normal at a triangle; its own where that is not known.
+    pub(crate) fn normal_at(&self, triangle: [u32; 3]) -> DVec3 {
+        let sum: DVec3 = triangle.map(|v| self.normals[v as usize]).into_iter().sum();
+        if sum == DVec3::ZERO {
+            self.doubled_area(triangle)
+        } else {
+            sum
+        }
+    }
+
+    /// Triangles that do not look the way that the surface does.
+    pub(crate) fn folds(&self) -> Vec<usize> {
+        let is_folded = |t: &usize| {
+            let own = self.triangles[*t];
+            self.faces_away(own, self.normal_at(own))
+        };
+        (0..self.triangles.len()).filter(is_folded).collect()
+    }
+
     fn ratio(&self, a: u32, b: u32) -> f64 {
         let wanted = 0.5 * (self.sizes[a as usize] + self.sizes[b as usize]);
         self.places[a as usize].distance(self.places[b as usize]) / wanted
@@ -65,7 +103,7 @@ impl Net {
 
     /// Splits inner edges that are too long, longest first, none twice beside another; how many.
     /// `place` puts the middle of an edge where the surface is.
-    pub(crate) fn split(&mut self, place: &(impl Fn(DVec3, f64) -> DVec3 + Sync)) -> usize {
+    pub(crate) fn split(&mut self, place: &(impl Fn(DVec3, f64) -> Placed + Sync)) -> usize {
         use rayon::prelude::*;
         let opposite = self.opposite();
         let mut long: Vec<(f64, u32)> = (0..opposite.len() as u32)
@@ -91,14 +129,15 @@ impl Net {
             let (p, q) = (self.places[a as usize], self.places[b as usize]);
             place(0.5 * (p + q), p.distance(q))
         };
-        let middles: Vec<DVec3> = long.par_iter().with_min_len(8).map(middle).collect();
-        for (&(_, side), at) in long.iter().zip(middles) {
+        let middles: Vec<Placed> = long.par_iter().with_min_len(8).map(middle).collect();
+        for (&(_, side), (at, normal)) in long.iter().zip(middles) {
             let across = opposite[side as usize];
             let (a, b) = ends(&self.triangles, side);
             let corner = |s: u32| self.triangles[s as usize / 3][(s as usize % 3 + 2) % 3];
             let (c, d) = (corner(side), corner(across));
             let m = self.places.len() as u32;
             self.places.push(at);
+            self.normals.push(normal);
             self.sizes.push(0.5 * (self.sizes[a as usize] + self.sizes[b as usize]));
             self.triangles[side as usize / 3] = [a, m, c];
             self.triangles[across as usize / 3] = [b, m, d];
@@ -151,15 +190,23 @@ impl Net {
 
     /// Whether an edge c-d is better than a-b between triangles abc and bad.
     fn is_better(&self, a: u32, b: u32, c: u32, d: u32) -> bool {
-        let (old, other) = (self.doubled_area([a, b, c]), self.doubled_area([b, a, d]));
-        let (new, next) = (self.doubled_area([a, d, c]), self.doubled_area([d, b, c]));
-        let side = old + other;
-        if new.dot(side) <= 0.0 || next.dot(side) <= 0.0 || new.dot(next) <= 0.0 {
-            // Both ways are folded where the old one is, and then roundness decides.
-            return old.dot(other) <= 0.0 && new.dot(next) > 0.0;
+        let sum: DVec3 = [a, b, c, d].map(|v| self.normals[v as usize]).into_iter().sum();
+        let old = [[a, b, c], [b, a, d]];
+        let normal = if sum == DVec3::ZERO {
+            old.map(|t| self.doubled_area(t)).into_iter().sum()
+        } else {
+            sum
+        };
+        let folded = |pair: [[u32; 3]; 2]| {
+            let own = pair.into_iter().filter(|&t| self.faces_away(t, normal));
+            own.count()
+        };
+        let (before, after) = (folded(old), folded([[a, d, c], [d, b, c]]));
+        if before != after {
+            return after < before;
         }
-        if old.dot(other) <= 0.0 {
-            return true;
+        if after > 0 {
+            return false;
         }
         let at = |v: u32| self.places[v as usize];
         let angle = |apex: u32| {
@@ -209,7 +256,8 @@ impl Net {
                 let new = own.map(moved);
                 let is_gone = new[0] == new[1] || new[1] == new[2] || new[2] == new[0];
                 let (before, after) = (self.doubled_area(own), self.doubled_area(new));
-                is_gone || after.dot(before) > 0.5 * after.length() * before.length()
+                let turns = after.dot(before) <= 0.5 * after.length() * before.length();
+                is_gone || !(turns || self.faces_away(new, self.normal_at(new)))
             });
             let too_long = of_u.iter().any(|&w| w != v && self.ratio(v, w) > LONG);
             if !holds || too_long {
@@ -248,11 +296,13 @@ impl Net {
                 new_of[v] = count as u32;
                 self.places[count] = self.places[v];
                 self.sizes[count] = self.sizes[v];
+                self.normals[count] = self.normals[v];
                 count += 1;
             }
         }
         self.places.truncate(count);
         self.sizes.truncate(count);
+        self.normals.truncate(count);
         for corner in self.triangles.as_flattened_mut() {
             *corner = new_of[*corner as usize];
         }
