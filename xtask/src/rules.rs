@@ -42,6 +42,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("surfacing", &["nurbs", "range-image"]),
     ("toolpath", &["range-image"]),
     ("terraces", &["nurbs"]),
+    ("fill", &["nurbs", "range-image"]),
     ("features", &["nurbs", "range-image", "segment", "terraces"]),
     (
         "pipeline",
@@ -154,11 +155,13 @@ const DAEMON: [&str; 18] = [
     "toolpath",
 ];
 
-const COMMAND_LINE: [&str; 22] = [
+const COMMAND_LINE: [&str; 24] = [
     "cad-exchange",
     "compare",
     "deliverables",
     "features",
+    "fill",
+    "mesh-files",
     "nurbs",
     "pipeline",
     "range-image",

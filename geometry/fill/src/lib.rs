@@ -23,6 +23,7 @@ mod patch;
 mod region;
 mod run;
 mod settings;
+mod yoo;
 
 pub use error::FillError;
 pub use holes::{Hole, HoleKind};
@@ -30,3 +31,4 @@ pub use implicit::{FitSettings, Implicit, ImplicitError, Kernel, Sample, Smoothi
 pub use mesh::{Mended, TriangleMesh};
 pub use run::{Filled, HoleReport, Outcome, Survey, fill, survey};
 pub use settings::{Method, Precision, Settings};
+pub use yoo::TrimmedPatch;

@@ -8,13 +8,14 @@ use rayon::prelude::*;
 
 use crate::error::FillError;
 use crate::holes::{Hole, HoleKind, holes};
-use crate::implicit::{FitSettings, Implicit, Kernel};
+use crate::implicit::{FitSettings, Implicit, Kernel, Solver};
 use crate::loops::loops;
 use crate::meet::meetings;
 use crate::mesh::{Edges, Mended, Stars, TriangleMesh, mend, split_fans};
 use crate::patch::{Patch, Polygon, Trouble, grow};
-use crate::region::around;
+use crate::region::{around, edge_length, mean_normal};
 use crate::settings::{Method, Precision, Settings};
+use crate::yoo::{Base, Trim, TrimmedPatch, Unseen, base, elements, trim};
 
 /// What a mesh is, before anything is closed.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,6 +67,8 @@ pub struct HoleReport {
     pub hole: Hole,
     /// What became of it.
     pub outcome: Outcome,
+    /// The hole as a trimmed surface, where that was asked for; or why it has none.
+    pub patch: Option<Result<TrimmedPatch, String>>,
 }
 
 /// A mesh with its holes closed.
@@ -85,6 +88,8 @@ pub struct Filled {
 const CENTRES_PER_VERTEX: usize = 6;
 const FEWEST_CENTRES: usize = 160;
 const MOST_CENTRES: usize = 600;
+/// Most points whose whole system is eliminated by the paper's way.
+const MOST_ELIMINATED: usize = 2500;
 
 struct Prepared {
     mesh: TriangleMesh,
@@ -145,6 +150,7 @@ pub fn fill(
         })
         .collect();
     let mut patches: Vec<Option<Patch>> = vec![None; plan.len()];
+    let mut trimmed: Vec<Option<Result<TrimmedPatch, String>>> = vec![None; plan.len()];
     let mut left: Vec<usize> = (0..plan.len())
         .filter(|&k| matches!(plan[k], Planned::Close(_)))
         .collect();
@@ -185,9 +191,10 @@ pub fn fill(
         monitor.check()?;
         for (&k, found) in left.iter().zip(found) {
             match found {
-                Some(Ok((patch, outcome))) => {
-                    patches[k] = Some(patch);
-                    outcomes[k] = outcome;
+                Some(Ok(closed)) => {
+                    patches[k] = Some(closed.patch);
+                    outcomes[k] = closed.outcome;
+                    trimmed[k] = closed.trimmed;
                 }
                 Some(Err(trouble)) => outcomes[k] = open(trouble),
                 None => {}
@@ -202,6 +209,7 @@ pub fn fill(
         for (k, count) in bad.into_iter().enumerate() {
             if count > 0 {
                 patches[k] = None;
+                trimmed[k] = None;
                 outcomes[k] = open(Trouble::Intersects(count));
                 left.push(k);
             }
@@ -209,7 +217,7 @@ pub fn fill(
         left.sort_unstable();
     }
     monitor.progress(1.0);
-    Ok(joined(prepared, patches, outcomes))
+    Ok(joined(prepared, patches, outcomes, trimmed))
 }
 
 fn open(trouble: Trouble) -> Outcome {
@@ -250,21 +258,57 @@ fn planned(holes: &[Hole], settings: &Settings) -> Vec<Planned> {
 /// Ways to close a hole, in the order in which they are tried.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Attempt {
-    /// By an implicit surface.
+    /// On a trimmed surface of patches through an implicit surface.
+    Trimmed(Kernel),
+    /// On an implicit surface.
     Surface(Kernel),
     /// By a fair net alone.
     Fair,
 }
 
-fn attempts(settings: &Settings) -> Vec<Attempt> {
-    let first = settings.kernel();
-    let mut kernels: Vec<Kernel> = vec![first];
-    if settings.method == Method::Relief && first == Kernel::Quintic {
-        kernels.push(Kernel::Triharmonic);
+impl Attempt {
+    fn kernel(self) -> Option<Kernel> {
+        match self {
+            Self::Trimmed(kernel) | Self::Surface(kernel) => Some(kernel),
+            Self::Fair => None,
+        }
     }
-    let mut own: Vec<Attempt> = kernels.into_iter().map(Attempt::Surface).collect();
-    own.push(Attempt::Fair);
-    own
+}
+
+fn attempts(settings: &Settings) -> Vec<Attempt> {
+    let kernel = settings.kernel();
+    match settings.method {
+        // What its mean normal does not see whole is closed on the same surface itself.
+        Method::Yoo => vec![Attempt::Trimmed(kernel), Attempt::Surface(kernel), Attempt::Fair],
+        Method::Relief if kernel == Kernel::Quintic => vec![
+            Attempt::Surface(kernel),
+            Attempt::Surface(Kernel::Triharmonic),
+            Attempt::Fair,
+        ],
+        Method::Relief => vec![Attempt::Surface(kernel), Attempt::Fair],
+    }
+}
+
+/// A hole that is closed, as far as its own elements go.
+struct Closed {
+    patch: Patch,
+    outcome: Outcome,
+    trimmed: Option<Result<TrimmedPatch, String>>,
+}
+
+fn fit_settings(kernel: Kernel, method: Method, points: usize, border: usize) -> FitSettings {
+    let most = (CENTRES_PER_VERTEX * border).clamp(FEWEST_CENTRES, MOST_CENTRES);
+    let is_whole = method == Method::Yoo && points <= MOST_ELIMINATED;
+    FitSettings {
+        kernel,
+        most_centres: most,
+        solver: if is_whole {
+            Solver::Elimination
+        } else {
+            Solver::Levels
+        },
+        ..FitSettings::default()
+    }
 }
 
 fn attempted(
@@ -273,7 +317,7 @@ fn attempted(
     islands: &[usize],
     attempt: Attempt,
     settings: &Settings,
-) -> Result<(Patch, Outcome), Trouble> {
+) -> Result<Closed, Trouble> {
     let Prepared {
         mesh,
         stars,
@@ -282,40 +326,98 @@ fn attempted(
     let hole = &survey.holes[k];
     let islands: Vec<&Hole> = islands.iter().map(|&k| &survey.holes[k]).collect();
     let loops: Vec<&Hole> = std::iter::once(hole).chain(islands.iter().copied()).collect();
-    let polygon = Polygon::of(mesh, stars, hole, &islands);
-    let mut points = 0;
-    let surface = match attempt {
-        Attempt::Fair => None,
-        Attempt::Surface(kernel) => {
-            let samples = around(mesh, stars, &loops, hole.size_mm);
-            points = samples.len();
-            let most = (CENTRES_PER_VERTEX * polygon.chain.len()).clamp(FEWEST_CENTRES, MOST_CENTRES);
-            let fit = FitSettings {
-                kernel,
-                most_centres: most,
-                ..FitSettings::default()
-            };
-            Implicit::fit(&samples, hole.size_mm, &fit).ok()
+    let samples = match attempt {
+        Attempt::Fair => Vec::new(),
+        _ => around(mesh, stars, &loops, hole.size_mm),
+    };
+    let border: usize = loops.iter().map(|own| own.vertices.len()).sum();
+    let surface = attempt.kernel().and_then(|kernel| {
+        let fit = fit_settings(kernel, settings.method, samples.len(), border);
+        Implicit::fit(&samples, hole.size_mm, &fit).ok()
+    });
+    let seen = surface.as_ref().map(|own| {
+        let wanted = settings.patches || matches!(attempt, Attempt::Trimmed(_));
+        wanted.then(|| Seen::of(prepared, &loops, own, mean_normal(&samples), settings))
+    });
+    let seen = seen.flatten();
+    let mut patch = match (attempt, &seen) {
+        (Attempt::Trimmed(_), Some(Ok(seen))) => seen.elements(&loops)?,
+        (Attempt::Trimmed(_), Some(Err(unseen))) => return Err(Trouble::Unseen(*unseen)),
+        _ => {
+            let polygon = Polygon::of(mesh, stars, hole, &islands);
+            grow(mesh, stars, &polygon, surface.as_ref(), settings.max_edge_mm)?
         }
     };
-    let mut patch = grow(mesh, stars, &polygon, surface.as_ref(), settings.max_edge_mm)?;
     if settings.precision == Precision::Single {
         for place in &mut patch.places {
             *place = DVec3::from_array(place.to_array().map(|c| f64::from(c as f32)));
         }
     }
     let outcome = Outcome::Filled {
-        kernel: match attempt {
-            Attempt::Surface(kernel) if surface.is_some() => Some(kernel),
-            _ => None,
-        },
-        points,
+        kernel: attempt.kernel().filter(|_| surface.is_some()),
+        points: samples.len(),
         centres: surface.as_ref().map_or(0, Implicit::centres),
         noise_mm: surface.as_ref().map_or(0.0, Implicit::noise_mm),
         vertices: patch.places.len(),
         triangles: patch.triangles.len(),
     };
-    Ok((patch, outcome))
+    let trimmed = settings.patches.then(|| match seen {
+        Some(Ok(seen)) => {
+            let patch = seen.trim.patch(hole.number, &seen.base);
+            patch.ok_or_else(|| Unseen::NoElements.to_string())
+        }
+        Some(Err(unseen)) => Err(unseen.to_string()),
+        None => Err("no implicit surface closes it".to_owned()),
+    });
+    Ok(Closed {
+        patch,
+        outcome,
+        trimmed,
+    })
+}
+
+/// A hole on its base surface.
+struct Seen {
+    base: Base,
+    trim: Trim,
+    edge_mm: f64,
+}
+
+impl Seen {
+    fn of(
+        prepared: &Prepared,
+        loops: &[&Hole],
+        surface: &Implicit,
+        normal: DVec3,
+        settings: &Settings,
+    ) -> Result<Self, Unseen> {
+        let Prepared { mesh, stars, .. } = prepared;
+        let places = |own: &&Hole| own.vertices.iter().map(|&v| mesh.place(v)).collect();
+        let rings: Vec<Vec<DVec3>> = loops.iter().map(places).collect();
+        let (mut sum, mut count) = (0.0, 0.0);
+        for &vertex in loops.iter().flat_map(|own| &own.vertices) {
+            sum += edge_length(mesh, stars, vertex);
+            count += 1.0;
+        }
+        let edge_mm = settings.max_edge_mm.map_or(sum / count, |most| (0.75 * most).min(sum / count));
+        let base = base(surface, &rings, normal, edge_mm)?;
+        let trim = trim(&base, &rings)?;
+        Ok(Self {
+            base,
+            trim,
+            edge_mm,
+        })
+    }
+
+    fn elements(&self, loops: &[&Hole]) -> Result<Patch, Trouble> {
+        let (places, triangles) =
+            elements(&self.base, &self.trim, self.edge_mm).map_err(Trouble::Unseen)?;
+        Ok(Patch {
+            border: loops.iter().flat_map(|own| own.vertices.clone()).collect(),
+            places,
+            triangles,
+        })
+    }
 }
 
 fn corners(mesh: &TriangleMesh, patch: &Patch) -> Vec<[DVec3; 3]> {
@@ -327,7 +429,12 @@ fn corners(mesh: &TriangleMesh, patch: &Patch) -> Vec<[DVec3; 3]> {
     patch.triangles.iter().map(|t| t.map(at)).collect()
 }
 
-fn joined(prepared: Prepared, patches: Vec<Option<Patch>>, outcomes: Vec<Outcome>) -> Filled {
+fn joined(
+    prepared: Prepared,
+    patches: Vec<Option<Patch>>,
+    outcomes: Vec<Outcome>,
+    trimmed: Vec<Option<Result<TrimmedPatch, String>>>,
+) -> Filled {
     let Prepared {
         mut mesh, survey, ..
     } = prepared;
@@ -343,13 +450,17 @@ fn joined(prepared: Prepared, patches: Vec<Option<Patch>>, outcomes: Vec<Outcome
     }
     let mut mended = survey.mended;
     mended.split_vertices = split_fans(&mut mesh);
-    let holes = survey.holes.into_iter().zip(outcomes);
+    let holes = survey.holes.into_iter().zip(outcomes).zip(trimmed);
     Filled {
         mesh,
         old_triangles,
         mended,
         holes: holes
-            .map(|(hole, outcome)| HoleReport { hole, outcome })
+            .map(|((hole, outcome), patch)| HoleReport {
+                hole,
+                outcome,
+                patch,
+            })
             .collect(),
     }
 }

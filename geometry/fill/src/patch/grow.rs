@@ -11,6 +11,7 @@ use super::polygon::{Polygon, border_sizes};
 use super::relax::{foot, refine, relax, unfold};
 use crate::implicit::Implicit;
 use crate::mesh::{NONE, Stars, TriangleMesh, ends};
+use crate::yoo::Unseen;
 
 /// Elements over the vertices of a border and new ones.
 #[derive(Debug, Clone)]
@@ -35,6 +36,9 @@ pub(crate) enum Trouble {
     /// It would run through itself or the mesh.
     #[error("a filling would run through {0} triangles of itself or of the mesh")]
     Intersects(usize),
+    /// It has no base surface.
+    #[error(transparent)]
+    Unseen(Unseen),
 }
 
 /// Inner edges of the coarse net, as a share of the hole's size, where its polygon is finer.

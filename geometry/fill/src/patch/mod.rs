@@ -13,6 +13,4 @@ mod polygon;
 mod relax;
 
 pub(crate) use grow::{Patch, Trouble, grow};
-pub(crate) use net::Net;
-pub(crate) use polygon::{Polygon, border_sizes};
-pub(crate) use relax::refine;
+pub(crate) use polygon::Polygon;
