@@ -179,7 +179,7 @@ mod tests {
         assert!(!meet(&flat, &beside));
         let within = triangle([[1.0, 1.0, 0.0], [1.5, 1.0, 0.0], [1.0, 1.5, 0.0]]);
         assert!(meet(&flat, &within));
-        let from_corner = triangle([[0.0, 0.0, 0.0], [3.0, 3.0, -1.0], [3.0, 3.0, 1.0]]);
+        let from_corner = triangle([[0.0, 0.0, 0.0], [3.0, -3.0, -1.0], [3.0, -3.0, 1.0]]);
         assert!(!meet(&flat, &from_corner));
         let through_corner = triangle([[0.0, 0.0, 0.0], [1.0, 1.0, -1.0], [1.0, 1.0, 1.0]]);
         assert!(meet(&flat, &through_corner));

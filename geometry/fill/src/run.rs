@@ -12,7 +12,7 @@ use crate::implicit::{FitSettings, Implicit, Kernel, Solver};
 use crate::loops::loops;
 use crate::meet::meetings;
 use crate::mesh::{Edges, Mended, Stars, TriangleMesh, mend, split_fans};
-use crate::patch::{Patch, Polygon, Trouble, grow};
+use crate::patch::{Ground, Patch, Polygon, Trouble, grow};
 use crate::region::{around, edge_length, mean_normal};
 use crate::settings::{Method, Precision, Settings};
 use crate::yoo::{Base, Trim, TrimmedPatch, Unseen, base, elements, trim};
@@ -176,7 +176,12 @@ pub fn fill(
             let Planned::Close(islands) = &plan[k] else {
                 return None;
             };
-            let own = attempted(&prepared, k, islands, *attempt, settings);
+            // The surface beside a border leads away from it.
+            let attempt = match prepared.survey.holes[k].kind {
+                HoleKind::Border => Attempt::Fair,
+                _ => *attempt,
+            };
+            let own = attempted(&prepared, k, islands, attempt, settings);
             let count = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             if is_first
                 && let Ok(mut told) = told.lock()
@@ -345,7 +350,12 @@ fn attempted(
         (Attempt::Trimmed(_), Some(Err(unseen))) => return Err(Trouble::Unseen(*unseen)),
         _ => {
             let polygon = Polygon::of(mesh, stars, hole, &islands);
-            grow(mesh, stars, &polygon, surface.as_ref(), settings.max_edge_mm)?
+            let ground = match &surface {
+                Some(own) => Ground::Surface(own),
+                None if hole.kind == HoleKind::Border => Ground::Flat,
+                None => Ground::Fair,
+            };
+            grow(mesh, stars, &polygon, ground, settings.max_edge_mm)?
         }
     };
     if settings.precision == Precision::Single {

@@ -142,11 +142,12 @@ fn the_border_of_a_sheet_stays_open() {
     assert_eq!(kinds, [HoleKind::Border, HoleKind::Hole]);
     let own = filled(&mesh, &Settings::default());
     assert_eq!(own.holes[0].outcome, Outcome::Border);
+    // Straight across it there is the sheet itself.
     let forced = Settings {
         force: [1].into(),
         ..Settings::default()
     };
-    assert!(is_watertight(&filled(&mesh, &forced).mesh));
+    assert_eq!(filled(&mesh, &forced).open(), [1].into());
     let kept = Settings {
         keep: [2].into(),
         ..Settings::default()
@@ -154,6 +155,28 @@ fn the_border_of_a_sheet_stays_open() {
     let kept = filled(&mesh, &kept);
     assert_eq!(kept.holes[1].outcome, Outcome::Kept);
     assert_eq!(kept.mesh.triangles, mesh.triangles);
+}
+
+#[test]
+fn the_ends_of_a_pipe_are_closed_on_demand() {
+    let (mesh, _) = with_hole(Shape::Cylinder, 4.0, 0.15);
+    let found = survey(mesh.clone(), &Settings::default()).unwrap();
+    let numbers = |kind: HoleKind| {
+        let own = found.holes.iter().filter(move |hole| hole.kind == kind);
+        own.map(|hole| hole.number).collect::<Vec<_>>()
+    };
+    assert_eq!(numbers(HoleKind::Hole).len(), 1);
+    let ends = numbers(HoleKind::Border);
+    assert_eq!(ends.len(), 2);
+    let forced = Settings {
+        force: ends.into_iter().collect(),
+        ..Settings::default()
+    };
+    let own = filled(&mesh, &forced);
+    assert!(is_watertight(&own.mesh), "{:?}", own.holes);
+    // Flat ones: nothing is beyond them.
+    let heights = new_places(&own).into_iter().map(|p| p.z);
+    assert!(heights.into_iter().all(|z| (-1e-9..=100.0 + 1e-9).contains(&z)));
 }
 
 #[test]

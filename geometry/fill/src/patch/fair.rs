@@ -16,7 +16,8 @@ pub(super) struct Ghost {
 const GHOST_WEIGHT: f64 = 2.0;
 
 /// Moves new vertices to where the squares of all umbrellas, differences of vertices to the mean of
-/// their neighbours, sum up to the least: a thin plate that is clamped along its border.
+/// their neighbours, sum up to the least: a thin plate that is clamped along its border. Without ghosts
+/// to clamp it: a membrane, each new vertex in the middle of its neighbours.
 pub(super) fn fair(net: &mut Net, ghosts: &[Ghost]) {
     let (fixed, count) = (net.fixed, net.places.len());
     let inner = count - fixed;
@@ -42,7 +43,8 @@ pub(super) fn fair(net: &mut Net, ghosts: &[Ghost]) {
     // Rows of the umbrellas: coefficients of new vertices, and what the fixed ones give.
     let mut normal = Square::zero(inner);
     let mut right = [vec![0.0; inner], vec![0.0; inner], vec![0.0; inner]];
-    for v in 0..count {
+    let first = if ghosts.is_empty() { fixed } else { 0 };
+    for v in first..count {
         let total: f64 = around[v].iter().map(|n| n.1).sum::<f64>() + outside[v].1;
         if total == 0.0 {
             continue;

@@ -36,6 +36,9 @@ pub(crate) enum Trouble {
     /// It would run through itself or the mesh.
     #[error("a filling would run through {0} triangles of itself or of the mesh")]
     Intersects(usize),
+    /// It grows without end.
+    #[error("a filling would take more than {0} vertices: nothing bounds it")]
+    TooMany(usize),
     /// It has no base surface.
     #[error(transparent)]
     Unseen(Unseen),
@@ -47,6 +50,10 @@ const COARSE_SHARE: f64 = 0.125;
 const FAIR_ROUNDS: usize = 4;
 /// Rounds in which it is relaxed on the surface.
 const RELAXED: usize = 4;
+/// Most new vertices of a coarse net.
+const MOST_COARSE: usize = 800;
+/// Most vertices of one filling.
+const MOST_VERTICES: usize = 4_000_000;
 
 impl Patch {
     fn of(polygon: &Polygon, net: Net) -> Self {
@@ -58,14 +65,29 @@ impl Patch {
     }
 }
 
-/// Closes a polygon with elements on a surface, or with a fair net where there is none.
+/// What elements lie on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Ground<'a> {
+    /// An implicit surface.
+    Surface(&'a Implicit),
+    /// Nothing; they go on as the mesh does at the border.
+    Fair,
+    /// Nothing; they go straight across.
+    Flat,
+}
+
+/// Closes a polygon with elements.
 pub(crate) fn grow(
     mesh: &TriangleMesh,
     stars: &Stars,
     polygon: &Polygon,
-    surface: Option<&Implicit>,
+    ground: Ground<'_>,
     max_edge_mm: Option<f64>,
 ) -> Result<Patch, Trouble> {
+    let surface = match ground {
+        Ground::Surface(own) => Some(own),
+        Ground::Fair | Ground::Flat => None,
+    };
     let places = polygon.places(mesh);
     let sizes = border_sizes(mesh, stars, polygon, max_edge_mm);
     let is_forbidden = |a: u32, b: u32| {
@@ -94,15 +116,33 @@ pub(crate) fn grow(
         places,
         triangles,
     };
-    let ghosts = ghosts(&net, &chain, &outside);
+    let ghosts = match ground {
+        Ground::Flat => Vec::new(),
+        _ => ghosts(&net, &chain, &outside),
+    };
     shape(&mut net, &ghosts, surface, &is_forbidden);
     insert_skipped(&mut net, polygon, &coarse);
     finish_sizes(&mut net, &sizes);
-    refine(&mut net, surface, &is_forbidden);
+    let most = most_vertices(&net, polygon);
+    if !refine(&mut net, surface, &is_forbidden, most) {
+        return Err(Trouble::TooMany(most));
+    }
     if !(net.is_manifold() && has_sides(&net, polygon) && !has_forbidden(&net, &is_forbidden)) {
         return Err(Trouble::NotManifold);
     }
     Ok(Patch::of(polygon, net))
+}
+
+/// More vertices than a filling of any sensible shape takes: many times those of a disc.
+fn most_vertices(net: &Net, polygon: &Polygon) -> usize {
+    let count = polygon.chain.len();
+    let around: f64 = (0..count)
+        .map(|k| {
+            let (a, b) = (polygon.chain[k] as usize, polygon.chain[(k + 1) % count] as usize);
+            net.places[a].distance(net.places[b]) / net.sizes[a].min(net.sizes[b])
+        })
+        .sum();
+    5000.max((2.0 * around * around) as usize).min(MOST_VERTICES)
 }
 
 /// Whether all sides of the polygon are there; with a manifold net, nothing else is its border.
@@ -198,9 +238,12 @@ fn shape(
         for _ in 0..8 {
             let split = net.split(&|at, _| (at, DVec3::ZERO));
             net.flip(is_forbidden);
-            if split == 0 {
+            if split == 0 || net.places.len() > net.fixed + MOST_COARSE {
                 break;
             }
+        }
+        if net.places.len() > net.fixed + 2 * MOST_COARSE {
+            break;
         }
         fair(net, ghosts);
         net.flip(is_forbidden);

@@ -12,5 +12,5 @@ mod net;
 mod polygon;
 mod relax;
 
-pub(crate) use grow::{Patch, Trouble, grow};
+pub(crate) use grow::{Ground, Patch, Trouble, grow};
 pub(crate) use polygon::Polygon;

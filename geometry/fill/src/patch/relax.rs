@@ -12,24 +12,26 @@ const MOST_ROUNDS: usize = 40;
 const RELAXING: usize = 6;
 /// How far a vertex goes towards the middle of its neighbours at a time.
 const DAMPING: f64 = 0.6;
-/// Most vertices of one filling.
-const MOST_VERTICES: usize = 4_000_000;
 
 /// Rounds in which folds are smoothed out.
 const UNFOLDING: usize = 30;
 
 /// Splits, flips, collapses and relaxes until edges have the wanted lengths; new vertices lie on the
-/// surface where they reach it.
+/// surface where they reach it. False where there would be more vertices than `most`.
 pub(crate) fn refine(
     net: &mut Net,
     surface: Option<&Implicit>,
     is_forbidden: &impl Fn(u32, u32) -> bool,
-) {
+    most: usize,
+) -> bool {
     let place = |at: DVec3, reach: f64| foot(surface, at, reach).unwrap_or((at, DVec3::ZERO));
     for _ in 0..MOST_ROUNDS {
         let split = net.split(&place);
         net.flip(is_forbidden);
-        if split == 0 || net.places.len() > MOST_VERTICES {
+        if net.places.len() > most {
+            return false;
+        }
+        if split == 0 {
             break;
         }
         relax(net, surface);
@@ -44,6 +46,7 @@ pub(crate) fn refine(
     }
     net.flip(is_forbidden);
     unfold(net, surface, is_forbidden);
+    true
 }
 
 /// Relaxes on until nothing is folded.

@@ -1,5 +1,5 @@
 //! Meshes of known surfaces, and holes in them.
-#![allow(missing_docs, dead_code, clippy::unwrap_used, clippy::panic)]
+#![allow(missing_docs, dead_code, unreachable_pub, clippy::unwrap_used, clippy::panic)]
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
