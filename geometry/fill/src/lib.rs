@@ -13,6 +13,7 @@
 //!
 //! Triangles that are there stay where they are, to the last bit.
 
+mod close;
 mod error;
 mod holes;
 pub mod implicit;
@@ -21,6 +22,7 @@ mod meet;
 mod mesh;
 mod patch;
 mod region;
+mod report;
 mod run;
 mod settings;
 mod yoo;
@@ -29,6 +31,7 @@ pub use error::FillError;
 pub use holes::{Hole, HoleKind};
 pub use implicit::{FitSettings, Implicit, ImplicitError, Kernel, Sample, Smoothing, Solver};
 pub use mesh::{Mended, TriangleMesh};
-pub use run::{Filled, HoleReport, Outcome, Survey, fill, survey};
+pub use report::{Filled, HoleReport, Outcome, Survey};
+pub use run::{fill, survey};
 pub use settings::{Method, Precision, Settings};
 pub use yoo::TrimmedPatch;

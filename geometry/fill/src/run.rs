@@ -1,95 +1,27 @@
 //! From a mesh with holes to one without.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
+use std::sync::Mutex;
 
 use glam::DVec3;
 use range_image::Monitor;
 use rayon::prelude::*;
 
+use crate::close::{Closed, attempted, attempts};
 use crate::error::FillError;
 use crate::holes::{Hole, HoleKind, holes};
-use crate::implicit::{FitSettings, Implicit, Kernel, Solver};
 use crate::loops::loops;
 use crate::meet::meetings;
-use crate::mesh::{Edges, Mended, Stars, TriangleMesh, mend, split_fans};
-use crate::patch::{Ground, Patch, Polygon, Trouble, grow};
-use crate::region::{around, edge_length, mean_normal};
-use crate::settings::{Method, Precision, Settings};
-use crate::yoo::{Base, Trim, TrimmedPatch, Unseen, base, elements, trim};
+use crate::mesh::{Edges, Stars, TriangleMesh, mend, split_fans};
+use crate::patch::{Patch, Trouble};
+use crate::report::{Filled, HoleReport, Outcome, Survey};
+use crate::settings::Settings;
+use crate::yoo::TrimmedPatch;
 
-/// What a mesh is, before anything is closed.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Survey {
-    /// What was mended.
-    pub mended: Mended,
-    /// Loops of border edges.
-    pub holes: Vec<Hole>,
-}
-
-/// What became of a loop.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Outcome {
-    /// Closed.
-    Filled {
-        /// Radial function of the surface; `None` where the elements are only fair.
-        kernel: Option<Kernel>,
-        /// Points of the mesh that the surface was put through.
-        points: usize,
-        /// Radial functions in it.
-        centres: usize,
-        /// What the points lie off the surface, root mean square, millimetres.
-        noise_mm: f64,
-        /// New vertices.
-        vertices: usize,
-        /// New triangles.
-        triangles: usize,
-    },
-    /// Left open since its number was named.
-    Kept,
-    /// Left open since it is the border of an open sheet.
-    Border,
-    /// Closed, or left open, with the hole around it.
-    Island {
-        /// The number of that hole.
-        hole: usize,
-    },
-    /// Left open since it cannot be closed.
-    Open {
-        /// Why.
-        reason: String,
-    },
-}
-
-/// A loop and what became of it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct HoleReport {
-    /// The loop.
-    pub hole: Hole,
-    /// What became of it.
-    pub outcome: Outcome,
-    /// The hole as a trimmed surface, where that was asked for; or why it has none.
-    pub patch: Option<Result<TrimmedPatch, String>>,
-}
-
-/// A mesh with its holes closed.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Filled {
-    /// The triangles that were there first, in their order, then the new ones.
-    pub mesh: TriangleMesh,
-    /// How many were there.
-    pub old_triangles: usize,
-    /// What was mended.
-    pub mended: Mended,
-    /// What became of every loop.
-    pub holes: Vec<HoleReport>,
-}
-
-/// Points in the dense part of a fit: as many as these times the loop's vertices, between two bounds.
-const CENTRES_PER_VERTEX: usize = 6;
-const FEWEST_CENTRES: usize = 160;
-const MOST_CENTRES: usize = 600;
-/// Most points whose whole system is eliminated by the paper's way.
-const MOST_ELIMINATED: usize = 2500;
+/// How often the triangles around holes that cannot be closed are left out, a ring at a time.
+const CLEARINGS: usize = 4;
+/// Parts of a mesh that are cut off by that go, too, if they have no more triangles than this.
+const SCRAP: usize = 24;
 
 struct Prepared {
     mesh: TriangleMesh,
@@ -127,6 +59,45 @@ pub fn survey(mesh: TriangleMesh, settings: &Settings) -> Result<Survey, FillErr
     Ok(prepare(mesh, settings)?.survey)
 }
 
+/// A hole to be closed, and what came of it.
+struct Job {
+    hole: Hole,
+    islands: Vec<Hole>,
+    /// Numbers of the loops that it was when all were told.
+    numbers: BTreeSet<usize>,
+    patch: Option<Patch>,
+    outcome: Outcome,
+    trimmed: Option<Result<TrimmedPatch, String>>,
+}
+
+impl Job {
+    fn new(hole: Hole, islands: Vec<Hole>, numbers: BTreeSet<usize>) -> Self {
+        Self {
+            hole,
+            islands,
+            numbers,
+            patch: None,
+            outcome: Outcome::Open {
+                reason: String::new(),
+            },
+            trimmed: None,
+        }
+    }
+
+    fn fail(&mut self, trouble: Trouble) {
+        self.patch = None;
+        self.trimmed = None;
+        self.outcome = Outcome::Open {
+            reason: trouble.to_string(),
+        };
+    }
+
+    fn loops(&self) -> impl Iterator<Item = &Vec<u32>> {
+        let islands = self.islands.iter().map(|own| &own.vertices);
+        std::iter::once(&self.hole.vertices).chain(islands)
+    }
+}
+
 /// Mends a mesh and closes its holes. The result does not depend on the number of threads.
 ///
 /// # Errors
@@ -137,297 +108,219 @@ pub fn fill(
     settings: &Settings,
     monitor: &dyn Monitor,
 ) -> Result<Filled, FillError> {
-    let prepared = prepare(mesh, settings)?;
+    let Prepared {
+        mut mesh,
+        mut stars,
+        survey,
+    } = prepare(mesh, settings)?;
     monitor.check()?;
-    let plan = planned(&prepared.survey.holes, settings);
-    let mut outcomes: Vec<Outcome> = plan
-        .iter()
-        .map(|own| match own {
-            Planned::Leave(outcome) => outcome.clone(),
-            Planned::Close(_) => Outcome::Open {
-                reason: String::new(),
-            },
-        })
-        .collect();
-    let mut patches: Vec<Option<Patch>> = vec![None; plan.len()];
-    let mut trimmed: Vec<Option<Result<TrimmedPatch, String>>> = vec![None; plan.len()];
-    let mut left: Vec<usize> = (0..plan.len())
-        .filter(|&k| matches!(plan[k], Planned::Close(_)))
-        .collect();
-    let there: Vec<[DVec3; 3]> = prepared
-        .mesh
-        .triangles
-        .iter()
-        .map(|&t| prepared.mesh.corners(t))
-        .collect();
-    let attempts = attempts(settings);
-    let total = left.len().max(1);
-    for (number, attempt) in attempts.iter().enumerate() {
-        if left.is_empty() {
+    let (mut jobs, left) = planned(&survey.holes, settings);
+    let mut mended = survey.mended;
+    for round in 0..=CLEARINGS {
+        close_all((&mesh, &stars), &mut jobs, settings, monitor)?;
+        let is_failed = |job: &Job| job.patch.is_none() && job.hole.kind != HoleKind::Border;
+        if round == CLEARINGS || !jobs.iter().any(is_failed) {
             break;
         }
-        let is_first = number == 0;
-        let done = std::sync::atomic::AtomicUsize::new(0);
-        let told = std::sync::Mutex::new(0);
-        let close = |&k: &usize| {
-            if monitor.is_cancelled() {
-                return None;
-            }
-            let Planned::Close(islands) = &plan[k] else {
-                return None;
-            };
-            // The surface beside a border leads away from it.
-            let attempt = match prepared.survey.holes[k].kind {
-                HoleKind::Border => Attempt::Fair,
-                _ => *attempt,
-            };
-            let own = attempted(&prepared, k, islands, attempt, settings);
-            let count = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-            if is_first
-                && let Ok(mut told) = told.lock()
-                && count > *told
-            {
-                *told = count;
-                monitor.progress(0.9 * count as f64 / total as f64);
-            }
-            Some(own)
-        };
-        let found: Vec<_> = left.par_iter().with_max_len(1).map(close).collect();
-        monitor.check()?;
-        for (&k, found) in left.iter().zip(found) {
-            match found {
-                Some(Ok(closed)) => {
-                    patches[k] = Some(closed.patch);
-                    outcomes[k] = closed.outcome;
-                    trimmed[k] = closed.trimmed;
-                }
-                Some(Err(trouble)) => outcomes[k] = open(trouble),
-                None => {}
-            }
-        }
-        let groups: Vec<Vec<[DVec3; 3]>> = patches
-            .iter()
-            .map(|patch| patch.as_ref().map_or_else(Vec::new, |own| corners(&prepared.mesh, own)))
-            .collect();
-        let bad = meetings(&groups, &there);
-        left.retain(|&k| patches[k].is_none());
-        for (k, count) in bad.into_iter().enumerate() {
-            if count > 0 {
-                patches[k] = None;
-                trimmed[k] = None;
-                outcomes[k] = open(Trouble::Intersects(count));
-                left.push(k);
-            }
-        }
-        left.sort_unstable();
+        let before = mesh.triangles.len();
+        let (cleared, kept) = clear((&mesh, &stars), jobs, &left);
+        mesh = cleared;
+        mended.cleared += before - mesh.triangles.len();
+        stars = Stars::of(&mesh);
+        jobs = refreshed((&mesh, &stars), kept, &left);
     }
     monitor.progress(1.0);
-    Ok(joined(prepared, patches, outcomes, trimmed))
-}
-
-fn open(trouble: Trouble) -> Outcome {
-    Outcome::Open {
-        reason: trouble.to_string(),
+    let old_triangles = mesh.triangles.len();
+    for patch in jobs.iter().filter_map(|job| job.patch.as_ref()) {
+        join(&mut mesh, patch);
     }
-}
-
-enum Planned {
-    /// With islands, by their places among the loops.
-    Close(Vec<usize>),
-    Leave(Outcome),
-}
-
-fn planned(holes: &[Hole], settings: &Settings) -> Vec<Planned> {
-    let is_forced = |hole: &Hole| settings.force.contains(&hole.number);
-    holes
-        .iter()
-        .map(|hole| match hole.kind {
-            _ if settings.keep.contains(&hole.number) => Planned::Leave(Outcome::Kept),
-            HoleKind::Border if !is_forced(hole) => Planned::Leave(Outcome::Border),
-            HoleKind::Island(number) if !is_forced(hole) => {
-                Planned::Leave(Outcome::Island { hole: number })
-            }
-            _ => {
-                let is_in = |other: &&Hole| {
-                    other.kind == HoleKind::Island(hole.number)
-                        && !settings.keep.contains(&other.number)
-                        && !is_forced(other)
-                };
-                let islands = holes.iter().filter(is_in).map(|own| own.number - 1);
-                Planned::Close(islands.collect())
-            }
-        })
-        .collect()
-}
-
-/// Ways to close a hole, in the order in which they are tried.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Attempt {
-    /// On a trimmed surface of patches through an implicit surface.
-    Trimmed(Kernel),
-    /// On an implicit surface.
-    Surface(Kernel),
-    /// By a fair net alone.
-    Fair,
-}
-
-impl Attempt {
-    fn kernel(self) -> Option<Kernel> {
-        match self {
-            Self::Trimmed(kernel) | Self::Surface(kernel) => Some(kernel),
-            Self::Fair => None,
-        }
-    }
-}
-
-fn attempts(settings: &Settings) -> Vec<Attempt> {
-    let kernel = settings.kernel();
-    match settings.method {
-        // What its mean normal does not see whole is closed on the same surface itself.
-        Method::Yoo => vec![Attempt::Trimmed(kernel), Attempt::Surface(kernel), Attempt::Fair],
-        Method::Relief if kernel == Kernel::Quintic => vec![
-            Attempt::Surface(kernel),
-            Attempt::Surface(Kernel::Triharmonic),
-            Attempt::Fair,
-        ],
-        Method::Relief => vec![Attempt::Surface(kernel), Attempt::Fair],
-    }
-}
-
-/// A hole that is closed, as far as its own elements go.
-struct Closed {
-    patch: Patch,
-    outcome: Outcome,
-    trimmed: Option<Result<TrimmedPatch, String>>,
-}
-
-fn fit_settings(kernel: Kernel, method: Method, points: usize, border: usize) -> FitSettings {
-    let most = (CENTRES_PER_VERTEX * border).clamp(FEWEST_CENTRES, MOST_CENTRES);
-    let is_whole = method == Method::Yoo && points <= MOST_ELIMINATED;
-    FitSettings {
-        kernel,
-        most_centres: most,
-        solver: if is_whole {
-            Solver::Elimination
-        } else {
-            Solver::Levels
-        },
-        ..FitSettings::default()
-    }
-}
-
-fn attempted(
-    prepared: &Prepared,
-    k: usize,
-    islands: &[usize],
-    attempt: Attempt,
-    settings: &Settings,
-) -> Result<Closed, Trouble> {
-    let Prepared {
+    mended.split_vertices = split_fans(&mut mesh);
+    Ok(Filled {
         mesh,
-        stars,
-        survey,
-    } = prepared;
-    let hole = &survey.holes[k];
-    let islands: Vec<&Hole> = islands.iter().map(|&k| &survey.holes[k]).collect();
-    let loops: Vec<&Hole> = std::iter::once(hole).chain(islands.iter().copied()).collect();
-    let samples = match attempt {
-        Attempt::Fair => Vec::new(),
-        _ => around(mesh, stars, &loops, hole.size_mm),
-    };
-    let border: usize = loops.iter().map(|own| own.vertices.len()).sum();
-    let surface = attempt.kernel().and_then(|kernel| {
-        let fit = fit_settings(kernel, settings.method, samples.len(), border);
-        Implicit::fit(&samples, hole.size_mm, &fit).ok()
-    });
-    let seen = surface.as_ref().map(|own| {
-        let wanted = settings.patches || matches!(attempt, Attempt::Trimmed(_));
-        wanted.then(|| Seen::of(prepared, &loops, own, mean_normal(&samples), settings))
-    });
-    let seen = seen.flatten();
-    let mut patch = match (attempt, &seen) {
-        (Attempt::Trimmed(_), Some(Ok(seen))) => seen.elements(&loops)?,
-        (Attempt::Trimmed(_), Some(Err(unseen))) => return Err(Trouble::Unseen(*unseen)),
-        _ => {
-            let polygon = Polygon::of(mesh, stars, hole, &islands);
-            let ground = match &surface {
-                Some(own) => Ground::Surface(own),
-                None if hole.kind == HoleKind::Border => Ground::Flat,
-                None => Ground::Fair,
-            };
-            grow(mesh, stars, &polygon, ground, settings.max_edge_mm)?
-        }
-    };
-    if settings.precision == Precision::Single {
-        for place in &mut patch.places {
-            *place = DVec3::from_array(place.to_array().map(|c| f64::from(c as f32)));
-        }
-    }
-    let outcome = Outcome::Filled {
-        kernel: attempt.kernel().filter(|_| surface.is_some()),
-        points: samples.len(),
-        centres: surface.as_ref().map_or(0, Implicit::centres),
-        noise_mm: surface.as_ref().map_or(0.0, Implicit::noise_mm),
-        vertices: patch.places.len(),
-        triangles: patch.triangles.len(),
-    };
-    let trimmed = settings.patches.then(|| match seen {
-        Some(Ok(seen)) => {
-            let patch = seen.trim.patch(hole.number, &seen.base);
-            patch.ok_or_else(|| Unseen::NoElements.to_string())
-        }
-        Some(Err(unseen)) => Err(unseen.to_string()),
-        None => Err("no implicit surface closes it".to_owned()),
-    });
-    Ok(Closed {
-        patch,
-        outcome,
-        trimmed,
+        old_triangles,
+        mended,
+        holes: reports(survey.holes, &jobs, settings),
     })
 }
 
-/// A hole on its base surface.
-struct Seen {
-    base: Base,
-    trim: Trim,
-    edge_mm: f64,
+/// Which loops are to be closed, and which are left, as vertices.
+fn planned(holes: &[Hole], settings: &Settings) -> (Vec<Job>, HashSet<Vec<u32>>) {
+    let mut jobs = Vec::new();
+    let mut left = HashSet::new();
+    for hole in holes {
+        if stays(hole, settings).is_none() {
+            let is_in = |other: &&Hole| {
+                other.kind == HoleKind::Island(hole.number)
+                    && matches!(stays(other, settings), Some(Outcome::Island { .. }))
+            };
+            let islands = holes.iter().filter(is_in).cloned().collect();
+            jobs.push(Job::new(hole.clone(), islands, [hole.number].into()));
+        }
+    }
+    for hole in holes {
+        if !jobs.iter().flat_map(Job::loops).any(|own| *own == hole.vertices) {
+            left.insert(hole.vertices.clone());
+        }
+    }
+    (jobs, left)
 }
 
-impl Seen {
-    fn of(
-        prepared: &Prepared,
-        loops: &[&Hole],
-        surface: &Implicit,
-        normal: DVec3,
-        settings: &Settings,
-    ) -> Result<Self, Unseen> {
-        let Prepared { mesh, stars, .. } = prepared;
-        let places = |own: &&Hole| own.vertices.iter().map(|&v| mesh.place(v)).collect();
-        let rings: Vec<Vec<DVec3>> = loops.iter().map(places).collect();
-        let (mut sum, mut count) = (0.0, 0.0);
-        for &vertex in loops.iter().flat_map(|own| &own.vertices) {
-            sum += edge_length(mesh, stars, vertex);
-            count += 1.0;
-        }
-        let edge_mm = settings.max_edge_mm.map_or(sum / count, |most| (0.75 * most).min(sum / count));
-        let base = base(surface, &rings, normal, edge_mm)?;
-        let trim = trim(&base, &rings)?;
-        Ok(Self {
-            base,
-            trim,
-            edge_mm,
-        })
+/// Why a loop is none to be closed; `None` where it is one.
+fn stays(hole: &Hole, settings: &Settings) -> Option<Outcome> {
+    if settings.keep.contains(&hole.number) {
+        return Some(Outcome::Kept);
     }
+    if settings.force.contains(&hole.number) {
+        return None;
+    }
+    match hole.kind {
+        HoleKind::Hole => None,
+        HoleKind::Border => Some(Outcome::Border),
+        HoleKind::Island(hole) => Some(Outcome::Island { hole }),
+    }
+}
 
-    fn elements(&self, loops: &[&Hole]) -> Result<Patch, Trouble> {
-        let (places, triangles) =
-            elements(&self.base, &self.trim, self.edge_mm).map_err(Trouble::Unseen)?;
-        Ok(Patch {
-            border: loops.iter().flat_map(|own| own.vertices.clone()).collect(),
-            places,
-            triangles,
-        })
+/// Closes all that are not closed, in one way after the other.
+fn close_all(
+    ground: (&TriangleMesh, &Stars),
+    jobs: &mut [Job],
+    settings: &Settings,
+    monitor: &dyn Monitor,
+) -> Result<(), FillError> {
+    let mesh = ground.0;
+    let there: Vec<[DVec3; 3]> = mesh.triangles.iter().map(|&t| mesh.corners(t)).collect();
+    let done = Mutex::new(0.0);
+    for attempt in attempts(settings) {
+        let open: Vec<usize> = (0..jobs.len()).filter(|&k| jobs[k].patch.is_none()).collect();
+        if open.is_empty() {
+            break;
+        }
+        let share = 0.9 / open.len() as f64;
+        let close = |&k: &usize| -> Option<Result<Closed, Trouble>> {
+            if monitor.is_cancelled() {
+                return None;
+            }
+            let job = &jobs[k];
+            let own = attempted(ground, (&job.hole, &job.islands), attempt, settings);
+            if let Ok(mut done) = done.lock()
+                && *done + share <= 0.9
+            {
+                *done += share;
+                monitor.progress(*done);
+            }
+            Some(own)
+        };
+        let found: Vec<_> = open.par_iter().with_max_len(1).map(close).collect();
+        monitor.check()?;
+        for (k, found) in open.into_iter().zip(found) {
+            match found {
+                Some(Ok(closed)) => {
+                    jobs[k].patch = Some(closed.patch);
+                    jobs[k].outcome = closed.outcome;
+                    jobs[k].trimmed = closed.trimmed;
+                }
+                Some(Err(trouble)) => jobs[k].fail(trouble),
+                None => {}
+            }
+        }
+        let groups: Vec<Vec<[DVec3; 3]>> = jobs
+            .iter()
+            .map(|job| job.patch.as_ref().map_or_else(Vec::new, |own| corners(mesh, own)))
+            .collect();
+        for (job, count) in jobs.iter_mut().zip(meetings(&groups, &there)) {
+            if count > 0 {
+                job.fail(Trouble::Intersects(count));
+            }
+        }
     }
+    Ok(())
+}
+
+/// Leaves out the triangles around holes that could not be closed, and the scraps that this cuts off;
+/// the mesh then, and the jobs as they were. What is around loops that are to stay is not touched.
+fn clear(
+    (mesh, stars): (&TriangleMesh, &Stars),
+    jobs: Vec<Job>,
+    left: &HashSet<Vec<u32>>,
+) -> (TriangleMesh, Vec<Job>) {
+    let held: HashSet<u32> = left.iter().flatten().copied().collect();
+    let mut is_out = vec![false; mesh.triangles.len()];
+    let mut touched = BTreeSet::new();
+    for job in jobs.iter().filter(|job| job.patch.is_none()) {
+        if job.hole.kind == HoleKind::Border {
+            continue;
+        }
+        for &vertex in job.loops().flatten() {
+            for &t in stars.around(vertex) {
+                let own = mesh.triangles[t as usize];
+                if !own.iter().any(|v| held.contains(v)) {
+                    is_out[t as usize] = true;
+                    touched.extend(own);
+                }
+            }
+        }
+    }
+    // Scraps: grown from what is beside, until it is all of a part or too large for one.
+    for &start in &touched {
+        let beside = stars.around(start).iter().find(|&&t| !is_out[t as usize]);
+        let Some(&first) = beside else {
+            continue;
+        };
+        let mut part = vec![first];
+        let mut next = 0;
+        while next < part.len() && part.len() <= SCRAP {
+            for v in mesh.triangles[part[next] as usize] {
+                for &t in stars.around(v) {
+                    if !is_out[t as usize] && !part.contains(&t) {
+                        part.push(t);
+                    }
+                }
+            }
+            next += 1;
+        }
+        if part.len() <= SCRAP {
+            part.into_iter().for_each(|t| is_out[t as usize] = true);
+        }
+    }
+    let mut cleared = mesh.clone();
+    let mut outs = is_out.into_iter();
+    cleared.triangles.retain(|_| !outs.next().unwrap_or(false));
+    (cleared, jobs)
+}
+
+/// The jobs on a mesh that has lost triangles: those whose loops are still there, and new ones.
+fn refreshed(
+    (mesh, stars): (&TriangleMesh, &Stars),
+    jobs: Vec<Job>,
+    left: &HashSet<Vec<u32>>,
+) -> Vec<Job> {
+    let found = holes(mesh, loops(mesh, &Edges::of(&mesh.triangles)), stars);
+    let there: HashSet<&Vec<u32>> = found.iter().map(|own| &own.vertices).collect();
+    let (mut kept, gone): (Vec<Job>, Vec<Job>) = jobs
+        .into_iter()
+        .partition(|job| job.loops().all(|own| there.contains(own)));
+    let known: HashSet<Vec<u32>> = kept.iter().flat_map(Job::loops).chain(left).cloned().collect();
+    let new: Vec<&Hole> = found
+        .iter()
+        .filter(|own| !known.contains(&own.vertices) && !matches!(own.kind, HoleKind::Island(_)))
+        .collect();
+    let first = kept.len();
+    for hole in &new {
+        let is_in = |other: &&Hole| other.kind == HoleKind::Island(hole.number);
+        let islands = found.iter().filter(is_in).cloned().collect();
+        kept.push(Job::new((*hole).clone(), islands, BTreeSet::new()));
+    }
+    // Whatever is gone is part of the new one that is nearest.
+    let nearest = |to: DVec3, among: &[Job]| {
+        let apart = |k: &usize| among[*k].hole.centre_mm.distance_squared(to);
+        (first..among.len()).min_by(|a, b| apart(a).total_cmp(&apart(b)))
+    };
+    for job in &gone {
+        if let Some(k) = nearest(job.hole.centre_mm, &kept) {
+            kept[k].numbers.extend(&job.numbers);
+        }
+    }
+    kept
 }
 
 fn corners(mesh: &TriangleMesh, patch: &Patch) -> Vec<[DVec3; 3]> {
@@ -439,53 +332,39 @@ fn corners(mesh: &TriangleMesh, patch: &Patch) -> Vec<[DVec3; 3]> {
     patch.triangles.iter().map(|t| t.map(at)).collect()
 }
 
-fn joined(
-    prepared: Prepared,
-    patches: Vec<Option<Patch>>,
-    outcomes: Vec<Outcome>,
-    trimmed: Vec<Option<Result<TrimmedPatch, String>>>,
-) -> Filled {
-    let Prepared {
-        mut mesh, survey, ..
-    } = prepared;
-    let old_triangles = mesh.triangles.len();
-    for patch in patches.into_iter().flatten() {
-        let (first, border) = (mesh.vertices_mm.len() as u32, patch.border.len() as u32);
-        mesh.vertices_mm.extend(patch.places.iter().map(DVec3::to_array));
-        let id = |v: u32| match patch.border.get(v as usize) {
-            Some(&own) => own,
-            None => v - border + first,
-        };
-        mesh.triangles.extend(patch.triangles.iter().map(|t| t.map(id)));
-    }
-    let mut mended = survey.mended;
-    mended.split_vertices = split_fans(&mut mesh);
-    let holes = survey.holes.into_iter().zip(outcomes).zip(trimmed);
-    Filled {
-        mesh,
-        old_triangles,
-        mended,
-        holes: holes
-            .map(|((hole, outcome), patch)| HoleReport {
-                hole,
-                outcome,
-                patch,
-            })
-            .collect(),
-    }
+fn join(mesh: &mut TriangleMesh, patch: &Patch) {
+    let (first, border) = (mesh.vertices_mm.len() as u32, patch.border.len() as u32);
+    mesh.vertices_mm.extend(patch.places.iter().map(DVec3::to_array));
+    let id = |v: u32| match patch.border.get(v as usize) {
+        Some(&own) => own,
+        None => v - border + first,
+    };
+    mesh.triangles.extend(patch.triangles.iter().map(|t| t.map(id)));
 }
 
-impl Filled {
-    /// Numbers of holes that could not be closed.
-    #[must_use]
-    pub fn open(&self) -> BTreeSet<usize> {
-        let is_open = |own: &&HoleReport| matches!(own.outcome, Outcome::Open { .. });
-        self.holes
-            .iter()
-            .filter(is_open)
-            .map(|own| own.hole.number)
-            .collect()
-    }
+/// What became of every loop that was told.
+fn reports(told: Vec<Hole>, jobs: &[Job], settings: &Settings) -> Vec<HoleReport> {
+    told.into_iter()
+        .map(|hole| {
+            let of = |job: &&Job| job.numbers.contains(&hole.number);
+            let is_open = |job: &&Job| job.patch.is_none();
+            let own: Vec<&Job> = jobs.iter().filter(of).collect();
+            // One that cannot be closed says more than one that can.
+            let job = own.iter().find(|job| is_open(job)).or(own.first());
+            let outcome = match (stays(&hole, settings), job) {
+                (Some(outcome), _) => outcome,
+                (None, Some(job)) => job.outcome.clone(),
+                (None, None) => Outcome::Open {
+                    reason: "what was around it had to be left out".to_owned(),
+                },
+            };
+            HoleReport {
+                patch: job.and_then(|job| job.trimmed.clone()),
+                hole,
+                outcome,
+            }
+        })
+        .collect()
 }
 
 #[cfg(test)]

@@ -235,7 +235,7 @@ fn what_is_wrong_with_a_mesh_is_mended() {
 }
 
 #[test]
-fn soups_are_welded_and_a_moebius_strip_is_cut() {
+fn soups_are_welded_and_a_moebius_strip_is_told() {
     let (mesh, _) = with_hole(Shape::Torus, 4.0, 0.2);
     let mut soup = TriangleMesh::default();
     for t in &mesh.triangles {

@@ -26,8 +26,11 @@ pub struct Mended {
     pub non_manifold_edges: usize,
     /// Triangles left out so that no edge has more than two.
     pub left_out: usize,
-    /// Edges cut apart since they can be turned no way, as on a Moebius strip.
+    /// Edges across which triangles can be turned no way, as on a Moebius strip; one triangle at each is
+    /// left out.
     pub one_sided_edges: usize,
+    /// Triangles around holes left out since the holes could not be closed otherwise.
+    pub cleared: usize,
     /// Vertices added so that every fan of triangles that met others only in one has its own; they are
     /// split once holes are closed, since holes may touch in a vertex.
     pub split_vertices: usize,
@@ -191,8 +194,27 @@ fn flattest(mesh: &TriangleMesh, triangles: &[usize], (a, b): (u32, u32)) -> [us
 }
 
 /// Turns triangles around so that neighbours run along their edge in opposite senses. Of each component
-/// the fewer are turned. Where no turning will do, edges are cut apart.
+/// the fewer are turned. Where no turning will do, the smaller of two triangles is left out.
 fn turn(mesh: &mut TriangleMesh, done: &mut Mended) {
+    while let Some(torn) = turned(mesh, done) {
+        done.one_sided_edges += torn.len();
+        let mut is_out = vec![false; mesh.triangles.len()];
+        for [a, b] in torn {
+            if !(is_out[a] || is_out[b]) {
+                let area = |t: usize| mesh.doubled_area(mesh.triangles[t]).length_squared();
+                is_out[if area(a) < area(b) { a } else { b }] = true;
+            }
+        }
+        let before = mesh.triangles.len();
+        let mut outs = is_out.into_iter();
+        mesh.triangles.retain(|_| !outs.next().unwrap_or(false));
+        done.left_out += before - mesh.triangles.len();
+    }
+}
+
+/// Turns what can be turned; the pairs of triangles that then run the same way, if there are any, and
+/// nothing is turned.
+fn turned(mesh: &mut TriangleMesh, done: &mut Mended) -> Option<Vec<[usize; 2]>> {
     let edges = Edges::of(&mesh.triangles);
     let count = mesh.triangles.len();
     // Neighbours across edges, and whether both run the same way along it.
@@ -206,7 +228,7 @@ fn turn(mesh: &mut TriangleMesh, done: &mut Mended) {
         }
     }
     let mut turned: Vec<Option<bool>> = vec![None; count];
-    let mut is_torn = vec![false; count];
+    let mut torn = Vec::new();
     let mut queue = Vec::new();
     for start in 0..count {
         if turned[start].is_some() {
@@ -226,10 +248,8 @@ fn turn(mesh: &mut TriangleMesh, done: &mut Mended) {
                         turned[other] = Some(is_turned ^ same);
                         queue.push(other);
                     }
-                    Some(its) if its != is_turned ^ same => {
-                        is_torn[own] = true;
-                        done.one_sided_edges += 1;
-                    }
+                    // Both sides of the edge meet it: once is enough.
+                    Some(its) if its != is_turned ^ same && own < other => torn.push([own, other]),
                     Some(_) => {}
                 }
             }
@@ -240,21 +260,14 @@ fn turn(mesh: &mut TriangleMesh, done: &mut Mended) {
         }
         queue.clear();
     }
+    if !torn.is_empty() {
+        return Some(torn);
+    }
     for (triangle, turned) in mesh.triangles.iter_mut().zip(&turned) {
         if *turned == Some(true) {
             triangle.swap(1, 2);
             done.turned += 1;
         }
     }
-    // Both sides of an edge met it.
-    done.one_sided_edges /= 2;
-    if done.one_sided_edges > 0 {
-        // A triangle beside such an edge gets vertices of its own, which its neighbours do not have.
-        for (triangle, _) in mesh.triangles.iter_mut().zip(&is_torn).filter(|own| *own.1) {
-            for corner in triangle {
-                mesh.vertices_mm.push(mesh.vertices_mm[*corner as usize]);
-                *corner = (mesh.vertices_mm.len() - 1) as u32;
-            }
-        }
-    }
+    None
 }
