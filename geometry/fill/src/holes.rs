@@ -43,11 +43,15 @@ pub struct Hole {
 const LEADS_IN: f64 = 0.3;
 /// A border is not much smaller than its part of the mesh is across.
 const BORDER_SHARE: f64 = 0.05;
+/// Where the surface leads straight on, the ends of pipes are borders and the stumps of limbs are holes:
+/// these span less than this, of the area of their part of the mesh.
+const STUMP: f64 = 0.02;
 
-/// Connected parts: for each vertex its part, and how far each is across.
+/// Connected parts: for each vertex its part; how far each is across, and its area.
 struct Parts {
     of_vertex: Vec<u32>,
     across_mm: Vec<f64>,
+    area_mm2: Vec<f64>,
 }
 
 fn parts(mesh: &TriangleMesh) -> Parts {
@@ -80,8 +84,13 @@ fn parts(mesh: &TriangleMesh) -> Parts {
         let own = &mut boxes[number[own] as usize];
         *own = [own[0].min(at), own[1].max(at)];
     }
+    let mut area_mm2 = vec![0.0; boxes.len()];
+    for &own in &mesh.triangles {
+        area_mm2[of_vertex[own[0] as usize] as usize] += 0.5 * mesh.doubled_area(own).length();
+    }
     Parts {
         of_vertex,
+        area_mm2,
         across_mm: boxes.iter().map(|[low, high]| low.distance(*high)).collect(),
     }
 }
@@ -144,8 +153,8 @@ fn across(mesh: &TriangleMesh, vertices: &[u32]) -> f64 {
     own[0].distance(own[1])
 }
 
-/// How far the surface beside a loop leads into it, as [`LEADS_IN`] has it.
-fn leads_in(mesh: &TriangleMesh, stars: &Stars, hole: &Hole) -> f64 {
+/// How far the surface beside a loop leads into it, as [`LEADS_IN`] has it, and the area that it spans.
+fn leads_in(mesh: &TriangleMesh, stars: &Stars, hole: &Hole) -> (f64, f64) {
     let (mut flux, mut area) = (0.0, DVec3::ZERO);
     for (k, &own) in hole.vertices.iter().enumerate() {
         let next = hole.vertices[(k + 1) % hole.vertices.len()];
@@ -157,14 +166,16 @@ fn leads_in(mesh: &TriangleMesh, stars: &Stars, hole: &Hole) -> f64 {
         area += 0.5 * (a - hole.centre_mm).cross(b - hole.centre_mm);
     }
     let area = area.length();
-    if area > 0.0 { flux / area } else { 1.0 }
+    (if area > 0.0 { flux / area } else { 1.0 }, area)
 }
 
 fn tell_borders(mesh: &TriangleMesh, stars: &Stars, parts: &Parts, holes: &mut [Hole]) {
     for hole in holes {
         let is_large =
             across(mesh, &hole.vertices) >= BORDER_SHARE * parts.across_mm[hole.component];
-        if is_large && leads_in(mesh, stars, hole) < LEADS_IN {
+        let (leads_in, area) = leads_in(mesh, stars, hole);
+        let is_stump = leads_in > -LEADS_IN && area < STUMP * parts.area_mm2[hole.component];
+        if is_large && leads_in < LEADS_IN && !is_stump {
             hole.kind = HoleKind::Border;
         }
     }

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::edges::{Edges, is_down, side_of};
 use super::weld::{weld_equal, weld_near};
-use super::{NONE, TriangleMesh};
+use super::TriangleMesh;
 use crate::error::FillError;
 
 /// What was found and done before holes were looked for.
@@ -212,59 +212,89 @@ fn turn(mesh: &mut TriangleMesh, done: &mut Mended) {
     }
 }
 
+/// Triangles by which way around they are to be, relative to others of their part.
+struct Senses {
+    parent: Vec<u32>,
+    /// Whether a triangle is to be turned if its parent is not.
+    is_turned: Vec<bool>,
+}
+
+impl Senses {
+    /// The root of a triangle's part, and whether it is to be turned if that is not.
+    fn root(&mut self, triangle: u32) -> (u32, bool) {
+        let (mut at, mut way) = (triangle, Vec::new());
+        while self.parent[at as usize] != at {
+            way.push(at);
+            at = self.parent[at as usize];
+        }
+        // Shortened from the root's end, so that each hangs on the root itself.
+        let mut is_turned = false;
+        for &own in way.iter().rev() {
+            is_turned ^= self.is_turned[own as usize];
+            self.is_turned[own as usize] = is_turned;
+            self.parent[own as usize] = at;
+        }
+        (at, is_turned)
+    }
+
+    /// Joins two that lie beside each other; false where they are joined already and disagree.
+    fn join(&mut self, a: u32, b: u32, same_way: bool) -> bool {
+        let ((root_a, turned_a), (root_b, turned_b)) = (self.root(a), self.root(b));
+        let disagree = turned_a ^ turned_b ^ same_way;
+        if root_a == root_b {
+            return !disagree;
+        }
+        let (low, high) = (root_a.min(root_b), root_a.max(root_b));
+        self.parent[high as usize] = low;
+        self.is_turned[high as usize] = disagree;
+        true
+    }
+}
+
 /// Turns what can be turned; the pairs of triangles that then run the same way, if there are any, and
-/// nothing is turned.
+/// nothing is turned. Neighbours that agree as they come are believed first, then those that lie
+/// flattest beside each other, so that what disagrees in the end is what is least like a surface.
 fn turned(mesh: &mut TriangleMesh, done: &mut Mended) -> Option<Vec<[usize; 2]>> {
     let edges = Edges::of(&mesh.triangles);
     let count = mesh.triangles.len();
-    // Neighbours across edges, and whether both run the same way along it.
-    let mut beside: Vec<[(u32, bool); 3]> = vec![[(NONE, false); 3]; count];
+    let mut senses = Senses {
+        parent: (0..count as u32).collect(),
+        is_turned: vec![false; count],
+    };
+    let mut against: Vec<(f64, u32, u32)> = Vec::new();
     for group in edges.groups() {
-        if let [a, b] = group {
-            let (sa, sb) = (side_of(a), side_of(b));
-            let same = is_down(a) == is_down(b);
-            beside[sa as usize / 3][sa as usize % 3] = (sb / 3, same);
-            beside[sb as usize / 3][sb as usize % 3] = (sa / 3, same);
+        let [a, b] = group else {
+            continue;
+        };
+        let (ta, tb) = (side_of(a) / 3, side_of(b) / 3);
+        if is_down(a) != is_down(b) {
+            senses.join(ta, tb, false);
+        } else {
+            let normal = |t: u32| mesh.doubled_area(mesh.triangles[t as usize]).normalize_or_zero();
+            against.push((normal(ta).dot(normal(tb)), ta, tb));
         }
     }
-    let mut turned: Vec<Option<bool>> = vec![None; count];
+    if against.is_empty() {
+        return None;
+    }
+    // Turned against each other, flat ones have opposite normals.
+    against.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
     let mut torn = Vec::new();
-    let mut queue = Vec::new();
-    for start in 0..count {
-        if turned[start].is_some() {
-            continue;
+    for (_, a, b) in against {
+        if !senses.join(a, b, true) {
+            torn.push([a as usize, b as usize]);
         }
-        turned[start] = Some(false);
-        queue.push(start);
-        let mut next = 0;
-        while next < queue.len() {
-            let own = queue[next];
-            next += 1;
-            let is_turned = turned[own] == Some(true);
-            for &(other, same) in beside[own].iter().filter(|n| n.0 != NONE) {
-                let other = other as usize;
-                match turned[other] {
-                    None => {
-                        turned[other] = Some(is_turned ^ same);
-                        queue.push(other);
-                    }
-                    // Both sides of the edge meet it: once is enough.
-                    Some(its) if its != is_turned ^ same && own < other => torn.push([own, other]),
-                    Some(_) => {}
-                }
-            }
-        }
-        let many = queue.iter().filter(|&&t| turned[t] == Some(true)).count();
-        if 2 * many > queue.len() {
-            queue.iter().for_each(|&t| turned[t] = turned[t].map(|own| !own));
-        }
-        queue.clear();
     }
     if !torn.is_empty() {
         return Some(torn);
     }
-    for (triangle, turned) in mesh.triangles.iter_mut().zip(&turned) {
-        if *turned == Some(true) {
+    let own: Vec<(u32, bool)> = (0..count as u32).map(|t| senses.root(t)).collect();
+    let mut votes = vec![0_i64; count];
+    for &(root, is_turned) in &own {
+        votes[root as usize] += if is_turned { 1 } else { -1 };
+    }
+    for (triangle, &(root, is_turned)) in mesh.triangles.iter_mut().zip(&own) {
+        if is_turned != (votes[root as usize] > 0) {
             triangle.swap(1, 2);
             done.turned += 1;
         }

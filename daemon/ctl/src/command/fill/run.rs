@@ -48,6 +48,7 @@ pub(super) struct MendedFigures {
     pub(super) non_manifold_edges: usize,
     pub(super) triangles_left_out: usize,
     pub(super) one_sided_edges: usize,
+    pub(super) triangles_cleared: usize,
     pub(super) split_vertices: usize,
 }
 
@@ -252,6 +253,7 @@ impl From<&Mended> for MendedFigures {
             non_manifold_edges: own.non_manifold_edges,
             triangles_left_out: own.left_out,
             one_sided_edges: own.one_sided_edges,
+            triangles_cleared: own.cleared,
             split_vertices: own.split_vertices,
         }
     }
@@ -316,21 +318,51 @@ impl LoopFigures {
 fn mending(own: &Mended) -> Vec<String> {
     let counted = output::counted;
     let vertices = |n: usize| if n == 1 { "1 vertex".to_owned() } else { format!("{n} vertices") };
+    let triangles = |n: usize| counted(n, "triangle");
     let all = [
-        (own.welded_near, format!("{} of borders joined to others beside them", vertices(own.welded_near))),
-        (own.degenerate, format!("{} with one vertex twice left out", counted(own.degenerate, "triangle"))),
-        (own.slivers, format!("{} without an area kept", counted(own.slivers, "triangle"))),
-        (own.duplicate, format!("{} that others cover left out", counted(own.duplicate, "triangle"))),
-        (own.turned, format!("{} turned around to agree with its neighbours", counted(own.turned, "triangle"))),
         (
-            own.non_manifold_edges,
+            own.welded_near,
+            format!("{} of borders joined to others beside them", vertices(own.welded_near)),
+        ),
+        (
+            own.degenerate,
+            format!("{} with one vertex twice left out", triangles(own.degenerate)),
+        ),
+        (
+            own.slivers,
+            format!("{} without an area kept", triangles(own.slivers)),
+        ),
+        (
+            own.duplicate,
+            format!("{} that others cover left out", triangles(own.duplicate)),
+        ),
+        (
+            own.turned,
+            format!("{} turned around to agree with their neighbours", triangles(own.turned)),
+        ),
+        (
+            own.left_out,
             format!(
-                "{} had more than two triangles: {} left out",
+                "{} left out at {} of more than two triangles and {} that can be turned no way",
+                triangles(own.left_out),
                 counted(own.non_manifold_edges, "edge"),
-                counted(own.left_out, "triangle")
+                own.one_sided_edges
             ),
         ),
-        (own.one_sided_edges, format!("{} cut, since the mesh there has but one side", counted(own.one_sided_edges, "edge"))),
+        (
+            own.cleared,
+            format!(
+                "{} around holes left out, since these could not be closed otherwise",
+                triangles(own.cleared)
+            ),
+        ),
+        (
+            own.split_vertices,
+            format!(
+                "{} split where parts of the mesh met in nothing else",
+                vertices(own.split_vertices)
+            ),
+        ),
     ];
     all.into_iter().filter(|(count, _)| *count > 0).map(|(_, told)| told).collect()
 }
