@@ -86,6 +86,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "sim-scanner",
         ],
     ),
+    ("relief-fillings", &["fill", "range-image"]),
     ("relief-tests", &EVERYTHING),
     ("relief-studies", &STUDIES),
     (

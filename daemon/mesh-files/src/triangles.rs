@@ -107,7 +107,11 @@ fn write_ply(
     let places = ply::element(
         "vertex",
         vertices.len(),
-        &[("x", coordinate()), ("y", coordinate()), ("z", coordinate())],
+        &[
+            ("x", coordinate()),
+            ("y", coordinate()),
+            ("z", coordinate()),
+        ],
     );
     let list = PropertyType::List(ScalarType::UChar, ScalarType::Int);
     let faces = ply::element("face", triangles.len(), &[("vertex_indices", list)]);

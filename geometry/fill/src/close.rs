@@ -43,7 +43,11 @@ pub(crate) fn attempts(settings: &Settings) -> Vec<Attempt> {
     let kernel = settings.kernel();
     match settings.method {
         // What its mean normal does not see whole is closed on the same surface itself.
-        Method::Yoo => vec![Attempt::Trimmed(kernel), Attempt::Surface(kernel), Attempt::Fair],
+        Method::Yoo => vec![
+            Attempt::Trimmed(kernel),
+            Attempt::Surface(kernel),
+            Attempt::Fair,
+        ],
         Method::Relief if kernel == Kernel::Quintic => vec![
             Attempt::Surface(kernel),
             Attempt::Surface(Kernel::Triharmonic),
@@ -88,7 +92,9 @@ pub(crate) fn attempted(
         _ => attempt,
     };
     let islands: Vec<&Hole> = islands.iter().collect();
-    let loops: Vec<&Hole> = std::iter::once(hole).chain(islands.iter().copied()).collect();
+    let loops: Vec<&Hole> = std::iter::once(hole)
+        .chain(islands.iter().copied())
+        .collect();
     let samples = match attempt {
         Attempt::Fair => Vec::new(),
         _ => around(mesh, stars, &loops, hole.size_mm),
@@ -166,7 +172,9 @@ impl Seen {
             sum += edge_length(mesh, stars, vertex);
             count += 1.0;
         }
-        let edge_mm = settings.max_edge_mm.map_or(sum / count, |most| (0.75 * most).min(sum / count));
+        let edge_mm = settings
+            .max_edge_mm
+            .map_or(sum / count, |most| (0.75 * most).min(sum / count));
         let base = base(surface, &rings, normal, edge_mm)?;
         let trim = trim(&base, &rings)?;
         Ok(Self {

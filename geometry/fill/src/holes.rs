@@ -91,7 +91,10 @@ fn parts(mesh: &TriangleMesh) -> Parts {
     Parts {
         of_vertex,
         area_mm2,
-        across_mm: boxes.iter().map(|[low, high]| low.distance(*high)).collect(),
+        across_mm: boxes
+            .iter()
+            .map(|[low, high]| low.distance(*high))
+            .collect(),
     }
 }
 

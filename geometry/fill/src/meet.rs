@@ -31,9 +31,7 @@ pub(crate) fn meet(a: &Triangle, b: &Triangle) -> bool {
             // Flat on each other only where both are on one side of the edge in one plane.
             side(e, f, p, q) == 0.0 && (f - e).cross(p - e).dot((f - e).cross(q - e)) > 0.0
         }
-        (2, 2) => {
-            crosses(a[a_own[0]], a[a_own[1]], b) || crosses(b[b_own[0]], b[b_own[1]], a)
-        }
+        (2, 2) => crosses(a[a_own[0]], a[a_own[1]], b) || crosses(b[b_own[0]], b[b_own[1]], a),
         _ => (0..3).any(|k| {
             let next = (k + 1) % 3;
             crosses(a[k], a[next], b) || crosses(b[k], b[next], a)
@@ -190,7 +188,10 @@ mod tests {
         let flat = triangle([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]]);
         let through = triangle([[1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [5.0, 5.0, 0.0]]);
         let away = triangle([[1.0, 1.0, 9.0], [1.0, 2.0, 9.0], [5.0, 5.0, 9.0]]);
-        assert_eq!(meetings(&[vec![flat], vec![through], vec![away]], &[]), [0, 1, 0]);
+        assert_eq!(
+            meetings(&[vec![flat], vec![through], vec![away]], &[]),
+            [0, 1, 0]
+        );
         assert_eq!(meetings(&[vec![away], vec![through]], &[flat]), [0, 1]);
         assert_eq!(meetings(&[vec![flat, through]], &[]), [2]);
     }

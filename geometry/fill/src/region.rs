@@ -37,7 +37,12 @@ impl Ord for Far {
 
 /// Points around a hole, nearest to its loops first, by ways along edges: what only comes near through
 /// space, such as the other side of a wall, is not of it.
-pub(crate) fn around(mesh: &TriangleMesh, stars: &Stars, loops: &[&Hole], size_mm: f64) -> Vec<Sample> {
+pub(crate) fn around(
+    mesh: &TriangleMesh,
+    stars: &Stars,
+    loops: &[&Hole],
+    size_mm: f64,
+) -> Vec<Sample> {
     let edges: usize = loops.iter().map(|own| own.vertices.len()).sum();
     let length_mm: f64 = loops.iter().map(|own| own.length_mm).sum();
     let edge_mm = length_mm / edges.max(1) as f64;

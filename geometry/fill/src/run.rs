@@ -158,7 +158,11 @@ fn planned(holes: &[Hole], settings: &Settings) -> (Vec<Job>, HashSet<Vec<u32>>)
         }
     }
     for hole in holes {
-        if !jobs.iter().flat_map(Job::loops).any(|own| *own == hole.vertices) {
+        if !jobs
+            .iter()
+            .flat_map(Job::loops)
+            .any(|own| *own == hole.vertices)
+        {
             left.insert(hole.vertices.clone());
         }
     }
@@ -191,7 +195,9 @@ fn close_all(
     let there: Vec<[DVec3; 3]> = mesh.triangles.iter().map(|&t| mesh.corners(t)).collect();
     let done = Mutex::new(0.0);
     for attempt in attempts(settings) {
-        let open: Vec<usize> = (0..jobs.len()).filter(|&k| jobs[k].patch.is_none()).collect();
+        let open: Vec<usize> = (0..jobs.len())
+            .filter(|&k| jobs[k].patch.is_none())
+            .collect();
         if open.is_empty() {
             break;
         }
@@ -225,7 +231,11 @@ fn close_all(
         }
         let groups: Vec<Vec<[DVec3; 3]>> = jobs
             .iter()
-            .map(|job| job.patch.as_ref().map_or_else(Vec::new, |own| corners(mesh, own)))
+            .map(|job| {
+                job.patch
+                    .as_ref()
+                    .map_or_else(Vec::new, |own| corners(mesh, own))
+            })
             .collect();
         for (job, count) in jobs.iter_mut().zip(meetings(&groups, &there)) {
             if count > 0 {
@@ -299,7 +309,12 @@ fn refreshed(
     let (mut kept, gone): (Vec<Job>, Vec<Job>) = jobs
         .into_iter()
         .partition(|job| job.loops().all(|own| there.contains(own)));
-    let known: HashSet<Vec<u32>> = kept.iter().flat_map(Job::loops).chain(left).cloned().collect();
+    let known: HashSet<Vec<u32>> = kept
+        .iter()
+        .flat_map(Job::loops)
+        .chain(left)
+        .cloned()
+        .collect();
     let new: Vec<&Hole> = found
         .iter()
         .filter(|own| !known.contains(&own.vertices) && !matches!(own.kind, HoleKind::Island(_)))
@@ -334,12 +349,14 @@ fn corners(mesh: &TriangleMesh, patch: &Patch) -> Vec<[DVec3; 3]> {
 
 fn join(mesh: &mut TriangleMesh, patch: &Patch) {
     let (first, border) = (mesh.vertices_mm.len() as u32, patch.border.len() as u32);
-    mesh.vertices_mm.extend(patch.places.iter().map(DVec3::to_array));
+    mesh.vertices_mm
+        .extend(patch.places.iter().map(DVec3::to_array));
     let id = |v: u32| match patch.border.get(v as usize) {
         Some(&own) => own,
         None => v - border + first,
     };
-    mesh.triangles.extend(patch.triangles.iter().map(|t| t.map(id)));
+    mesh.triangles
+        .extend(patch.triangles.iter().map(|t| t.map(id)));
 }
 
 /// What became of every loop that was told.

@@ -74,7 +74,12 @@ impl Settings {
     /// [`FillError::Setting`] with the first that is not.
     pub fn validate(&self) -> Result<(), FillError> {
         let lengths = [
-            ("max-edge", self.max_edge_mm, f64::MIN_POSITIVE, "a length above 0"),
+            (
+                "max-edge",
+                self.max_edge_mm,
+                f64::MIN_POSITIVE,
+                "a length above 0",
+            ),
             ("weld", self.weld_mm, 0.0, "a length of 0 or more"),
         ];
         for (name, value, least, expected) in lengths {

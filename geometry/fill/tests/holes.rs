@@ -19,7 +19,11 @@ fn filled(mesh: &TriangleMesh, settings: &Settings) -> Filled {
 
 /// New vertices.
 fn new_places(own: &Filled) -> Vec<DVec3> {
-    let old: HashSet<u32> = own.mesh.triangles[..own.old_triangles].iter().flatten().copied().collect();
+    let old: HashSet<u32> = own.mesh.triangles[..own.old_triangles]
+        .iter()
+        .flatten()
+        .copied()
+        .collect();
     let mut new: Vec<u32> = own.mesh.triangles[own.old_triangles..]
         .iter()
         .flatten()
@@ -42,7 +46,11 @@ fn rms(own: &Filled, shape: Shape) -> f64 {
 
 /// Largest angle of new triangles on the border to the surface, degrees.
 fn border_angle(own: &Filled, shape: Shape) -> f64 {
-    let old: HashSet<u32> = own.mesh.triangles[..own.old_triangles].iter().flatten().copied().collect();
+    let old: HashSet<u32> = own.mesh.triangles[..own.old_triangles]
+        .iter()
+        .flatten()
+        .copied()
+        .collect();
     let angle = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|v| DVec3::from_array(own.mesh.vertices_mm[v as usize]));
         let normal = (b - a).cross(c - a).normalize();
@@ -90,7 +98,11 @@ fn holes_of_known_surfaces() {
 
 #[test]
 fn noise_is_told_and_not_made_worse() {
-    for (shape, seed) in [(Shape::Sphere, 11), (Shape::Saddle, 12), (Shape::Cylinder, 13)] {
+    for (shape, seed) in [
+        (Shape::Sphere, 11),
+        (Shape::Saddle, 12),
+        (Shape::Cylinder, 13),
+    ] {
         let (mut mesh, _) = with_hole(shape, 1.5, 0.2);
         noisy(&mut mesh, shape, 0.05, seed);
         let own = filled(&mesh, &Settings::default());
@@ -99,7 +111,10 @@ fn noise_is_told_and_not_made_worse() {
             Outcome::Filled { noise_mm, .. } => Some(noise_mm),
             _ => None,
         });
-        assert!((0.035..0.06).contains(&noise.unwrap()), "{shape:?}: {noise:?}");
+        assert!(
+            (0.035..0.06).contains(&noise.unwrap()),
+            "{shape:?}: {noise:?}"
+        );
     }
 }
 
@@ -176,7 +191,11 @@ fn the_ends_of_a_pipe_are_closed_on_demand() {
     assert!(is_watertight(&own.mesh), "{:?}", own.holes);
     // Flat ones: nothing is beyond them.
     let heights = new_places(&own).into_iter().map(|p| p.z);
-    assert!(heights.into_iter().all(|z| (-1e-9..=100.0 + 1e-9).contains(&z)));
+    assert!(
+        heights
+            .into_iter()
+            .all(|z| (-1e-9..=100.0 + 1e-9).contains(&z))
+    );
 }
 
 #[test]
@@ -184,7 +203,10 @@ fn an_island_is_joined_to_what_is_around_it() {
     let (mesh, centre) = Shape::Sphere.mesh(2.0);
     let holed = cut(&mesh, |p| (6.0..16.0).contains(&p.distance(centre)));
     let found = survey(holed.clone(), &Settings::default()).unwrap();
-    let islands = found.holes.iter().filter(|hole| matches!(hole.kind, HoleKind::Island(_)));
+    let islands = found
+        .holes
+        .iter()
+        .filter(|hole| matches!(hole.kind, HoleKind::Island(_)));
     assert_eq!(islands.count(), 1);
     let own = filled(&holed, &Settings::default());
     assert!(own.open().is_empty(), "{:?}", own.holes);
@@ -208,7 +230,10 @@ fn holes_that_touch_in_a_vertex() {
     let kept = (0..mesh.triangles.len()).filter(|&k| !is_out(k));
     let holed = compacted(&mesh, kept.map(|k| mesh.triangles[k]).collect());
     let own = filled(&holed, &Settings::default());
-    let closed = own.holes.iter().filter(|h| matches!(h.outcome, Outcome::Filled { .. }));
+    let closed = own
+        .holes
+        .iter()
+        .filter(|h| matches!(h.outcome, Outcome::Filled { .. }));
     assert_eq!(closed.count(), 2);
     assert_eq!(own.mended.split_vertices, 0);
     let again = survey(own.mesh, &Settings::default()).unwrap();
@@ -226,11 +251,15 @@ fn what_is_wrong_with_a_mesh_is_mended() {
     mesh.triangles.push([again[0], again[0], again[1]]);
     // A fin on an edge that has two triangles.
     mesh.vertices_mm.push([0.0, 0.0, 90.0]);
-    mesh.triangles.push([again[0], again[1], mesh.vertices_mm.len() as u32 - 1]);
+    mesh.triangles
+        .push([again[0], again[1], mesh.vertices_mm.len() as u32 - 1]);
     let own = filled(&mesh, &Settings::default());
     assert!(is_watertight(&own.mesh));
     let mended = own.mended;
-    assert_eq!((mended.turned, mended.duplicate, mended.degenerate), (2, 1, 1));
+    assert_eq!(
+        (mended.turned, mended.duplicate, mended.degenerate),
+        (2, 1, 1)
+    );
     assert_eq!((mended.non_manifold_edges, mended.left_out), (1, 1));
 }
 
@@ -240,10 +269,14 @@ fn soups_are_welded_and_a_moebius_strip_is_told() {
     let mut soup = TriangleMesh::default();
     for t in &mesh.triangles {
         let first = soup.vertices_mm.len() as u32;
-        soup.vertices_mm.extend(t.map(|v| mesh.vertices_mm[v as usize]));
+        soup.vertices_mm
+            .extend(t.map(|v| mesh.vertices_mm[v as usize]));
         soup.triangles.push([first, first + 1, first + 2]);
     }
-    let (own, shared) = (filled(&soup, &Settings::default()), filled(&mesh, &Settings::default()));
+    let (own, shared) = (
+        filled(&soup, &Settings::default()),
+        filled(&mesh, &Settings::default()),
+    );
     assert!(is_watertight(&own.mesh));
     assert_eq!(own.mesh.triangles.len(), shared.mesh.triangles.len());
     let strip = grid(24, 2, [false, false], |u, v| {
@@ -252,7 +285,14 @@ fn soups_are_welded_and_a_moebius_strip_is_told() {
         let r = 10.0 + (v - 0.5) * hc;
         DVec3::new(r * c, r * s, (v - 0.5) * hs)
     });
-    let found = survey(strip, &Settings { weld_mm: Some(1e-6), ..Settings::default() }).unwrap();
+    let found = survey(
+        strip,
+        &Settings {
+            weld_mm: Some(1e-6),
+            ..Settings::default()
+        },
+    )
+    .unwrap();
     assert!(found.mended.one_sided_edges > 0, "{:?}", found.mended);
 }
 
@@ -261,7 +301,9 @@ fn far_away_and_in_single_precision() {
     let (mut mesh, across) = with_hole(Shape::Sphere, 4.0, 0.3);
     let away = DVec3::new(1e6, -1e6, 5e5);
     for place in &mut mesh.vertices_mm {
-        *place = (DVec3::from_array(*place) + away).to_array().map(|c| f64::from(c as f32));
+        *place = (DVec3::from_array(*place) + away)
+            .to_array()
+            .map(|c| f64::from(c as f32));
     }
     let settings = Settings {
         precision: Precision::Single,
@@ -269,7 +311,9 @@ fn far_away_and_in_single_precision() {
     };
     let own = filled(&mesh, &settings);
     assert!(own.open().is_empty() && is_watertight(&own.mesh));
-    let offs = new_places(&own).into_iter().map(|p| Shape::Sphere.off(p - away).0.abs());
+    let offs = new_places(&own)
+        .into_iter()
+        .map(|p| Shape::Sphere.off(p - away).0.abs());
     // The coordinates themselves have but a sixteenth of a millimetre.
     assert!(offs.fold(0.0, f64::max) < 0.01 * across);
     let is_single = |c: &f64| f64::from(*c as f32) == *c;
@@ -282,7 +326,11 @@ fn edges_are_as_long_as_those_around_or_shorter() {
     let longest = |own: &Filled| {
         let new = &own.mesh.triangles[own.old_triangles..];
         let at = |v: u32| DVec3::from_array(own.mesh.vertices_mm[v as usize]);
-        let old: HashSet<u32> = own.mesh.triangles[..own.old_triangles].iter().flatten().copied().collect();
+        let old: HashSet<u32> = own.mesh.triangles[..own.old_triangles]
+            .iter()
+            .flatten()
+            .copied()
+            .collect();
         let sides = new.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
         sides
             .filter(|(a, b)| !(old.contains(a) && old.contains(b)))
@@ -304,7 +352,10 @@ fn edges_are_as_long_as_those_around_or_shorter() {
 fn the_number_of_threads_changes_nothing() {
     let (mesh, _) = with_hole(Shape::Torus, 1.5, 0.3);
     let with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
         pool.install(|| filled(&mesh, &Settings::default()))
     };
     let (one, many) = (with(1), with(5));
@@ -321,13 +372,19 @@ fn clear_answers() {
         triangles: vec![[0, 1, 2], [0, 0, 1]],
     };
     let none = Settings::default();
-    assert_eq!(told(triangle.clone(), &none), "none of its 2 triangles has an area");
+    assert_eq!(
+        told(triangle.clone(), &none),
+        "none of its 2 triangles has an area"
+    );
     let mut endless = triangle.clone();
     endless.vertices_mm[1][2] = f64::NAN;
     assert!(told(endless, &none).starts_with("vertex 2 has a coordinate"));
     let mut outside = triangle;
     outside.triangles[1][0] = 9;
-    assert_eq!(told(outside, &none), "triangle 2 names vertex 10, and there are 3");
+    assert_eq!(
+        told(outside, &none),
+        "triangle 2 names vertex 10, and there are 3"
+    );
     let (mesh, _) = with_hole(Shape::Sphere, 8.0, 0.3);
     let keep = Settings {
         keep: [2].into(),

@@ -13,7 +13,9 @@ pub(super) fn is_obj(head: &[u8]) -> bool {
         return false;
     }
     let text = String::from_utf8_lossy(head);
-    let words = text.lines().filter_map(|line| line.split_whitespace().next());
+    let words = text
+        .lines()
+        .filter_map(|line| line.split_whitespace().next());
     let first = words.into_iter().find(|word| !word.starts_with('#'));
     first.is_some_and(|word| {
         let known = ["v", "vn", "vt", "f", "o", "g", "s", "mtllib", "usemtl"];

@@ -133,7 +133,10 @@ fn check(header: &Header, bytes: u64) -> Result<bool, ReadMeshError> {
     let Some(face) = header.elements.get("face") else {
         return refuse("is a PLY file of points, without faces; a mesh is needed");
     };
-    if !CORNERS.iter().any(|name| face.properties.contains_key(*name)) {
+    if !CORNERS
+        .iter()
+        .any(|name| face.properties.contains_key(*name))
+    {
         return refuse("is a PLY file whose faces have no `vertex_indices`");
     }
     let mut is_single = true;

@@ -120,7 +120,9 @@ pub fn read(
 
 fn facets(source: &mut (impl Read + Seek), most: usize) -> Result<Triangles, ReadMeshError> {
     let damaged = |facet: usize, error: &io::Error| {
-        ReadMeshError(format!("is damaged, or no STL file: facet {facet}: {error}"))
+        ReadMeshError(format!(
+            "is damaged, or no STL file: facet {facet}: {error}"
+        ))
     };
     let reader = stl_io::create_stl_reader(source).map_err(|error| damaged(1, &error))?;
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());

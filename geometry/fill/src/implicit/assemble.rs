@@ -78,7 +78,10 @@ pub(super) fn columns(kernel: Kernel, conditions: &[Condition]) -> Vec<Vec<f64>>
 
 /// What is wanted, by the standard deviations.
 pub(super) fn wanted(conditions: &[Condition]) -> Vec<f64> {
-    conditions.iter().map(|own| own.wanted * own.scale()).collect()
+    conditions
+        .iter()
+        .map(|own| own.wanted * own.scale())
+        .collect()
 }
 
 /// Weights as they apply to the conditions themselves.

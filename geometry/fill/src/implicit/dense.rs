@@ -204,7 +204,11 @@ impl Tridiagonal {
             let is_shared = v.len() > SHARED_ROWS;
             let product = |row: &[f64]| factor * dot(&row[k + 1..], &v);
             let mut w: Vec<f64> = if is_shared {
-                below.par_chunks(size).with_min_len(64).map(product).collect()
+                below
+                    .par_chunks(size)
+                    .with_min_len(64)
+                    .map(product)
+                    .collect()
             } else {
                 below.chunks(size).map(product).collect()
             };
@@ -219,7 +223,10 @@ impl Tridiagonal {
                 let rows = below.par_chunks_mut(size).with_min_len(64);
                 rows.zip(v.par_iter().zip(w.par_iter())).for_each(update);
             } else {
-                below.chunks_mut(size).zip(v.iter().zip(&w)).for_each(update);
+                below
+                    .chunks_mut(size)
+                    .zip(v.iter().zip(&w))
+                    .for_each(update);
             }
             vectors.push((v, factor));
         }

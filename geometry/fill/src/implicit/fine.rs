@@ -51,7 +51,13 @@ fn cell_of(at: DVec3, size: f64) -> Cell {
 }
 
 fn around(cell: Cell) -> impl Iterator<Item = Cell> {
-    (0..27).map(move |k| [cell[0] + k / 9 - 1, cell[1] + k / 3 % 3 - 1, cell[2] + k % 3 - 1])
+    (0..27).map(move |k| {
+        [
+            cell[0] + k / 9 - 1,
+            cell[1] + k / 3 % 3 - 1,
+            cell[2] + k % 3 - 1,
+        ]
+    })
 }
 
 impl Fine {

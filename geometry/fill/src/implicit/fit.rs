@@ -168,7 +168,9 @@ fn conditions(
     let mut conditions: Vec<Condition> = indices.iter().map(value).collect();
     // Their order is such that every beginning of it is spread.
     let count = indices.len().div_ceil(settings.every.max(1)).max(4);
-    let with_normal = indices.iter().filter(|&&k| samples[k].normal != DVec3::ZERO);
+    let with_normal = indices
+        .iter()
+        .filter(|&&k| samples[k].normal != DVec3::ZERO);
     let points = conditions.len();
     for &k in with_normal.take(count) {
         let (at, along) = (frame.inside(samples[k].place_mm), samples[k].normal);

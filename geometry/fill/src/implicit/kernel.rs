@@ -101,18 +101,7 @@ pub(crate) fn terms(degree: usize) -> usize {
 pub(crate) fn polynomial(at: DVec3, along: Option<DVec3>, out: &mut [f64]) {
     let DVec3 { x, y, z } = at;
     let all = match along {
-        None => [
-            1.0,
-            x,
-            y,
-            z,
-            x * x,
-            y * y,
-            z * z,
-            y * z,
-            z * x,
-            x * y,
-        ],
+        None => [1.0, x, y, z, x * x, y * y, z * z, y * z, z * x, x * y],
         Some(d) => [
             0.0,
             d.x,
@@ -179,8 +168,14 @@ mod tests {
                 let by_values = (value(r + step) - value(r - step)) / (2.0 * step);
                 let by_slopes = (slope(r + step) - slope(r - step)) / (2.0 * step);
                 let scale = 1.0 + by_values.abs() + by_slopes.abs();
-                assert!((own.slope * r - by_values).abs() < 1e-7 * scale, "{kernel:?} {r}");
-                assert!((own.bend * r - by_slopes).abs() < 1e-7 * scale, "{kernel:?} {r}");
+                assert!(
+                    (own.slope * r - by_values).abs() < 1e-7 * scale,
+                    "{kernel:?} {r}"
+                );
+                assert!(
+                    (own.bend * r - by_slopes).abs() < 1e-7 * scale,
+                    "{kernel:?} {r}"
+                );
             }
         }
     }
@@ -190,7 +185,12 @@ mod tests {
         let (at, along) = (DVec3::new(0.3, -1.2, 2.0), DVec3::new(0.2, 0.5, -0.7));
         let coefficients: Vec<f64> = (1..=10).map(f64::from).collect();
         let mut row = [0.0; 10];
-        let dot = |row: &[f64]| row.iter().zip(&coefficients).map(|(a, b)| a * b).sum::<f64>();
+        let dot = |row: &[f64]| {
+            row.iter()
+                .zip(&coefficients)
+                .map(|(a, b)| a * b)
+                .sum::<f64>()
+        };
         polynomial(at, None, &mut row);
         let (value, gradient) = evaluated(&coefficients, at);
         assert!((dot(&row) - value).abs() < 1e-12);

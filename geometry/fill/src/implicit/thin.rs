@@ -96,7 +96,10 @@ mod tests {
         let kept = thinned(&samples, 20.0, 300);
         assert!((270..=300).contains(&kept.len()), "{}", kept.len());
         let near = kept.iter().filter(|&&k| samples[k].reach_mm < 50.0).count();
-        let far = kept.iter().filter(|&&k| samples[k].reach_mm >= 150.0).count();
+        let far = kept
+            .iter()
+            .filter(|&&k| samples[k].reach_mm >= 150.0)
+            .count();
         assert!(near > 4 * far, "{near} {far}");
         assert_eq!(thinned(&samples[..50], 20.0, 300).len(), 50);
     }

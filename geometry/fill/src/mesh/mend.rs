@@ -2,9 +2,9 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::TriangleMesh;
 use super::edges::{Edges, is_down, side_of};
 use super::weld::{weld_equal, weld_near};
-use super::TriangleMesh;
 use crate::error::FillError;
 
 /// What was found and done before holes were looked for.
@@ -270,7 +270,10 @@ fn turned(mesh: &mut TriangleMesh, done: &mut Mended) -> Option<Vec<[usize; 2]>>
         if is_down(a) != is_down(b) {
             senses.join(ta, tb, false);
         } else {
-            let normal = |t: u32| mesh.doubled_area(mesh.triangles[t as usize]).normalize_or_zero();
+            let normal = |t: u32| {
+                mesh.doubled_area(mesh.triangles[t as usize])
+                    .normalize_or_zero()
+            };
             against.push((normal(ta).dot(normal(tb)), ta, tb));
         }
     }

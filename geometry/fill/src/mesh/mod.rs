@@ -9,8 +9,8 @@ mod weld;
 use crate::error::FillError;
 
 pub(crate) use edges::{Edges, NONE, ends};
-pub(crate) use mend::mend;
 pub use mend::Mended;
+pub(crate) use mend::mend;
 pub(crate) use split::split_fans;
 pub(crate) use stars::Stars;
 

@@ -65,7 +65,9 @@ impl Stars {
     /// Twice the area of that triangle, along its normal.
     pub(crate) fn beside(&self, mesh: &TriangleMesh, from: u32, to: u32) -> DVec3 {
         let own = self.along(mesh, from, to);
-        own.map_or(DVec3::ZERO, |t| mesh.doubled_area(mesh.triangles[t as usize]))
+        own.map_or(DVec3::ZERO, |t| {
+            mesh.doubled_area(mesh.triangles[t as usize])
+        })
     }
 
     /// Whether two vertices have an edge between them.

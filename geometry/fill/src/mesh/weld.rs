@@ -45,7 +45,13 @@ pub(super) fn weld_near(mesh: &mut TriangleMesh, within_mm: f64) -> usize {
     for &vertex in &border {
         let at = mesh.place(vertex);
         let own = cell(at);
-        let around = (0..27).map(|k| [own[0] + k / 9 - 1, own[1] + k / 3 % 3 - 1, own[2] + k % 3 - 1]);
+        let around = (0..27).map(|k| {
+            [
+                own[0] + k / 9 - 1,
+                own[1] + k / 3 % 3 - 1,
+                own[2] + k % 3 - 1,
+            ]
+        });
         let found = around
             .filter_map(|cell| cells.get(&cell))
             .flatten()

@@ -124,10 +124,20 @@ mod tests {
         let outside = [Some(DVec3::Z); 4];
         assert_eq!(cover(&places, &outside, |_, _| false).unwrap().len(), 2);
         let one = cover(&places, &outside, |i, j| (i, j) == (0, 2)).unwrap();
-        assert!(one.iter().all(|t| !(t.contains(&0) && t.contains(&2))), "{one:?}");
+        assert!(
+            one.iter().all(|t| !(t.contains(&0) && t.contains(&2))),
+            "{one:?}"
+        );
         assert!(cover(&places, &outside, |_, _| true).is_none());
         // An L: no triangle lies outside of it.
-        let corner = [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]];
+        let corner = [
+            [0.0, 0.0],
+            [3.0, 0.0],
+            [3.0, 1.0],
+            [1.0, 1.0],
+            [1.0, 3.0],
+            [0.0, 3.0],
+        ];
         let places = corner.map(|[x, y]| DVec3::new(x, y, 0.0));
         let own = cover(&places, &[Some(DVec3::Z); 6], |_, _| false).unwrap();
         let area: f64 = own

@@ -91,7 +91,11 @@ pub(crate) fn grow(
     let places = polygon.places(mesh);
     let sizes = border_sizes(mesh, stars, polygon, max_edge_mm);
     let is_forbidden = |a: u32, b: u32| {
-        stars.are_joined(mesh, polygon.vertices[a as usize], polygon.vertices[b as usize])
+        stars.are_joined(
+            mesh,
+            polygon.vertices[a as usize],
+            polygon.vertices[b as usize],
+        )
     };
     let coarse = polygon.coarse(&places);
     let chain: Vec<u32> = coarse.iter().map(|&k| polygon.chain[k]).collect();
@@ -100,7 +104,12 @@ pub(crate) fn grow(
     // A bridge is an edge of the polygon, and can be no other.
     let bridges: HashSet<(u32, u32)> = (0..polygon.chain.len())
         .filter(|&k| polygon.outside[k].is_none())
-        .map(|k| (polygon.chain[k], polygon.chain[(k + 1) % polygon.chain.len()]))
+        .map(|k| {
+            (
+                polygon.chain[k],
+                polygon.chain[(k + 1) % polygon.chain.len()],
+            )
+        })
         .collect();
     let never = |i: usize, j: usize| {
         let (a, b) = (chain[i], chain[j]);
@@ -138,11 +147,15 @@ fn most_vertices(net: &Net, polygon: &Polygon) -> usize {
     let count = polygon.chain.len();
     let around: f64 = (0..count)
         .map(|k| {
-            let (a, b) = (polygon.chain[k] as usize, polygon.chain[(k + 1) % count] as usize);
+            let (a, b) = (
+                polygon.chain[k] as usize,
+                polygon.chain[(k + 1) % count] as usize,
+            );
             net.places[a].distance(net.places[b]) / net.sizes[a].min(net.sizes[b])
         })
         .sum();
-    5000.max((2.0 * around * around) as usize).min(MOST_VERTICES)
+    5000.max((2.0 * around * around) as usize)
+        .min(MOST_VERTICES)
 }
 
 /// Whether all sides of the polygon are there; with a manifold net, nothing else is its border.
@@ -178,7 +191,9 @@ fn outside(polygon: &Polygon, coarse: &[usize]) -> Vec<Option<DVec3>> {
         .map(|k| {
             let from = coarse[k];
             let to = coarse.get(k + 1).copied().unwrap_or(coarse[0] + count);
-            let own: Vec<DVec3> = (from..to).filter_map(|k| polygon.outside[k % count]).collect();
+            let own: Vec<DVec3> = (from..to)
+                .filter_map(|k| polygon.outside[k % count])
+                .collect();
             (!own.is_empty()).then(|| own.iter().sum::<DVec3>().normalize_or_zero())
         })
         .collect()
@@ -210,7 +225,10 @@ fn ghosts(net: &Net, chain: &[u32], outside: &[Option<DVec3>]) -> Vec<Ghost> {
     let at = |k: usize| net.places[chain[k % count] as usize];
     let ghost = |k: usize| {
         let before = (k + count - 1) % count;
-        let normal = [outside[before], outside[k]].into_iter().flatten().sum::<DVec3>();
+        let normal = [outside[before], outside[k]]
+            .into_iter()
+            .flatten()
+            .sum::<DVec3>();
         let along = at(k + 1) - at(before);
         let inward = normal.cross(along).normalize_or_zero();
         if inward == DVec3::ZERO {
@@ -302,8 +320,7 @@ fn finish_sizes(net: &mut Net, border: &[f64]) {
         }
     }
     for _ in 0..20 {
-        for v in net.fixed..net.places.len() {
-            let own = &around[v];
+        for (v, own) in around.iter().enumerate().skip(net.fixed) {
             if !own.is_empty() {
                 let sum: f64 = own.iter().map(|&w| net.sizes[w as usize]).sum();
                 net.sizes[v] = sum / own.len() as f64;

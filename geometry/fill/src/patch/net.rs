@@ -138,7 +138,8 @@ impl Net {
             let m = self.places.len() as u32;
             self.places.push(at);
             self.normals.push(normal);
-            self.sizes.push(0.5 * (self.sizes[a as usize] + self.sizes[b as usize]));
+            self.sizes
+                .push(0.5 * (self.sizes[a as usize] + self.sizes[b as usize]));
             self.triangles[side as usize / 3] = [a, m, c];
             self.triangles[across as usize / 3] = [b, m, d];
             self.triangles.push([m, b, c]);
@@ -190,7 +191,10 @@ impl Net {
 
     /// Whether an edge c-d is better than a-b between triangles abc and bad.
     fn is_better(&self, a: u32, b: u32, c: u32, d: u32) -> bool {
-        let sum: DVec3 = [a, b, c, d].map(|v| self.normals[v as usize]).into_iter().sum();
+        let sum: DVec3 = [a, b, c, d]
+            .map(|v| self.normals[v as usize])
+            .into_iter()
+            .sum();
         let old = [[a, b, c], [b, a, d]];
         let normal = if sum == DVec3::ZERO {
             old.map(|t| self.doubled_area(t)).into_iter().sum()
@@ -239,7 +243,9 @@ impl Net {
         for (_, u, v) in short {
             let around = |w: u32| -> HashSet<u32> {
                 let own = stars[w as usize].iter();
-                own.flat_map(|&t| self.triangles[t as usize]).filter(|&x| x != w).collect()
+                own.flat_map(|&t| self.triangles[t as usize])
+                    .filter(|&x| x != w)
+                    .collect()
             };
             let (of_u, of_v) = (around(u), around(v));
             let is_free = |w: &u32| !is_touched[*w as usize];

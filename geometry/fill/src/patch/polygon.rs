@@ -93,7 +93,8 @@ impl Polygon {
         let (mut gone, mut next) = (0.0, 0.0);
         for k in 0..count {
             // Ends of bridges stay: they stand in the chain twice.
-            let is_bridge = self.outside[k].is_none() || self.outside[(k + count - 1) % count].is_none();
+            let is_bridge =
+                self.outside[k].is_none() || self.outside[(k + count - 1) % count].is_none();
             if gone >= next || is_bridge {
                 kept[k] = true;
                 next = gone + total / COARSE as f64;
@@ -110,7 +111,8 @@ impl Polygon {
             let chord = b - a;
             let off = |own: usize| {
                 let arm = at(own) - a;
-                let along = (arm.dot(chord) / chord.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+                let along = (arm.dot(chord) / chord.length_squared().max(f64::MIN_POSITIVE))
+                    .clamp(0.0, 1.0);
                 (arm - along * chord).length()
             };
             let far = (from + 1..to).max_by(|&x, &y| off(x).total_cmp(&off(y)).then(y.cmp(&x)));

@@ -55,7 +55,11 @@ pub(crate) fn base(
     }
     let (x, y) = normal.any_orthonormal_pair();
     // Right-handed, so that loops run counter-clockwise.
-    let axes = if x.cross(y).dot(normal) > 0.0 { [x, y] } else { [y, x] };
+    let axes = if x.cross(y).dot(normal) > 0.0 {
+        [x, y]
+    } else {
+        [y, x]
+    };
     let origin = places.iter().sum::<DVec3>() / places.len() as f64;
     let seen = |p: DVec3| axes.map(|axis| axis.dot(p - origin));
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
@@ -78,7 +82,10 @@ pub(crate) fn base(
     let reach = 2.0 * extent;
     let thrown = |k: usize| {
         let (i, j) = (k / counts[1], k % counts[1]);
-        let (u, v) = (first[0] + steps[0] * i as f64, first[1] + steps[1] * j as f64);
+        let (u, v) = (
+            first[0] + steps[0] * i as f64,
+            first[1] + steps[1] * j as f64,
+        );
         let from = origin + u * axes[0] + v * axes[1];
         // From the height of the loop's nearest point, which is near the surface's.
         let near = places.iter().min_by(|a, b| {

@@ -47,8 +47,11 @@ pub(crate) fn elements(
         .with_min_required_area(0.1 * EQUILATERAL * edge_mm * edge_mm)
         .with_max_additional_vertices(MOST_ELEMENTS);
     let refined = net.refine(parameters);
-    let outside: std::collections::HashSet<usize> =
-        refined.excluded_faces.iter().map(|face| face.index()).collect();
+    let outside: std::collections::HashSet<usize> = refined
+        .excluded_faces
+        .iter()
+        .map(|face| face.index())
+        .collect();
     let mut number = vec![u32::MAX; net.num_vertices()];
     for (k, handle) in handles.iter().enumerate() {
         if number[handle.index()] != u32::MAX {

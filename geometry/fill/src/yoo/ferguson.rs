@@ -133,10 +133,17 @@ mod tests {
 
     #[test]
     fn bicubic_surfaces_come_out_as_they_are() {
-        let at = |u: f64, v: f64| DVec3::new(u, v, 0.1 * u * u * u * v - v * v * u + 0.2 * u * v * v * v);
+        let at = |u: f64, v: f64| {
+            DVec3::new(u, v, 0.1 * u * u * u * v - v * v * u + 0.2 * u * v * v * v)
+        };
         let (columns, rows) = (6, 5);
         let points = (0..columns * rows)
-            .map(|k| at(2.0 + 0.5 * (k / rows) as f64, -1.0 + 0.7 * (k % rows) as f64))
+            .map(|k| {
+                at(
+                    2.0 + 0.5 * (k / rows) as f64,
+                    -1.0 + 0.7 * (k % rows) as f64,
+                )
+            })
             .collect();
         let grid = Grid {
             columns,

@@ -38,7 +38,10 @@ pub(super) fn foot(surface: &BSplineSurface, place: DVec3, from: [f64; 2]) -> Op
         let (ru, rv) = (at(1, 0), at(0, 1));
         let (f, g) = (ru.dot(arm), rv.dot(arm));
         let cross = ru.dot(rv) + at(1, 1).dot(arm);
-        let (fu, gv) = (ru.dot(ru) + at(2, 0).dot(arm), rv.dot(rv) + at(0, 2).dot(arm));
+        let (fu, gv) = (
+            ru.dot(ru) + at(2, 0).dot(arm),
+            rv.dot(rv) + at(0, 2).dot(arm),
+        );
         let determinant = fu * gv - cross * cross;
         let (du, dv) = (
             (cross * g - gv * f) / determinant,
@@ -99,7 +102,10 @@ fn crosses_itself(loops: &[Vec<[f64; 2]>]) -> bool {
     let right = |side: &([f64; 2], [f64; 2])| side.0[0].max(side.1[0]);
     sides.sort_by(|a, b| left(a).total_cmp(&left(b)));
     for (k, &(a, b)) in sides.iter().enumerate() {
-        for &(c, d) in sides[k + 1..].iter().take_while(|own| left(own) <= right(&(a, b))) {
+        for &(c, d) in sides[k + 1..]
+            .iter()
+            .take_while(|own| left(own) <= right(&(a, b)))
+        {
             if a == c || a == d || b == c || b == d {
                 continue;
             }

@@ -1,5 +1,11 @@
 //! Meshes of known surfaces, and holes in them.
-#![allow(missing_docs, dead_code, unreachable_pub, clippy::unwrap_used, clippy::panic)]
+#![allow(
+    missing_docs,
+    dead_code,
+    unreachable_pub,
+    clippy::unwrap_used,
+    clippy::panic
+)]
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
@@ -77,7 +83,10 @@ impl Shape {
     pub fn mesh(self, edge: f64) -> (TriangleMesh, DVec3) {
         let count = |length: f64| (length / edge).round() as u32;
         match self {
-            Self::Sphere => (ball(edge, DVec3::splat(RADIUS)), on_ball(DVec3::splat(RADIUS))),
+            Self::Sphere => (
+                ball(edge, DVec3::splat(RADIUS)),
+                on_ball(DVec3::splat(RADIUS)),
+            ),
             Self::Ellipsoid => (ball(edge, AXES), on_ball(AXES)),
             Self::Torus => {
                 let at = |u: f64, v: f64| {
@@ -96,14 +105,20 @@ impl Shape {
                     // Straight up onto it.
                     flat - DVec3::Z * (off / normal.z)
                 };
-                (grid(count(100.0), count(100.0), [false, false], at), at(0.57, 0.53))
+                (
+                    grid(count(100.0), count(100.0), [false, false], at),
+                    at(0.57, 0.53),
+                )
             }
             Self::Cylinder => {
                 let at = |u: f64, v: f64| {
                     let (s, c) = libm::sincos(TAU * u);
                     DVec3::new(PIPE * c, PIPE * s, 100.0 * v)
                 };
-                (grid(count(TAU * PIPE), count(100.0), [true, false], at), at(0.0, 0.5))
+                (
+                    grid(count(TAU * PIPE), count(100.0), [true, false], at),
+                    at(0.0, 0.5),
+                )
             }
         }
     }
@@ -141,7 +156,12 @@ fn on_ball(axes: DVec3) -> DVec3 {
 fn ball(edge: f64, axes: DVec3) -> TriangleMesh {
     let golden = (1.0 + 5.0_f64.sqrt()) / 2.0;
     let mut points = Vec::new();
-    for (a, b) in [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)] {
+    for (a, b) in [
+        (1.0, golden),
+        (-1.0, golden),
+        (1.0, -golden),
+        (-1.0, -golden),
+    ] {
         points.extend([
             DVec3::new(0.0, a, b),
             DVec3::new(a, b, 0.0),
@@ -188,7 +208,10 @@ fn ball(edge: f64, axes: DVec3) -> TriangleMesh {
 /// Leaves out triangles with a corner for which this holds, and vertices that nobody has then.
 pub fn cut(mesh: &TriangleMesh, is_out: impl Fn(DVec3) -> bool) -> TriangleMesh {
     let at = |v: u32| DVec3::from_array(mesh.vertices_mm[v as usize]);
-    let kept = mesh.triangles.iter().filter(|t| !t.iter().any(|&v| is_out(at(v))));
+    let kept = mesh
+        .triangles
+        .iter()
+        .filter(|t| !t.iter().any(|&v| is_out(at(v))));
     compacted(mesh, kept.copied().collect())
 }
 
@@ -213,9 +236,7 @@ pub fn with_hole(shape: Shape, edge: f64, share: f64) -> (TriangleMesh, f64) {
     let across = share * shape.size();
     if shape == Shape::Cylinder {
         let (half, high) = (share * 2.0 * PI, 0.5 * across);
-        let is_out = |p: DVec3| {
-            libm::atan2(p.y, p.x).abs() < half && (p.z - 50.0).abs() < high
-        };
+        let is_out = |p: DVec3| libm::atan2(p.y, p.x).abs() < half && (p.z - 50.0).abs() < high;
         return (cut(&mesh, is_out), across);
     }
     (cut(&mesh, |p| p.distance(centre) < 0.5 * across), across)
@@ -245,4 +266,42 @@ pub fn is_watertight(mesh: &TriangleMesh) -> bool {
     sides
         .iter()
         .all(|(&(a, b), &count)| count == 1 && sides.get(&(b, a)) == Some(&1))
+}
+
+/// Numbers between 0 and 1 that follow from a seed.
+pub fn uniform(seed: u64) -> impl FnMut() -> f64 {
+    use rand_core::{Rng, SeedableRng};
+    let mut random = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
+    move || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// A hole of a diameter, as a share of the size, where a seed puts it: anywhere on what is closed, and
+/// so far inside of sheets that it does not reach their borders.
+pub fn with_hole_by(shape: Shape, edge: f64, share: f64, seed: u64) -> (TriangleMesh, f64) {
+    let mut uniform = uniform(seed);
+    let (mesh, _) = shape.mesh(edge);
+    let across = share * shape.size();
+    let inside = |p: DVec3| match shape {
+        Shape::Saddle | Shape::Wavy => p.x.abs().max(p.y.abs()) < 48.0 - across,
+        Shape::Cylinder => (p.z - 50.0).abs() < 48.0 - across,
+        _ => true,
+    };
+    let centre = loop {
+        let k = (uniform() * mesh.vertices_mm.len() as f64) as usize;
+        let own = DVec3::from_array(mesh.vertices_mm[k]);
+        if inside(own) {
+            break own;
+        }
+    };
+    if shape == Shape::Cylinder {
+        // As far around as leaves the same share of the whole turn twice over.
+        let (half, high) = (share * 2.0 * PI, 0.5 * across);
+        let middle = libm::atan2(centre.y, centre.x);
+        let is_out = |p: DVec3| {
+            let turn = libm::remainder(libm::atan2(p.y, p.x) - middle, TAU);
+            turn.abs() < half && (p.z - centre.z).abs() < high
+        };
+        return (cut(&mesh, is_out), across);
+    }
+    (cut(&mesh, |p| p.distance(centre) < 0.5 * across), across)
 }

@@ -317,16 +317,28 @@ impl LoopFigures {
 /// What was mended, in words.
 fn mending(own: &Mended) -> Vec<String> {
     let counted = output::counted;
-    let vertices = |n: usize| if n == 1 { "1 vertex".to_owned() } else { format!("{n} vertices") };
+    let vertices = |n: usize| {
+        if n == 1 {
+            "1 vertex".to_owned()
+        } else {
+            format!("{n} vertices")
+        }
+    };
     let triangles = |n: usize| counted(n, "triangle");
     let all = [
         (
             own.welded_near,
-            format!("{} of borders joined to others beside them", vertices(own.welded_near)),
+            format!(
+                "{} of borders joined to others beside them",
+                vertices(own.welded_near)
+            ),
         ),
         (
             own.degenerate,
-            format!("{} with one vertex twice left out", triangles(own.degenerate)),
+            format!(
+                "{} with one vertex twice left out",
+                triangles(own.degenerate)
+            ),
         ),
         (
             own.slivers,
@@ -338,7 +350,10 @@ fn mending(own: &Mended) -> Vec<String> {
         ),
         (
             own.turned,
-            format!("{} turned around to agree with their neighbours", triangles(own.turned)),
+            format!(
+                "{} turned around to agree with their neighbours",
+                triangles(own.turned)
+            ),
         ),
         (
             own.left_out,
@@ -364,7 +379,10 @@ fn mending(own: &Mended) -> Vec<String> {
             ),
         ),
     ];
-    all.into_iter().filter(|(count, _)| *count > 0).map(|(_, told)| told).collect()
+    all.into_iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(_, told)| told)
+        .collect()
 }
 
 /// What is to be said of loops that stay open.

@@ -21,7 +21,10 @@ pub(super) fn told(told: &Told) -> String {
         None if told.loops.is_empty() => lines.push(format!("mesh       {counts}: it is closed")),
         None => lines.push(format!("mesh       {counts}")),
         Some(output) => {
-            lines.push(format!("mesh       {counts}; {} of the triangles are new", told.new_triangles));
+            lines.push(format!(
+                "mesh       {counts}; {} of the triangles are new",
+                told.new_triangles
+            ));
             lines.push(format!("written    {}", output.display()));
         }
     }
@@ -32,7 +35,16 @@ pub(super) fn told(told: &Told) -> String {
 }
 
 fn table(told: &Told) -> String {
-    let heading = ["LOOP", "IS", "EDGES", "LENGTH MM", "SIZE MM", "CENTRE MM", "TRIANGLES", "NOISE MM"];
+    let heading = [
+        "LOOP",
+        "IS",
+        "EDGES",
+        "LENGTH MM",
+        "SIZE MM",
+        "CENTRE MM",
+        "TRIANGLES",
+        "NOISE MM",
+    ];
     let is_filled = told.output.is_some();
     let columns = if is_filled { heading.len() } else { 6 };
     let lines = told.loops.iter().take(MOST_LOOPS).map(|own| {
@@ -50,11 +62,19 @@ fn table(told: &Told) -> String {
             format!("{:.3}", own.length_mm),
             format!("{:.3}", own.size_mm),
             format!("{x:.3} {y:.3} {z:.3}"),
-            filling.map(|own| own.triangles.to_string()).unwrap_or_default(),
-            filling.map(|own| format!("{:.4}", own.noise_mm)).unwrap_or_default(),
+            filling
+                .map(|own| own.triangles.to_string())
+                .unwrap_or_default(),
+            filling
+                .map(|own| format!("{:.4}", own.noise_mm))
+                .unwrap_or_default(),
         ];
         line.truncate(columns);
         line
     });
-    output::table(&heading[..columns], &[0, 2, 3, 4, 6, 7][..if is_filled { 6 } else { 4 }], lines)
+    output::table(
+        &heading[..columns],
+        &[0, 2, 3, 4, 6, 7][..if is_filled { 6 } else { 4 }],
+        lines,
+    )
 }
