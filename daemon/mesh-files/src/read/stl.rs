@@ -15,8 +15,11 @@ pub(super) fn has_length(head: &[u8], bytes: u64) -> bool {
     announced(head).is_some_and(|count| HEADER_BYTES + FACET_BYTES * count == bytes)
 }
 
+/// A text has no zeros, and binary files have one in all counts below 16 million.
 pub(super) fn is_text(head: &[u8], bytes: u64) -> bool {
-    head.trim_ascii_start().starts_with(b"solid") && !has_length(head, bytes)
+    let head = &head[..head.len().min(HEADER_BYTES as usize)];
+    let is_solid = head.trim_ascii_start().starts_with(b"solid");
+    is_solid && !head.contains(&0) && !has_length(head, bytes)
 }
 
 fn announced(head: &[u8]) -> Option<u64> {

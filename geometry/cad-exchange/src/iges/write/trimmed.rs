@@ -142,3 +142,60 @@ fn curve<const D: usize>(
     curve_parameters(&mut record, own, end, true, 0.0);
     record.finish()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::iges::{SplineCurve, TrimmedSurface, read_model};
+    use nurbs::KnotVector;
+
+    fn chain<const D: usize>(points: Vec<[f64; D]>) -> BSplineCurve<D> {
+        let spans = points.len() - 1;
+        BSplineCurve::new(
+            KnotVector::uniform(1, spans, 0.0, spans as f64).unwrap(),
+            points,
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn a_patch_is_read_as_it_was_written() {
+        let knots = || KnotVector::uniform(3, 2, 0.0, 2.0).unwrap();
+        let at = |i: f64, j: f64| [i, j, 0.1 * i * j];
+        let points = (0..25)
+            .map(|k| at(f64::from(k / 5), f64::from(k % 5)))
+            .collect();
+        let surface = BSplineSurface::new(knots(), knots(), points).unwrap();
+        let flat = vec![[0.5, 0.5], [1.5, 0.5], [1.0, 1.5], [0.5, 0.5]];
+        let spatial = flat.iter().map(|&[u, v]| surface.evaluate(u, v)).collect();
+        let (flat, spatial) = ([chain(flat)], [chain(spatial)]);
+        let patch = NamedPatch {
+            name: "hole-7",
+            surface: &surface,
+            parameter_curves: &flat,
+            space_curves: &spatial,
+        };
+        let options = WriteOptions::new("holes", "20261128.120000");
+        let mut file = Vec::new();
+        let summary = write_trimmed(&[patch], 1e-2, &options, &mut file).unwrap();
+        assert_eq!((summary.faces, summary.resolution_mm), (1, 1e-2));
+        let model = read_model(&file[..]).unwrap();
+        let [face] = &model.faces[..] else {
+            panic!("{} faces", model.faces.len());
+        };
+        assert_eq!(face.name.as_deref(), Some("hole-7"));
+        assert_eq!(face.surface, TrimmedSurface::BSpline(surface.clone()));
+        let border = &face.outer[0];
+        assert_eq!(
+            border.parameter_curve,
+            Some(SplineCurve::BSpline(flat[0].clone()))
+        );
+        assert_eq!(border.space_curve, SplineCurve::BSpline(spatial[0].clone()));
+        // Without a trim there is no outer border.
+        let bare = NamedPatch {
+            parameter_curves: &[],
+            ..patch
+        };
+        assert!(write_trimmed(&[bare], 0.0, &options, &mut Vec::new()).is_err());
+    }
+}
