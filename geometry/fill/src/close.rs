@@ -11,12 +11,10 @@ use crate::report::Outcome;
 use crate::settings::{Method, Precision, Settings};
 use crate::yoo::{Base, Trim, TrimmedPatch, Unseen, base, elements, trim};
 
-/// Points in the dense part of a fit: as many as these times the vertices of small loops, and at least
-/// so many; the most where loops are large, since noise is told from form by their number.
+/// Points in the dense part of a fit: as many as these times the loop's vertices, between two bounds.
 const CENTRES_PER_VERTEX: usize = 6;
 const FEWEST_CENTRES: usize = 160;
-const MOST_CENTRES: usize = 900;
-const LARGE_LOOP: usize = 48;
+const MOST_CENTRES: usize = 600;
 /// Most points whose whole system is eliminated by the paper's way.
 const MOST_ELIMINATED: usize = 2500;
 
@@ -67,11 +65,7 @@ pub(crate) struct Closed {
 }
 
 fn fit_settings(kernel: Kernel, method: Method, points: usize, border: usize) -> FitSettings {
-    let most = if border < LARGE_LOOP {
-        (CENTRES_PER_VERTEX * border).max(FEWEST_CENTRES)
-    } else {
-        MOST_CENTRES
-    };
+    let most = (CENTRES_PER_VERTEX * border).clamp(FEWEST_CENTRES, MOST_CENTRES);
     let is_whole = method == Method::Yoo && points <= MOST_ELIMINATED;
     FitSettings {
         kernel,
