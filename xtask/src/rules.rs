@@ -45,6 +45,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("toolpath", &["range-image"]),
     ("terraces", &["nurbs"]),
+    ("fill", &["nurbs", "range-image"]),
     ("features", &["nurbs", "range-image", "segment", "terraces"]),
     (
         "pipeline",
@@ -88,6 +89,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "sim-scanner",
         ],
     ),
+    ("relief-fillings", &["fill", "range-image"]),
     ("relief-tests", &EVERYTHING),
     ("relief-studies", &STUDIES),
     (
@@ -158,11 +160,13 @@ const DAEMON: [&str; 18] = [
     "toolpath",
 ];
 
-const COMMAND_LINE: [&str; 22] = [
+const COMMAND_LINE: [&str; 24] = [
     "cad-exchange",
     "compare",
     "deliverables",
     "features",
+    "fill",
+    "mesh-files",
     "nurbs",
     "pipeline",
     "range-image",

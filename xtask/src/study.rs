@@ -46,6 +46,13 @@ pub(crate) enum Study {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
+    /// Fill holes that were cut from known surfaces, and hold the fillings against these.
+    #[command(disable_help_flag = true)]
+    Fillings {
+        /// Options of the study; `--help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
     /// Scan under faults of every class, and under mixes of them, in simulated time.
     #[command(disable_help_flag = true)]
     Faults {
@@ -113,6 +120,7 @@ pub(crate) fn run(study: &Study) -> Result<()> {
         }
         Study::Faults { options } => program("study-faults", options),
         Study::Features { options } => features(options),
+        Study::Fillings { options } => program("study-fillings", options),
         Study::Mutations { options } => program("study-mutations", options),
         Study::Outline { options } => program("study-outline", options),
         Study::Parts { options } => {

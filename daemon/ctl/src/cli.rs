@@ -6,8 +6,8 @@ use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    abort, change, compare, convert, demo, doctor, features, fetch, jobs, laser, manual, rerun,
-    resume, scan, scans, skin, status, surface, token, toolpath, watch, webhooks,
+    abort, change, compare, convert, demo, doctor, features, fetch, fill, jobs, laser, manual,
+    rerun, resume, scan, scans, skin, status, surface, token, toolpath, watch, webhooks,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
@@ -15,8 +15,8 @@ use crate::command::{
 /// `relief demo` shows the whole road with a simulated scanner; `relief convert` takes an
 /// existing scan file, `relief surface` makes one B-spline surface of it, and `relief compare` holds
 /// it against its nominal; `relief features` recognises holes, pockets, slots and their like in it;
-/// `relief skin` makes a surface of cross-sections, `relief toolpath` mills a
-/// model; `relief doctor` finds out why something does not work. The other
+/// `relief skin` makes a surface of cross-sections, `relief fill` closes the holes of a mesh, and
+/// `relief toolpath` mills a model; `relief doctor` finds out why something does not work. The other
 /// commands speak to the service, reliefd.
 #[derive(Debug, Parser)]
 #[command(name = "relief", version, max_term_width = 100)]
@@ -35,6 +35,7 @@ pub(crate) enum Command {
     Convert(convert::Args),
     Compare(compare::Args),
     Features(features::Args),
+    Fill(fill::Args),
     Skin(skin::Args),
     Surface(surface::Args),
     Toolpath(toolpath::Args),

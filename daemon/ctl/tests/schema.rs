@@ -69,6 +69,7 @@ fn the_schemas_are_schemas() {
         "token",
         "laser",
         "toolpath",
+        "fill",
         "webhooks",
         "features",
         "features_train",

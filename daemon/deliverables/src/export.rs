@@ -141,6 +141,23 @@ pub fn write_surfaces(
     })
 }
 
+/// Writes trimmed B-spline surfaces as IGES; curves in space may lie `gap_mm` off.
+///
+/// # Errors
+/// As [`iges::write_trimmed`].
+pub fn write_trimmed(
+    patches: &[iges::NamedPatch<'_>],
+    gap_mm: f64,
+    name: &str,
+    timestamp: Timestamp,
+    mut sink: impl Write,
+) -> Result<iges::Summary, WriteError> {
+    let stem = file_stem(name);
+    let mut options = iges::WriteOptions::new(stem.clone(), iges_time(timestamp));
+    options.file_name = format!("{stem}.igs");
+    Ok(iges::write_trimmed(patches, gap_mm, &options, &mut sink)?)
+}
+
 fn iges_time(timestamp: Timestamp) -> String {
     let time = timestamp.to_zoned(TimeZone::UTC);
     time.strftime("%Y%m%d.%H%M%S").to_string()

@@ -28,7 +28,7 @@ mod write;
 pub use comparison::ComparisonReport;
 pub use export::{
     CadOptions, Entities, LengthUnit, Schema, WriteError, file_stem, write_iges, write_step,
-    write_surfaces,
+    write_surfaces, write_trimmed,
 };
 pub use file::{hexadecimal, sha256_of, write_atomically};
 pub use filed::{PageFormat, PageFormats, comparison_page, scan_page};

@@ -22,6 +22,49 @@ pub enum PointFormat {
     E57,
 }
 
+/// A format of bare triangles, which are read and written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum TriangleFormat {
+    /// Stereolithography.
+    Stl,
+    /// Polygon file format.
+    Ply,
+    /// Wavefront OBJ.
+    Obj,
+}
+
+impl TriangleFormat {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Stl, Self::Ply, Self::Obj];
+
+    /// The ending of its files.
+    #[must_use]
+    pub fn ending(self) -> &'static str {
+        match self {
+            Self::Stl => "stl",
+            Self::Ply => "ply",
+            Self::Obj => "obj",
+        }
+    }
+
+    /// Its name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Stl => "STL",
+            Self::Ply => "PLY",
+            Self::Obj => "OBJ",
+        }
+    }
+
+    /// The format that an ending means, in either case.
+    #[must_use]
+    pub fn of_ending(ending: &str) -> Option<Self> {
+        let of = |format: &Self| ending.eq_ignore_ascii_case(format.ending());
+        Self::ALL.into_iter().find(of)
+    }
+}
+
 impl MeshFormat {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Stl, Self::Ply, Self::ThreeMf, Self::Glb];

@@ -1,4 +1,5 @@
-//! Files of triangles (STL, PLY, 3MF, glTF) and of points (PLY, E57), written through libraries.
+//! Files of triangles (STL, PLY, 3MF, glTF) and of points (PLY, E57), written through libraries;
+//! files of bare triangles (STL, PLY, OBJ), read and written.
 //!
 //! Triangles come from [`tessellate`], with their faces: PLY, 3MF and glTF carry these by name and
 //! colour. Lengths are millimetres, but metres where a standard asks for them (glTF, E57). The part
@@ -11,18 +12,22 @@ mod format;
 mod glb;
 mod ply;
 mod points;
+mod read;
 mod scan;
 mod stl;
 mod threemf;
+mod triangles;
 
 use std::io::Write;
 
 use tessellate::Mesh;
 
 pub use error::MeshFileError;
-pub use format::{MeshFormat, PointFormat};
+pub use format::{MeshFormat, PointFormat, TriangleFormat};
 pub use points::{Point, Points};
+pub use read::{MOST_TRIANGLES, ReadMeshError, Triangles, read_stl, read_triangles};
 pub use scan::ScanDetails;
+pub use triangles::write_triangles;
 
 /// What stands in a file beside its triangles.
 #[derive(Debug, Clone, Copy)]

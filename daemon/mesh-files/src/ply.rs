@@ -77,7 +77,7 @@ impl PropertyAccess for Facet {
     }
 }
 
-fn element(name: &str, count: usize, properties: &[(&str, PropertyType)]) -> ElementDef {
+pub(crate) fn element(name: &str, count: usize, properties: &[(&str, PropertyType)]) -> ElementDef {
     let mut element = ElementDef::new(name.to_owned());
     element.count = count;
     for (name, kind) in properties {
@@ -88,7 +88,7 @@ fn element(name: &str, count: usize, properties: &[(&str, PropertyType)]) -> Ele
     element
 }
 
-fn header(comments: Vec<String>, elements: &[&ElementDef]) -> Header {
+pub(crate) fn header(comments: Vec<String>, elements: &[&ElementDef]) -> Header {
     let mut header = Header::new();
     header.encoding = Encoding::BinaryLittleEndian;
     header.comments = comments;
@@ -99,7 +99,7 @@ fn header(comments: Vec<String>, elements: &[&ElementDef]) -> Header {
 }
 
 /// A comment is one line of ASCII.
-fn comment(text: &str) -> String {
+pub(crate) fn comment(text: &str) -> String {
     let plain = |c: char| {
         if c.is_ascii_graphic() || c == ' ' {
             c

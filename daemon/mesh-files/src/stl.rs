@@ -23,7 +23,7 @@ pub(crate) fn write(mesh: &Mesh, mut sink: &mut dyn Write) -> Result<(), MeshFil
 }
 
 /// The unit normal of a triangle; zeros, which readers take for none, where it has no area.
-fn normal([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
+pub(crate) fn normal([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
     let [u, v]: [[f64; 3]; 2] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
     let normal = [
         u[1] * v[2] - u[2] * v[1],

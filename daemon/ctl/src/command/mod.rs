@@ -8,6 +8,7 @@ pub(crate) mod demo;
 pub(crate) mod doctor;
 pub(crate) mod features;
 pub(crate) mod fetch;
+pub(crate) mod fill;
 mod grid;
 pub(crate) mod jobs;
 pub(crate) mod laser;
@@ -45,6 +46,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Demo(args) => block_on(demo::run(args, json)),
         Command::Compare(args) => block_on(compare::run(args, json)),
         Command::Features(args) => block_on(features::run(args, json)),
+        Command::Fill(args) => block_on(fill::run(args, json)),
         Command::Toolpath(args) => block_on(toolpath::run(args, json)),
         Command::Convert(args) => block_on(convert::run(args, json)),
         Command::Skin(args) => block_on(skin::run(args, json)),

@@ -5,7 +5,7 @@
 //! common edges, with name, colour and level;
 //! [`read_points`] takes measured points (106, 116) from anybody's file; [`read_model`]
 //! reads back what [`write()`] writes. [`write_surfaces`] writes whole B-spline surfaces (128; as 114 by
-//! [`write_parametric_surfaces`]),
+//! [`write_parametric_surfaces`]), [`write_trimmed`] such with trims that are given as B-splines,
 //! [`read_surfaces`] reads them, and [`read_chains`] curves and chains of points (106, 112, 126).
 //!
 //! A file is sections of 80-column lines: Start, Global, Directory entry, Parameter
@@ -21,6 +21,6 @@ pub use read::{
     read_points, read_surfaces,
 };
 pub use write::{
-    DEFAULT_PALETTE, Entities, FaceDefect, NamedSurface, Summary, WriteError, WriteOptions, write,
-    write_parametric_surfaces, write_surfaces,
+    DEFAULT_PALETTE, Entities, FaceDefect, NamedPatch, NamedSurface, Summary, WriteError,
+    WriteOptions, write, write_parametric_surfaces, write_surfaces, write_trimmed,
 };

@@ -1,8 +1,7 @@
 //! Triangles of a part from its file: the nominal of a comparison, or a model to be milled.
 
-use std::collections::HashMap;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
+use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 use cad_exchange::step;
@@ -11,9 +10,8 @@ use solids::FacetSettings;
 
 use crate::failure::Failure;
 
-/// Length of a binary file's header, its count of facets included, and of each facet.
-const HEADER_BYTES: u64 = 84;
-const FACET_BYTES: u64 = 50;
+/// By so many bytes it is told what a file is.
+const HEAD_BYTES: u64 = 84;
 /// How a STEP file begins, and how far triangles may lie from its surfaces: a hundredth of what the
 /// finest scanners tell.
 const STEP: &[u8] = b"ISO-10303-21";
@@ -53,7 +51,7 @@ pub(crate) fn triangles(
     let mut head = Vec::new();
     source
         .by_ref()
-        .take(HEADER_BYTES)
+        .take(HEAD_BYTES)
         .read_to_end(&mut head)
         .map_err(cannot)?;
     if bytes > MOST_BYTES {
@@ -80,19 +78,12 @@ pub(crate) fn triangles(
         )));
     }
     let unit_mm = unit_mm.unwrap_or(1.0);
-    let is_text = head.trim_ascii_start().starts_with(b"solid") && !is_binary(&head, bytes);
-    let mut solid = if is_text {
-        source.rewind().map_err(cannot)?;
-        let mut line = Vec::new();
-        source.read_until(b'\n', &mut line).map_err(cannot)?;
-        Reheaded::new(&mut source, b"solid \n".to_vec(), line.len())
-    } else {
-        check_length(&head, bytes).map_err(|why| failed(&why))?;
-        head.iter_mut().take(80).for_each(|byte| *byte = 0);
-        let length = head.len();
-        Reheaded::new(&mut source, head, length)
-    };
-    facets(&mut solid, unit_mm).map_err(|why| failed(&why))
+    source.rewind().map_err(cannot)?;
+    let read = mesh_files::read_stl(&mut source, bytes, FACETS_MAX)
+        .map_err(|error| failed(&error.to_string()))?;
+    let vertices = read.vertices.iter().map(|p| p.map(|c| c * unit_mm));
+    let facets = read.triangles.iter().map(|t| t.map(|v| v as usize));
+    Ok((vertices.collect(), facets.collect()))
 }
 
 /// The faces of a STEP file.
@@ -120,108 +111,8 @@ pub(crate) fn of_body(body: &solids::Body) -> Result<Indexed, String> {
     Ok((points, facets.triangles))
 }
 
-/// Whether the number of facets fits the file's length: some binary files begin with `solid`, too.
-fn is_binary(head: &[u8], bytes: u64) -> bool {
-    announced(head).is_some_and(|count| HEADER_BYTES + FACET_BYTES * count == bytes)
-}
-
-fn announced(head: &[u8]) -> Option<u64> {
-    let count = head.get(80..84)?.try_into().ok()?;
-    Some(u64::from(u32::from_le_bytes(count)))
-}
-
-/// A binary file must hold what its header announces.
-fn check_length(head: &[u8], bytes: u64) -> Result<(), String> {
-    let Some(count) = announced(head) else {
-        return Err(format!(
-            "is no STL file: {bytes} bytes are less than the header of a binary one, and it does \
-             not begin with `solid`"
-        ));
-    };
-    let needed = HEADER_BYTES + FACET_BYTES * count;
-    if bytes < needed {
-        return Err(format!(
-            "is cut off, or no STL file: its header announces {count} facets, which take {needed} \
-             bytes; there are {bytes}"
-        ));
-    }
-    Ok(())
-}
-
-/// A file with another beginning. The library takes for text what begins with `solid` and a space:
-/// some text files have no space there, and some binary ones begin just so.
-struct Reheaded<'a, R> {
-    rest: &'a mut R,
-    rest_from: u64,
-    head: Vec<u8>,
-    at: usize,
-}
-
-impl<'a, R: Read + Seek> Reheaded<'a, R> {
-    /// `head` in the place of the first `instead_of` bytes, behind which the file is.
-    fn new(rest: &'a mut R, head: Vec<u8>, instead_of: usize) -> Self {
-        Self {
-            rest,
-            rest_from: instead_of as u64,
-            head,
-            at: 0,
-        }
-    }
-}
-
-impl<R: Read + Seek> Read for Reheaded<'_, R> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let mut left = self.head.get(self.at..).unwrap_or(&[]);
-        if left.is_empty() {
-            return self.rest.read(buffer);
-        }
-        let read = left.read(buffer)?;
-        self.at += read;
-        Ok(read)
-    }
-}
-
-impl<R: Read + Seek> Seek for Reheaded<'_, R> {
-    /// Goes to the beginning, which is all that the library asks for.
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        if to != SeekFrom::Start(0) {
-            return Err(io::ErrorKind::Unsupported.into());
-        }
-        self.at = 0;
-        self.rest.seek(SeekFrom::Start(self.rest_from))?;
-        Ok(0)
-    }
-}
-
 /// Vertices, and triangles by their indices.
 pub(crate) type Indexed = (Vec<[f64; 3]>, Vec<[usize; 3]>);
-
-/// Vertices, each once, and facets as indices of them.
-fn facets(source: &mut (impl Read + Seek), unit_mm: f64) -> Result<Indexed, String> {
-    let damaged = |facet: usize, error: &std::io::Error| {
-        format!("is damaged, or no STL file: facet {facet}: {error}")
-    };
-    let reader = stl_io::create_stl_reader(source).map_err(|error| damaged(1, &error))?;
-    let (mut vertices, mut facets) = (Vec::new(), Vec::new());
-    let mut known: HashMap<[u32; 3], usize> = HashMap::new();
-    for (number, triangle) in (1..).zip(reader) {
-        let triangle = triangle.map_err(|error| damaged(number, &error))?;
-        if number > FACETS_MAX {
-            return Err(format!(
-                "has more than {FACETS_MAX} facets, the most that are read: decimate the mesh first"
-            ));
-        }
-        facets.push(triangle.vertices.map(|vertex| {
-            // Adding 0 makes one of both zeros.
-            let place = [vertex[0], vertex[1], vertex[2]].map(|c: f32| c + 0.0);
-            *known.entry(place.map(f32::to_bits)).or_insert_with(|| {
-                vertices.push(place.map(|c| f64::from(c) * unit_mm));
-                vertices.len() - 1
-            })
-        }));
-    }
-    Ok((vertices, facets))
-}
 
 /// What a file is that is no STL.
 /// Whether a file is an IGES file, by its first line.

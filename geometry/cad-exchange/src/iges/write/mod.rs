@@ -17,6 +17,7 @@ mod plain;
 mod shapes;
 mod sheet;
 mod shell;
+mod trimmed;
 
 use std::io;
 
@@ -26,6 +27,7 @@ pub use crate::common::{DEFAULT_PALETTE, FaceDefect};
 pub use error::WriteError;
 pub use options::{Entities, WriteOptions};
 pub use plain::{NamedSurface, write_parametric_surfaces, write_surfaces};
+pub use trimmed::{NamedPatch, write_trimmed};
 
 use crate::brep::{Brep, Sharing};
 use crate::common::check;

@@ -236,14 +236,28 @@ fn bspline_curve<const D: usize>(
     joined: &Joined<'_, D>,
 ) -> Result<Pointer, WriteError> {
     let spline: BSplineCurve<D> = joined.curve.to_bspline(SMOOTH_MM);
+    let mut record = sheet.begin(plain_entry(126, level, curve_status(D)));
+    let (end, flat_mm) = (Some(joined.end), joined.flat_mm);
+    curve_parameters(&mut record, &spline, end, joined.closed, flat_mm);
+    record.finish()
+}
+
+/// The parameters of entity 126; its last control point is `end` where that is given, and points within
+/// `flat_mm` of one plane are in it.
+pub(super) fn curve_parameters<const D: usize>(
+    record: &mut Record<'_>,
+    spline: &BSplineCurve<D>,
+    end: Option<[f64; D]>,
+    closed: bool,
+    flat_mm: f64,
+) {
     let knots = spline.knots();
     let count = knots.control_count();
-    let normal = plane_normal(spline.points(), joined.flat_mm);
-    let mut record = sheet.begin(plain_entry(126, level, curve_status(D)));
+    let normal = plane_normal(spline.points(), flat_mm);
     record.integer(count - 1);
     record.integer(knots.degree());
     record.integer(usize::from(normal.is_some()));
-    record.integer(usize::from(joined.closed));
+    record.integer(usize::from(closed));
     // Polynomial, not periodic.
     record.integer(1);
     record.integer(0);
@@ -252,12 +266,8 @@ fn bspline_curve<const D: usize>(
         record.real(1.0);
     }
     for (index, point) in spline.points().iter().enumerate() {
-        let point = if index + 1 == count {
-            &joined.end
-        } else {
-            point
-        };
-        record.reals(point);
+        let last = end.as_ref().filter(|_| index + 1 == count);
+        record.reals(last.unwrap_or(point));
         for _ in D..3 {
             record.real(0.0);
         }
@@ -266,7 +276,6 @@ fn bspline_curve<const D: usize>(
     record.reals(&[first, last]);
     // Normal of the plane, zero where there is none.
     record.reals(&normal.unwrap_or_default());
-    record.finish()
 }
 
 /// Unit normal of the one plane that holds the points; `None` where there is none, or

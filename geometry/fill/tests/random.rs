@@ -1,0 +1,52 @@
+//! Random holes in closed surfaces.
+#![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
+
+mod common;
+
+use common::{Shape, compacted, is_watertight};
+use fill::{Settings, TriangleMesh, fill};
+use proptest::prelude::*;
+use range_image::Unmonitored;
+
+/// A mesh without the triangles around some, grown by rings.
+fn holed(mesh: &TriangleMesh, seeds: &[(prop::sample::Index, usize)]) -> TriangleMesh {
+    let mut is_out = vec![false; mesh.triangles.len()];
+    for (index, rings) in seeds {
+        let mut corners: std::collections::HashSet<u32> =
+            mesh.triangles[index.index(mesh.triangles.len())].into();
+        is_out[index.index(mesh.triangles.len())] = true;
+        for _ in 0..*rings {
+            let before = corners.clone();
+            for (t, own) in mesh.triangles.iter().enumerate() {
+                if own.iter().any(|v| before.contains(v)) {
+                    is_out[t] = true;
+                    corners.extend(own);
+                }
+            }
+        }
+    }
+    let kept = (0..mesh.triangles.len()).filter(|&t| !is_out[t]);
+    compacted(mesh, kept.map(|t| mesh.triangles[t]).collect())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    #[test]
+    fn all_are_closed(
+        seeds in prop::collection::vec((any::<prop::sample::Index>(), 0..5_usize), 1..7),
+        torus in any::<bool>(),
+    ) {
+        let shape = if torus { Shape::Torus } else { Shape::Sphere };
+        let (mesh, _) = shape.mesh(5.0);
+        let mesh = holed(&mesh, &seeds);
+        let own = fill(mesh.clone(), &Settings::default(), &Unmonitored).unwrap();
+        // Holes may leave islands and touch; what stays open is told.
+        prop_assert!(own.open().is_empty(), "{:?}", own.holes);
+        prop_assert!(is_watertight(&own.mesh));
+        for (own, old) in own.mesh.triangles.iter().map(|t| t.map(|v| own.mesh.vertices_mm[v as usize]))
+            .zip(mesh.triangles.iter().map(|t| t.map(|v| mesh.vertices_mm[v as usize]))) {
+            prop_assert_eq!(own, old);
+        }
+    }
+}
