@@ -162,6 +162,9 @@ fn full() -> anyhow::Result<()> {
     study::run(&study::Study::Parts {
         options: ["--gmsh", "--check"].map(Into::into).to_vec(),
     })?;
+    study::run(&study::Study::Features {
+        options: vec!["--check".into()],
+    })?;
     study::run(&study::Study::Surfaces {
         short: false,
         scan: None,

@@ -62,30 +62,33 @@ pub fn rebuilt(recognition: &Recognition) -> Result<Rebuilt, RebuildError> {
         );
         lowest - LEAST_UNDER_MM.max(UNDER_SHARE * length)
     });
-    let mut part = Part::new(outline(block, 0.0)?, top_mm, bottom_mm);
+    let edges = Edges::of(features, block, &mut assumed);
+    let mut part = Part::new(outline(block, 0.0, edges.is_sharp)?, top_mm, bottom_mm);
     let frame = &recognition.frame;
     part.frame = Frame {
         origin_mm: frame.origin_mm.into(),
         x: frame.axes[0].into(),
         z: frame.axes[2].into(),
     };
-    part.upper = upper(features, block.id);
+    part.upper = edges.upper;
     for feature in features.iter().filter(|f| f.id != block.id) {
         let name = format!("{} {}", feature.class, feature.id);
+        let edges = Edges::of(features, feature, &mut assumed);
         let operation = match feature.lie {
             Some(Lie::Hollow) => {
-                let outline = outline(feature, BEYOND_MM)?;
+                let outline = outline(feature, BEYOND_MM, edges.is_sharp)?;
                 Operation::cut(name, outline, floor(feature, &mut assumed))
             }
             Some(Lie::Raised) => {
                 let z_mm = feature.heights_mm.1.unwrap_or(feature.heights_mm.0);
-                Operation::raise(name, outline(feature, 0.0)?, Floor::Level { z_mm })
+                let outline = outline(feature, 0.0, edges.is_sharp)?;
+                Operation::raise(name, outline, Floor::Level { z_mm })
             }
             Some(Lie::Body) | None => continue,
         };
         part.operations.push(Operation {
-            upper: upper(features, feature.id),
-            lower: lower(features, feature.id),
+            upper: edges.upper,
+            lower: edges.lower,
             ..operation
         });
     }
@@ -114,6 +117,74 @@ fn floor(feature: &Feature, assumed: &mut Vec<String>) -> Floor {
             Shape::Rectangle(_) => level(rim_mm),
         },
         (Bottom::FreeForm(surface), Some(_)) => Floor::FreeForm(surface.clone()),
+    }
+}
+
+/// The treated edges of a feature, as its corners allow.
+struct Edges {
+    upper: Option<Treatment>,
+    lower: Option<Treatment>,
+    /// Whether its corners are taken to be sharp.
+    is_sharp: bool,
+}
+
+/// Of a corner's radius, how wide an edge in it is made where it is wider.
+const IN_CORNER: f64 = 0.95;
+
+impl Edges {
+    fn of(features: &[Feature], feature: &Feature, assumed: &mut Vec<String>) -> Self {
+        let mut own = Self {
+            upper: upper(features, feature.id),
+            lower: lower(features, feature.id),
+            is_sharp: false,
+        };
+        let Shape::Rectangle(rectangle) = feature.outline else {
+            return own;
+        };
+        // Those within the outline, whose corners become narrower.
+        let within = match feature.lie {
+            Some(Lie::Hollow) => &mut own.lower,
+            _ => &mut own.upper,
+        };
+        let Some(edge) = within else {
+            return own;
+        };
+        let (width, limit) = (width_mm(edge), IN_CORNER * rectangle.corner_mm);
+        if width <= limit {
+            return own;
+        }
+        // A small radius that is not told is that of a sharp corner between two samples.
+        if feature.dimension("corner_radius").is_none() {
+            own.is_sharp = true;
+        } else {
+            assumed.push(format!(
+                "{} {}: its treated edge is {limit:.3} mm wide instead of {width:.3}, as its corners \
+                 allow",
+                feature.class, feature.id
+            ));
+            narrow(edge, limit / width);
+        }
+        own
+    }
+}
+
+fn width_mm(edge: &Treatment) -> f64 {
+    match edge {
+        Treatment::Round { radius_mm } => *radius_mm,
+        Treatment::Chamfer { width_mm, .. } => *width_mm,
+    }
+}
+
+fn narrow(edge: &mut Treatment, share: f64) {
+    match edge {
+        Treatment::Round { radius_mm } => *radius_mm *= share,
+        Treatment::Chamfer {
+            width_mm,
+            height_mm,
+        } => {
+            *width_mm *= share;
+            *height_mm *= share;
+        }
     }
 }
 
@@ -154,10 +225,13 @@ fn treated(features: &[Feature], of: u32, kinds: &[Kind]) -> Option<Treatment> {
 }
 
 /// The outline of a feature; sides at which it runs out are moved outwards.
-fn outline(feature: &Feature, beyond_mm: f64) -> Result<Outline, RebuildError> {
+fn outline(feature: &Feature, beyond_mm: f64, is_sharp: bool) -> Result<Outline, RebuildError> {
     let made = match feature.outline {
         Shape::Circle(circle) => Outline::circle(circle.centre_mm, circle.radius_mm),
-        Shape::Rectangle(own) => Outline::new(pieces(&own, beyond_mm)),
+        Shape::Rectangle(own) => {
+            let corner_mm = if is_sharp { 0.0 } else { own.corner_mm };
+            Outline::new(pieces(&Rectangle { corner_mm, ..own }, beyond_mm))
+        }
     };
     made.map_err(|error| RebuildError::Outline {
         class: feature.class.clone(),

@@ -7,6 +7,7 @@ mod common;
 use common::{Bench, scan};
 use features::feature::{Bottom, Feature};
 use features::network::Classifier;
+use features::rebuild::rebuilt;
 use features::recognise::{Recognition, Settings, Teller, recognise};
 use range_image::Unmonitored;
 
@@ -174,6 +175,44 @@ fn rounded_edges_amid_noise_leave_the_sizes_as_they_are() {
     assert!((size(block, "width") - 50.0).abs() < 0.2, "{block:?}");
     let boss = of(&found, "boss")[0];
     assert!((size(boss, "diameter") - 14.0).abs() < 0.25, "{boss:?}");
+    // Noise at its corners keeps the block from none of its rounds.
+    let made = rebuilt(&found).unwrap();
+    assert_eq!(made.assumed, Vec::<String>::new());
+    let solid = made.part.build().unwrap();
+    assert!(solid.warnings.is_empty(), "{:?}", solid.warnings);
+}
+
+/// A fillet that is wider than the corners of its pocket are round is made as wide as these allow.
+#[test]
+fn an_edge_that_its_corners_are_too_narrow_for_is_made_narrower() {
+    let part = |x: f64, y: f64| {
+        let (u, v) = turned(x, y);
+        if u.abs() > 40.0 || v.abs() > 25.0 {
+            return TABLE_MM;
+        }
+        // 30 x 24, corners of 2.5 and a foot of 3.5.
+        let corner = 2.5;
+        let over = [u.abs() - 15.0 + corner, v.abs() - 12.0 + corner];
+        let outer = over.map(|own| own.max(0.0));
+        let beyond = off(outer[0], outer[1]) + over[0].max(over[1]).min(0.0) - corner;
+        if beyond > 0.0 {
+            return 0.0;
+        }
+        let along = (3.5 + beyond).max(0.0);
+        -7.0 + 3.5 - (3.5 * 3.5 - along * along).sqrt()
+    };
+    let found = found(&part);
+    let pocket = of(&found, "pocket")[0];
+    let corner = size(pocket, "corner_radius");
+    assert!((corner - 2.5).abs() < 0.3, "{pocket:?}");
+    assert!((size(of(&found, "fillet")[0], "radius") - 3.5).abs() < 0.2);
+    let made = rebuilt(&found).unwrap();
+    let [told] = &made.assumed[..] else {
+        panic!("{:?}", made.assumed);
+    };
+    assert!(told.contains("as its corners allow"), "{told}");
+    let solid = made.part.build().unwrap();
+    assert!(solid.warnings.is_empty(), "{:?}", solid.warnings);
 }
 
 /// The foot of a pocket, rounded; and one that is not.

@@ -1,5 +1,10 @@
 //! Recorded scans, zippered: boundary loops, doubled triangles and crowded edges as they come.
-#![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::disallowed_types)]
+#![allow(
+    missing_docs,
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::disallowed_types
+)]
 
 mod common;
 
