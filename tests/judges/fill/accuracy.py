@@ -21,9 +21,8 @@ EDGES = (0.6, 1.5)
 # Peers round: what is so near is where it was. Some of them take the half of a double.
 NEAR = 1e-5
 # Settings of MeshLab's filter, whose best by the truth is told: edges to be aimed at, as a part of those
-# around, and whether triangles are kept from meeting others.
-MESHLAB = ((1.0, True), (0.5, True), (1.0, False))
-METHODS = ("relief", "yoo", "meshlab", "meshfix")
+# around, and whether triangles are kept from meeting others, which changed nothing where it was tried.
+MESHLAB = ((1.0, False), (0.5, True))
 
 
 class Case:
@@ -108,7 +107,8 @@ def run(options, folder, missed):
         for name in surfaces.ALL:
             for size in sizes:
                 for ragged in (False, True):
-                    if options.short and ragged != (size == 10):
+                    # One outline of each size will do.
+                    if (options.short or noise) and ragged != (size in (3, 10)):
                         continue
                     case = Case(options.seed, name, size, ragged, noise, folder)
                     rows.append(judged(options.relief, case, missed))
@@ -214,7 +214,8 @@ def noise_table(rows):
 
 def verdict(rows):
     """How many holes each peer fills as well, and how many times further off it is at the median."""
-    lines = []
+    nets = sum(row["relief"].get("nets", 0) for row in rows)
+    lines = [f"{len(rows)} holes; {nets} closed by a fair net alone, where no implicit surface did."]
     for name, title in (("meshlab", "MeshLab"), ("meshfix", "MeshFix")):
         both = [row for row in rows if row["relief"]["score"]]
         better, border, times, clean = 0, 0, [], 0

@@ -5,7 +5,6 @@ usage: fillers.py meshlab|meshfix IN.ply OUT.ply SETTINGS (JSON); seconds of the
 
 import dataclasses
 import json
-import os
 import pathlib
 import subprocess
 import sys
@@ -16,6 +15,7 @@ import meshes
 import numpy as np
 
 OWN = pathlib.Path(__file__)
+MEASURED = OWN.with_name("measured.py")
 
 
 @dataclasses.dataclass
@@ -32,32 +32,12 @@ class Run:
 
 def measured(words, timeout):
     """Runs a program; its wall clock, processor time and peak memory are its own alone."""
-    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-        began = time.perf_counter()
-        child = subprocess.Popen(words, stdout=out, stderr=err, stdin=subprocess.DEVNULL)
-        while True:
-            pid, status, usage = os.wait4(child.pid, os.WNOHANG)
-            if pid:
-                break
-            if time.perf_counter() - began > timeout:
-                child.kill()
-                _, _, usage = os.wait4(child.pid, 0)
-                status = None
-                break
-            time.sleep(0.002)
-        seconds = time.perf_counter() - began
-        # Popen has not seen the end, and need not wait for it any more.
-        child.returncode = 124 if status is None else os.waitstatus_to_exitcode(status)
-        out.seek(0)
-        err.seek(0)
-        return Run(
-            child.returncode,
-            seconds,
-            usage.ru_utime + usage.ru_stime,
-            usage.ru_maxrss / 1024,
-            out.read().decode(errors="replace"),
-            err.read().decode(errors="replace"),
-        )
+    with tempfile.NamedTemporaryFile() as told:
+        words = [sys.executable, "-S", "-B", str(MEASURED), str(timeout), told.name, *words]
+        done = subprocess.run(words, capture_output=True, stdin=subprocess.DEVNULL, check=True)
+        cost = json.loads(told.read())
+    out, err = (text.decode(errors="replace") for text in (done.stdout, done.stderr))
+    return Run(**cost, out=out, told=err)
 
 
 def ours(relief, source, target, *words, timeout=300):
