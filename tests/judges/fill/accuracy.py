@@ -215,7 +215,7 @@ def noise_table(rows):
 def verdict(rows):
     """How many holes each peer fills as well, and how many times further off it is at the median."""
     nets = sum(row["relief"].get("nets", 0) for row in rows)
-    lines = [f"{len(rows)} holes; {nets} closed by a fair net alone, where no implicit surface did."]
+    lines = [f"{len(rows)} holes; {nets} closed by a fair net alone, where no implicit surface did.\n"]
     for name, title in (("meshlab", "MeshLab"), ("meshfix", "MeshFix")):
         both = [row for row in rows if row["relief"]["score"]]
         better, border, times, clean = 0, 0, [], 0
