@@ -353,17 +353,35 @@ pub(crate) fn python(place: &Path, more: &[&str]) -> Result<String> {
     if had.is_empty() {
         shell::run("python3", &["-m", "venv", &home.display().to_string()])?;
     }
-    let mut install = vec![
+    install(&python, &packages)?;
+    let now: Vec<&str> = had.lines().chain(packages.iter().copied()).collect();
+    std::fs::write(&ready, now.join("\n"))
+        .with_context(|| format!("cannot write {}", ready.display()))?;
+    Ok(python)
+}
+
+/// A Python of a judge of its own, made once: each pins what it needs, apart from the others.
+pub(crate) fn environment(place: &Path, packages: &[&str]) -> Result<String> {
+    let home = place.join("python");
+    let python = home.join("bin/python").display().to_string();
+    let ready = home.join("ready");
+    let wanted = packages.join("\n");
+    if std::fs::read_to_string(&ready).is_ok_and(|had| had == wanted) {
+        return Ok(python);
+    }
+    shell::run("python3", &["-m", "venv", &home.display().to_string()])?;
+    install(&python, packages)?;
+    std::fs::write(&ready, wanted).with_context(|| format!("cannot write {}", ready.display()))?;
+    Ok(python)
+}
+
+fn install(python: &str, packages: &[&str]) -> Result<()> {
+    let pip = [
         "-m",
         "pip",
         "install",
         "--quiet",
         "--disable-pip-version-check",
     ];
-    install.extend(packages.iter().copied());
-    shell::run(&python, &install)?;
-    let now: Vec<&str> = had.lines().chain(packages.iter().copied()).collect();
-    std::fs::write(&ready, now.join("\n"))
-        .with_context(|| format!("cannot write {}", ready.display()))?;
-    Ok(python)
+    shell::run(python, &[&pip[..], packages].concat())
 }

@@ -2,6 +2,7 @@
 
 mod apt;
 mod deb;
+mod fillings;
 mod fuzz;
 mod judge;
 mod peers;
@@ -47,6 +48,10 @@ enum Chore {
     ///
     /// Needs Python 3; installs the judge's packages into `target/judges/toolpath`.
     JudgeToolpath(toolpath::Options),
+    /// Let trimesh, libigl and CGAL judge `relief fill`, side by side with MeshLab and MeshFix.
+    ///
+    /// Needs Python 3; installs the judge's packages into `target/judges/fill`.
+    JudgeFill(fillings::Options),
     /// Let OpenCASCADE judge solids of random parts, rebuilt from their features.
     ///
     /// Needs Python 3; installs the judge's packages into `target/judges`.
@@ -94,6 +99,7 @@ fn main() -> anyhow::Result<()> {
         Chore::Judge(options) => judge::run(&options),
         Chore::Peers(peers) => peers::run(&peers),
         Chore::JudgeToolpath(options) => toolpath::run(&options),
+        Chore::JudgeFill(options) => fillings::run(&options),
         Chore::JudgeSolids(options) => solids::run(&options),
         Chore::Reproduce(options) => reproduce::run(&options),
         Chore::Fuzz(options) => fuzz::run(&options),
@@ -139,6 +145,10 @@ fn full() -> anyhow::Result<()> {
     toolpath::run(&toolpath::Options {
         surfaces: 20,
         linuxcnc: true,
+    })?;
+    fillings::run(&fillings::Options {
+        short: false,
+        write: false,
     })?;
     solids::run(&solids::Options { parts: 500 })?;
     vm::run(&vm::Vm::Usb(vm::Options::default()))?;

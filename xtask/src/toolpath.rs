@@ -1,11 +1,9 @@
 //! Lets opencamlib, a removal simulation of its own and LinuxCNC judge cutters, paths and NC code.
 
-use std::path::{Path, PathBuf};
-
 use anyhow::{Context, Result};
 use clap::Args;
 
-use crate::{apt, shell};
+use crate::{apt, judge, shell};
 
 /// The judge's packages, pinned: another release may judge otherwise.
 const PACKAGES: [&str; 3] = ["opencamlib==2023.1.11", "numpy==2.4.6", "numba==0.68.1"];
@@ -27,7 +25,7 @@ pub(crate) struct Options {
 /// Makes surfaces and paths, and has them judged.
 pub(crate) fn run(options: &Options) -> Result<()> {
     let place = shell::root().join("target/judges/toolpath");
-    let python = python(&place)?;
+    let python = judge::environment(&place, &PACKAGES)?;
     let out = place.join("surfaces");
     if out.exists() {
         std::fs::remove_dir_all(&out).with_context(|| format!("cannot empty {}", out.display()))?;
@@ -53,27 +51,4 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         shell::run(&python, &[check, &folder])?;
     }
     Ok(())
-}
-
-/// A Python with the judge's packages, made once. Apart from that of the other judges: both pin
-/// what they need.
-fn python(place: &Path) -> Result<String> {
-    let home: PathBuf = place.join("python");
-    let python = home.join("bin/python").display().to_string();
-    let ready = home.join("ready");
-    let wanted = PACKAGES.join("\n");
-    if std::fs::read_to_string(&ready).is_ok_and(|had| had == wanted) {
-        return Ok(python);
-    }
-    shell::run("python3", &["-m", "venv", &home.display().to_string()])?;
-    let pip = [
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--disable-pip-version-check",
-    ];
-    shell::run(&python, &[&pip[..], &PACKAGES].concat())?;
-    std::fs::write(&ready, wanted).with_context(|| format!("cannot write {}", ready.display()))?;
-    Ok(python)
 }
