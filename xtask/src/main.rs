@@ -79,7 +79,8 @@ enum Chore {
     ///
     /// Needs `systemd-analyze`, which it installs on Debian as root.
     Units,
-    /// Build the studies, judges and other programs of the checks, all at once.
+    /// Build the studies, judges and other programs of the checks, all at once, and install what the
+    /// judges need.
     Programs,
     /// Make the Debian package of service, command line, units, manual pages and completions.
     ///
@@ -109,7 +110,10 @@ fn main() -> anyhow::Result<()> {
             study::program("soak", &options)
         }
         Chore::Units => units::check(),
-        Chore::Programs => study::build(),
+        Chore::Programs => {
+            study::build()?;
+            judge::python(&shell::root().join("target/judges"), &[]).map(drop)
+        }
         Chore::Deb(options) => deb::run(&options),
         Chore::Vm(vm) => vm::run(&vm),
         Chore::Full => full(),
