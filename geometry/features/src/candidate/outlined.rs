@@ -35,36 +35,39 @@ pub(super) fn outlined(sight: &Sight<'_>, border: &Border, lie: Lie, seed: u64) 
     };
     let main = of(own_sense);
     let falls = pairs.len() - main.len();
-    let mut found: Vec<Outline> = Vec::new();
-    let mut common = Vec::new();
-    if lie != Lie::Body && falls as f64 <= OPEN * pairs.len() as f64 {
-        let places: Vec<[f64; 2]> = main.iter().map(|(_, place)| *place).collect();
-        if let Some(start) = circle(&places) {
-            let own: Vec<Pair> = main.iter().map(|(pair, _)| *pair).collect();
-            let told = witnesses(sight, &own);
-            found.push(outline(Shape::Circle(start), &told, pitch_mm, seed));
-            common = told;
+    let as_circle = || {
+        if lie == Lie::Body || falls as f64 > OPEN * pairs.len() as f64 {
+            return None;
         }
-    }
-    let all: Vec<[f64; 2]> = match lie {
-        Lie::Hollow => pairs.iter().map(|(_, place)| *place).collect(),
-        Lie::Raised | Lie::Body => main.iter().map(|(_, place)| *place).collect(),
+        let places: Vec<[f64; 2]> = main.iter().map(|(_, place)| *place).collect();
+        let start = circle(&places)?;
+        let own: Vec<Pair> = main.iter().map(|(pair, _)| *pair).collect();
+        let told = witnesses(sight, &own);
+        Some((outline(Shape::Circle(start), &told, pitch_mm, seed), told))
     };
-    if let Some(start) = rectangle(&all) {
+    let as_rectangle = || {
+        let all: Vec<[f64; 2]> = match lie {
+            Lie::Hollow => pairs.iter().map(|(_, place)| *place).collect(),
+            Lie::Raised | Lie::Body => main.iter().map(|(_, place)| *place).collect(),
+        };
+        let start = rectangle(&all)?;
         let (start, own) = match lie {
             Lie::Hollow => sided(start, &pairs, sight.field.image.pitch_mm()),
             Lie::Raised | Lie::Body => (start, main.iter().map(|(pair, _)| *pair).collect()),
         };
         let told = witnesses(sight, &own);
-        found.push(outline(Shape::Rectangle(start), &told, pitch_mm, seed));
-    }
+        Some(outline(Shape::Rectangle(start), &told, pitch_mm, seed))
+    };
+    let (round, straight) = rayon::join(as_circle, as_rectangle);
+    let (round, common) = round.map_or((None, Vec::new()), |(own, told)| (Some(own), told));
     // Both are asked of the same witnesses, and numbers cost what Schwarz 1978 says.
     let score = |one: &Outline| {
         let cost = one.shape.freedom() as f64 * libm::log(common.len().max(2) as f64);
         log_likelihood(&one.shape, &common, pitch_mm) - 0.5 * cost
     };
-    found
+    [round, straight]
         .into_iter()
+        .flatten()
         .max_by(|a, b| score(a).total_cmp(&score(b)))
 }
 

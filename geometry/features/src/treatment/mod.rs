@@ -9,6 +9,7 @@ mod settle;
 use std::collections::BTreeMap;
 
 use range_image::{Cancelled, Monitor};
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 use crate::candidate::{Candidate, Lie};
 use crate::levels::Strip;
@@ -91,32 +92,54 @@ pub fn treatments(
             groups.entry((of, strip.falls)).or_default().push(*strip);
         }
     }
+    monitor.check()?;
+    let none = Vec::new();
+    let found_then: &[Candidate] = found;
+    // Each edge by itself: none depends on how another turned out.
+    let settled: Vec<(usize, bool, Found)> = (0..found.len())
+        .flat_map(|of| [(of, false), (of, true)])
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .filter_map(|(of, falls)| {
+            let strips = groups.get(&(of, falls)).unwrap_or(&none);
+            Some((of, falls, Found::of(sight, found_then, of, falls, strips)?))
+        })
+        .collect();
+    monitor.check()?;
     let mut treated = Vec::new();
-    for of in 0..found.len() {
-        for falls in [false, true] {
-            monitor.check()?;
-            let of_strips = groups
-                .get(&(of, falls))
-                .and_then(|strips| Rim::of_strips(sight, found, of, strips));
-            let rim = of_strips.or_else(|| Rim::hinted(sight, found, of, falls));
-            let Some((rim, edge)) = rim.and_then(|rim| Some((rim, rim.edge(sight, found)?))) else {
-                continue;
-            };
-            if let Some(settled) =
-                settled(&edge, falls, of_strips.is_some(), sight.field.pitch_mm())
-            {
-                treated.push(treatment(sight, &found[of], &rim, &edge, &settled));
-                if falls {
-                    moved(
-                        &mut found[of],
-                        &settled,
-                        LEAST_SIGMA * sight.field.pitch_mm(),
-                    );
-                }
-            }
+    for (of, falls, own) in settled {
+        treated.push(own.treatment);
+        if falls {
+            let least_mm = LEAST_SIGMA * sight.field.pitch_mm();
+            moved(&mut found[of], &own.settled, least_mm);
         }
     }
     Ok(treated)
+}
+
+/// A treated edge, and its section.
+struct Found {
+    treatment: Treatment,
+    settled: Settled,
+}
+
+impl Found {
+    fn of(
+        sight: &Sight<'_>,
+        found: &[Candidate],
+        of: usize,
+        falls: bool,
+        strips: &[Strip],
+    ) -> Option<Self> {
+        let of_strips = Rim::of_strips(sight, found, of, strips);
+        let rim = of_strips.or_else(|| Rim::hinted(sight, found, of, falls))?;
+        let edge = rim.edge(sight, found)?;
+        let settled = settled(&edge, falls, of_strips.is_some(), sight.field.pitch_mm())?;
+        Some(Self {
+            treatment: treatment(sight, &found[of], &rim, &edge, &settled),
+            settled,
+        })
+    }
 }
 
 /// The section of an edge; of one without a strip only where there must be one.
