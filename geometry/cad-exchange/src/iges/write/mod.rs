@@ -144,12 +144,24 @@ fn write_face(
 ) -> Result<(), WriteError> {
     let level = style.level;
     let name = write_name(sheet, level, &face.name)?;
-    let mut trimmed = sheet.begin(Entry {
+    let entry = Entry {
         colour,
         label: "FACE",
         subscript: number,
         ..plain_entry(144, level, Status::Independent)
-    });
+    };
+    write_trims(sheet, entry, surface, borders, name)
+}
+
+/// Entity 144; `borders` begin with the outer one.
+fn write_trims(
+    sheet: &mut Sheet,
+    entry: Entry<'_>,
+    surface: Pointer,
+    borders: &[Pointer],
+    name: Pointer,
+) -> Result<(), WriteError> {
+    let mut trimmed = sheet.begin(entry);
     trimmed.pointer(surface);
     // The outer border is given, not that of the surface.
     trimmed.integer(1);

@@ -8,7 +8,7 @@ use super::error::WriteError;
 use super::options::WriteOptions;
 use super::shapes::{bspline_parameters, curve_parameters, curve_status, plain_entry};
 use super::sheet::{Entry, Pointer, Sheet, Status};
-use super::{Summary, global_fields, write_name};
+use super::{Summary, global_fields, write_name, write_trims};
 
 /// A trimmed surface of a file.
 #[derive(Debug, Clone, Copy)]
@@ -112,24 +112,12 @@ fn patch(sheet: &mut Sheet, number: usize, own: &NamedPatch<'_>) -> Result<(), W
         borders.push(record.finish()?);
     }
     let name = write_name(sheet, level, own.name)?;
-    let mut trimmed = sheet.begin(Entry {
+    let entry = Entry {
         label: "PATCH",
         subscript: number,
         ..plain_entry(144, level, Status::Independent)
-    });
-    trimmed.pointer(surface);
-    // The outer border is given, not that of the surface.
-    trimmed.integer(1);
-    trimmed.integer(borders.len() - 1);
-    for border in borders {
-        trimmed.pointer(border);
-    }
-    // No associativities, one property.
-    trimmed.integer(0);
-    trimmed.integer(1);
-    trimmed.pointer(name);
-    trimmed.finish()?;
-    Ok(())
+    };
+    write_trims(sheet, entry, surface, &borders, name)
 }
 
 fn curve<const D: usize>(
