@@ -53,29 +53,29 @@ pub(super) fn tip(sight: &Sight<'_>, level: u16, shape: &Shape) -> Option<Tip> {
 
 /// A line of heights over a distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Line {
+struct Line {
     /// Height at distance zero, millimetres.
-    pub(crate) at_zero: f64,
+    at_zero: f64,
     /// Rise over run.
-    pub(crate) slope: f64,
+    slope: f64,
     /// Root mean square of the places about it, millimetres.
-    pub(crate) rms_mm: f64,
+    rms_mm: f64,
     /// How many places it is of.
-    pub(crate) count: usize,
+    count: usize,
     middle: f64,
     spread: f64,
 }
 
 impl Line {
     /// Standard uncertainty of the height at a distance, millimetres.
-    pub(crate) fn sigma_mm(&self, distance_mm: f64) -> f64 {
+    fn sigma_mm(&self, distance_mm: f64) -> f64 {
         let off = distance_mm - self.middle;
         self.rms_mm * ((1.0 + off * off / self.spread) / self.count as f64).sqrt()
     }
 }
 
 /// Line through places without those that stray.
-pub(crate) fn line(places: &[(f64, f64)], noise_mm: f64) -> Option<Line> {
+fn line(places: &[(f64, f64)], noise_mm: f64) -> Option<Line> {
     let mut kept: Vec<(f64, f64)> = places.to_vec();
     let mut found = None;
     for _ in 0..5 {

@@ -93,16 +93,14 @@ pub fn treatments(
         }
     }
     monitor.check()?;
-    let none = Vec::new();
-    let found_then: &[Candidate] = found;
     // Each edge by itself: none depends on how another turned out.
-    let settled: Vec<(usize, bool, Found)> = (0..found.len())
-        .flat_map(|of| [(of, false), (of, true)])
-        .collect::<Vec<_>>()
+    let as_found: &[Candidate] = found;
+    let settled: Vec<(usize, bool, Found)> = (0..2 * as_found.len())
         .into_par_iter()
-        .filter_map(|(of, falls)| {
-            let strips = groups.get(&(of, falls)).unwrap_or(&none);
-            Some((of, falls, Found::of(sight, found_then, of, falls, strips)?))
+        .filter_map(|edge| {
+            let (of, falls) = (edge / 2, edge % 2 == 1);
+            let strips = groups.get(&(of, falls)).map_or(&[][..], Vec::as_slice);
+            Some((of, falls, Found::of(sight, as_found, of, falls, strips)?))
         })
         .collect();
     monitor.check()?;

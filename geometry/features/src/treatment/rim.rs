@@ -98,7 +98,6 @@ impl Rim {
         }
         let rim = Self::at(sight, found, of, face, falls)?;
         let pitch_mm = sight.field.pitch_mm();
-        let near = BESIDE_PITCHES.end * pitch_mm;
         let shape = candidate.outline.shape;
         let within = BETWEEN * sight.field.noise_mm;
         let deepest = sight.levels.levels.get(usize::from(beyond))?.plane;
@@ -108,10 +107,11 @@ impl Rim {
         });
         let is_beside = |place: [f64; 2]| {
             let off = shape.distance_mm(place).abs() / pitch_mm;
-            BESIDE_PITCHES.contains(&off) && rim.is_wall(&shape, place)
+            BESIDE_PITCHES.contains(&off) && Self::is_wall(&shape, place)
         };
-        let is_own = rim.levels(found);
-        let mut offs: Vec<f64> = rim
+        let own = rim.levels(sight, found);
+        let is_own = |level: u16| own[usize::from(level)];
+        let offs: Vec<f64> = rim
             .face
             .samples(sight, &is_own, &is_beside)
             .into_iter()
@@ -122,7 +122,6 @@ impl Rim {
         if (offs.len() as f64) < least.max(FEWEST as f64) {
             return None;
         }
-        offs.retain(|off| *off < near);
         let rim = rim.reaching(offs)?;
         Some(Self {
             reach_mm: rim.reach_mm.max(HINTED_PITCHES * pitch_mm),
@@ -155,23 +154,25 @@ impl Rim {
         (reach_mm > 0.0).then_some(Self { reach_mm, ..self })
     }
 
-    /// All levels but those of other candidates than the one whose edge it is and those that it runs
-    /// out in and goes into.
-    fn levels<'f>(&self, found: &'f [Candidate]) -> impl Fn(u16) -> bool + use<'f> {
-        let (of, level, host) = (self.of, self.level, found[self.of].host);
-        move |asked: u16| {
-            let is_other = |(index, own): (usize, &Candidate)| {
-                index != of
-                    && !own.levels.contains(&level)
-                    && !own.levels.contains(&host)
-                    && own.levels.contains(&asked)
-            };
-            !found.iter().enumerate().any(is_other)
+    /// Of each level whether it counts: all but those of other candidates than the one whose edge it is
+    /// and those that it runs out in and goes into.
+    fn levels(&self, sight: &Sight<'_>, found: &[Candidate]) -> Vec<bool> {
+        let (level, host) = (self.level, found[self.of].host);
+        let mut counts = vec![true; sight.levels.levels.len()];
+        for (index, other) in found.iter().enumerate() {
+            let is_own =
+                index == self.of || other.levels.contains(&level) || other.levels.contains(&host);
+            if !is_own {
+                for own in &other.levels {
+                    counts[usize::from(*own)] = false;
+                }
+            }
         }
+        counts
     }
 
     /// Whether the side that a place is beside is a wall.
-    fn is_wall(&self, shape: &Shape, place: [f64; 2]) -> bool {
+    fn is_wall(shape: &Shape, place: [f64; 2]) -> bool {
         match shape {
             Shape::Circle(_) => true,
             Shape::Rectangle(own) => own.walls[side_of(own, place)],
@@ -188,9 +189,10 @@ impl Rim {
         let is_wanted = |place: [f64; 2]| {
             let off = shape.distance_mm(place);
             let within = if self.is_inside { -off } else { off };
-            (-out..into).contains(&within) && self.is_wall(&shape, place)
+            (-out..into).contains(&within) && Self::is_wall(&shape, place)
         };
-        let is_own = self.levels(found);
+        let own = self.levels(sight, found);
+        let is_own = |level: u16| own[usize::from(level)];
         let mut places = self.face.samples(sight, &is_own, &is_wanted);
         // What stands on the face tells nothing of its edge.
         places.retain(|place| place.height_mm > -6.0 * noise_mm);
