@@ -190,6 +190,11 @@ fn wrong_usage_is_told_in_one_line_with_exit_code_2() {
         "KEY=VALUE",
     );
     refused(
+        &relief(at, &["rerun", "x", "--edit", "absent.toml"]),
+        1,
+        "absent.toml",
+    );
+    refused(
         &relief(at, &["status", "--url", "https://x:1"]),
         2,
         "http://127.0.0.1",

@@ -315,6 +315,11 @@ async fn what_the_clients_of_the_service_tell() {
     .await;
     assert_eq!(cancelled["id"], 3);
     told(&["cancel", "3"]).await;
+    fs::write(at.join("edits.toml"), "[[edit]]\nid = 0\nlength = 90\n").unwrap();
+    let edited = told(&["rerun", "latest", "--edit", "edits.toml"]).await;
+    assert_eq!(edited["settings"]["deliverables.features"], true);
+    let edits = json!([{ "id": 0, "length": 90.0 }]);
+    assert_eq!(edited["settings"]["deliverables.edit"], edits);
     // So that it is still under way when it is aborted.
     scanner.control().step_columns(Some(5));
     let second = told(&["scan", "--name", "second"]).await;

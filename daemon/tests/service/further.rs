@@ -209,3 +209,30 @@ fn a_scan_may_choose_otherwise() {
         "or the refusal tells nothing"
     );
 }
+
+/// Changes to features are of one scan.
+#[test]
+fn features_are_changed_for_one_scan_where_they_are_asked_for() {
+    let edit = json!([{ "id": 1, "type": "slot", "depth": 5.5 }]);
+    let alone: SettingOverrides = [("deliverables.edit".to_owned(), edit.clone())].into();
+    let plain = read("", MACHINE).unwrap();
+    let refused = plain.processing().with_overrides(&alone).unwrap_err();
+    assert!(
+        refused.to_string().contains("set features = true"),
+        "{refused}"
+    );
+    let mut both = alone;
+    both.insert("deliverables.features".to_owned(), true.into());
+    let made = plain.processing().with_overrides(&both).unwrap();
+    let edits = made.deliverables.further().unwrap().edits;
+    assert_eq!(edits.len(), 1);
+    let own = edits[0].edit();
+    assert_eq!((own.id, own.class.as_deref()), (1, Some("slot")));
+    assert_eq!(own.dimensions_mm["depth"], 5.5);
+    // As it stands with the job, and comes back.
+    assert_eq!(serde_json::to_value(&edits).unwrap(), edit);
+
+    let for_all = "[deliverables]\nfeatures = true\nedit = [{ id = 1, depth = 5.5 }]\n";
+    let refused = read(for_all, MACHINE).unwrap_err();
+    assert!(refused.contains("of one scan"), "{refused}");
+}
