@@ -57,7 +57,9 @@ fn scanned(scene: &Scene) -> Scanned {
             let which = usize::from(z > sheet(x) + 1.0);
             if z > sheet(x) - 1.0 {
                 votes[node][which] += 1;
-                heights[node][which] += z;
+                // Samples lie beside the node: what the sheet rises to it counts, too.
+                let column = node / ROWS;
+                heights[node][which] += z - sheet(x) + sheet(column as f64 * PITCH_MM);
             }
         }
         columns.push(Column::new(x, samples));
