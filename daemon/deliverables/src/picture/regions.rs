@@ -67,7 +67,11 @@ pub(super) fn draw(
 
 /// What was closed and not measured: the region's colour and white in turn, node by node.
 fn hatched(own: Rgb, column: usize, row: usize) -> Rgb {
-    if (column + row) % 2 == 0 { own } else { PAPER }
+    if (column + row).is_multiple_of(2) {
+        own
+    } else {
+        PAPER
+    }
 }
 
 /// A colour of its own for each region: a tested palette first, then hues by the golden
