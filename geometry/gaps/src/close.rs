@@ -49,6 +49,7 @@ pub fn close<E: From<Cancelled>>(
         sight,
         settings,
         labels: regions.raw_labels().to_vec(),
+        sizes: sizes(regions),
         given: BTreeMap::new(),
         gaps: Vec::new(),
     };
@@ -111,6 +112,8 @@ struct Work<'a> {
     sight: &'a Sight<'a>,
     settings: &'a Settings,
     labels: Vec<u16>,
+    /// Nodes of each region as measured, by label.
+    sizes: Vec<usize>,
     /// What closed nodes were given.
     given: BTreeMap<usize, Given>,
     gaps: Vec<Gap>,
@@ -213,6 +216,7 @@ impl Work<'_> {
                     given.insert(node, Given { region, z_mm });
                 }
             }
+            self.leave_extrapolations(&mut given);
             if given.is_empty() {
                 continue;
             }
@@ -232,6 +236,18 @@ impl Work<'_> {
             self.take(given);
         }
         Ok(())
+    }
+
+    /// No surface is carried on to more nodes than there are of it.
+    fn leave_extrapolations(&self, given: &mut BTreeMap<usize, Given>) {
+        let mut counts: BTreeMap<u16, usize> = BTreeMap::new();
+        for own in given.values() {
+            *counts.entry(own.region).or_default() += 1;
+        }
+        given.retain(|_, own| {
+            let there = self.sizes.get(usize::from(own.region)).copied();
+            counts.get(&own.region).copied() <= there
+        });
     }
 
     fn take(&mut self, given: BTreeMap<usize, Given>) {
@@ -359,6 +375,7 @@ impl Work<'_> {
             let grid = self.sight.grid();
             given.retain(|node, _| feet.iter().all(|foot| grid.distance(*node, *foot) > FOOT));
         }
+        self.leave_extrapolations(&mut given);
         Case {
             place,
             given,
@@ -459,6 +476,15 @@ impl Work<'_> {
             warnings,
         }
     }
+}
+
+/// Nodes by label.
+fn sizes(regions: &RegionMap) -> Vec<usize> {
+    let mut sizes = vec![0; usize::from(regions.regions()) + 1];
+    for label in regions.raw_labels() {
+        sizes[usize::from(*label)] += 1;
+    }
+    sizes
 }
 
 /// What rays tell of a gap; `None` where none went there.
