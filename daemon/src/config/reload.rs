@@ -38,6 +38,7 @@ impl Config {
             storage,
             regrid,
             segment,
+            fill,
             reconstruct,
             deliverables,
             webhooks

@@ -371,11 +371,12 @@ fn a_reload_says_what_holds_and_what_needs_a_restart() {
     let parse = |text: &str| Config::parse(text, Path::new("relief.toml")).unwrap();
     let old = parse("");
     let new = parse(
-        "[regrid]\nseed = 7\n[log]\nlevel = \"debug\"\n[scanner]\nbaud = 9600\n\
+        "[regrid]\nseed = 7\n[fill]\nmode = \"auto\"\n[log]\nlevel = \"debug\"\n\
+         [scanner]\nbaud = 9600\n\
          [deliverables]\nauthor = \"A\"\n",
     );
     let (merged, outcome) = old.reloaded(&new);
-    assert_eq!(outcome.applied, ["regrid", "deliverables", "log"]);
+    assert_eq!(outcome.applied, ["regrid", "fill", "deliverables", "log"]);
     assert_eq!(outcome.needs_restart, ["scanner"]);
     assert_eq!(merged.regrid.seed, Some(7));
     assert_eq!(merged.scanner, old.scanner);

@@ -82,14 +82,17 @@ async fn a_rerun_with_other_settings_makes_another_result() -> Result<()> {
     let entities = rig
         .rerun_to_result(&first.scan.id, &[("deliverables.entities", 128.into())])
         .await?;
+    let filled = [("fill.mode", "auto".into()), ("fill.max_size_mm", 6.into())];
+    let filled = rig.rerun_to_result(&first.scan.id, &filled).await?;
     let mut spooled = vec![
         first.scan.id.clone(),
+        filled.result.clone(),
         coarse.result.clone(),
         paper.result.clone(),
         entities.result.clone(),
     ];
     spooled.sort();
-    assert_eq!(rig.spooled()?, spooled, "four results side by side");
+    assert_eq!(rig.spooled()?, spooled, "five results side by side");
     assert_eq!(rig.result(&first.scan.id).await?, before, "untouched");
 
     let settings = |report: serde_json::Value| report["settings"].clone();
@@ -102,6 +105,10 @@ async fn a_rerun_with_other_settings_makes_another_result() -> Result<()> {
         settings(entities.json("report.json")?)["iges_entities"],
         128
     );
+    let filled = rig.result(&filled.result).await?.json("report.json")?;
+    assert_eq!(filled["fill"]["max_size_mm"], 6.0);
+    assert_eq!(filled["settings"]["fill"], "auto");
+    assert!(before.json("report.json")?.get("fill").is_none());
     let (parametric, rational) = (before.iges()?, entities.iges()?);
     for (file, present, absent) in [(parametric, 114, 128), (rational, 128, 114)] {
         assert!(relief_tests::iges::entities(file, present)? >= 4);
@@ -111,7 +118,7 @@ async fn a_rerun_with_other_settings_makes_another_result() -> Result<()> {
         assert_ne!(other.iges()?, before.iges()?);
     }
     let scan: Scan = rig.client().get(&path::scan(&first.scan.id)).await?;
-    assert_eq!(scan.jobs.len(), 4);
+    assert_eq!(scan.jobs.len(), 5);
     rig.end().await
 }
 

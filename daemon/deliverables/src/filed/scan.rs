@@ -6,7 +6,7 @@ use page::{Block, Chart, Column, Fact, Level, Line, Page, Section, Table, Verdic
 use super::parameters::parameters;
 use super::{date, figure, of_a_kind, origin, per_cent, picture, producer, signed, triple};
 use crate::manifest::ManifestFile;
-use crate::report::{DeviationsReport, RegionReport, Report};
+use crate::report::{DeviationsReport, FillReport, RegionReport, Report};
 use crate::write::{
     INLIERS_PICTURE_NAME, RANGE_PICTURE_NAME, REGIONS_PICTURE_NAME, RESIDUALS_PICTURE_NAME,
 };
@@ -176,7 +176,8 @@ fn surfaces(report: &Report, png: Option<Vec<u8>>) -> Section {
             report.regions.count
         );
         blocks.push(Block::Picture(picture(
-            "Regions with their numbers, borders as drawn; background grey, crumbs magenta.",
+            "Regions with their numbers, borders as drawn; background grey, crumbs magenta, closed \
+             holes chequered.",
             seen,
             png,
         )));
@@ -440,6 +441,20 @@ fn edges(report: &Report) -> Section {
     }
 }
 
+/// What was closed without having been measured.
+fn closed_holes(fill: &FillReport) -> Block {
+    let closed = fill.holes.iter().filter(|hole| hole.decision == "closed");
+    let closed = closed.count();
+    let text = Line::new()
+        .line(of_a_kind(closed, "hole", "holes"))
+        .text(" of the range image closed, ")
+        .count(fill.filled_nodes)
+        .text(" nodes that were not measured; ")
+        .line(of_a_kind(fill.holes.len() - closed, "hole", "holes"))
+        .text(" kept.");
+    Block::Text(text)
+}
+
 /// What belongs to no face.
 fn left_out(report: &Report) -> Option<Section> {
     let (background, crumbs) = (&report.background, &report.crumbs);
@@ -460,6 +475,7 @@ fn left_out(report: &Report) -> Option<Section> {
         .count(background.nodes)
         .text(" nodes of background were left out.");
     let mut blocks = vec![Block::Text(text)];
+    blocks.extend(report.fill.as_ref().map(closed_holes));
     if !background.list.is_empty() {
         let rows = background.list.iter().map(|region| {
             let normal = region
