@@ -265,7 +265,7 @@ def write(folder, seed):
         told = {"name": str(seed), "attempt": attempt, "block_mm": made.size,
                 "outline_mm": made.block.outline(), "top": made.top.told(), "glare_at_mm": made.glare_at,
                 "holes": made.holes, "bosses": made.bosses, "pockets": made.pockets, "scan": scan,
-                "faces": faces}
+                "extent_mm": extent, "faces": faces}
         with open(stem + ".json.part", "w", encoding="utf-8") as file:
             json.dump(parts.rounded(told), file)
         os.replace(stem + ".json.part", stem + ".json")

@@ -1,6 +1,10 @@
 """Tops of glossy parts: how high, which way they face, and where they mirror the laser at the sensor."""
 
 import math
+import os
+import sys
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "parts"))
 
 import solids
 
