@@ -328,12 +328,17 @@ mod tests {
     #[test]
     fn a_mirror_halfway_between_laser_and_sensor_blinds() {
         // The laser straight above the place that is looked at, the sensor beside it.
-        for ((x, y), turn) in [((0.0, 150.0), 0.0), ((0.0, 150.0), 0.04), ((90.0, 0.0), 0.0)] {
+        for ((x, y), turn) in [
+            ((0.0, 150.0), 0.0),
+            ((0.0, 150.0), 0.04),
+            ((90.0, 0.0), 0.0),
+        ] {
             let optics = optics((x, y), 0.1);
             let to_sensor = libm::atan2(libm::hypot(x, y), 750.0);
             // The normal halves the angle; turned by an angle, it turns the beam by twice that.
             let (sin, cos) = libm::sincos(to_sensor / 2.0 + turn);
-            let normal = Vec3::new(if x > 0.0 { sin } else { 0.0 }, if y > 0.0 { sin } else { 0.0 }, cos);
+            let aside = Vec3::new(x, y, 0.0).normalize();
+            let normal = aside * sin + Vec3::Z * cos;
             let offset_mm = normal.dot(Vec3::new(0.0, 4.0, 0.0));
             let scene = scene(vec![Surface::Plane { normal, offset_mm }]);
             let spot = optics.look(&scene, 0.0, 0.0).expect("an endless plane");
