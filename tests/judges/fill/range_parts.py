@@ -10,7 +10,7 @@ the same part. A part that is there is not made again, unless --anew is given.
 
 A block of 60 to 110 by 45 to 75 by 12 to 30 mm, turned at random. Its top is flat, leans along x by 3
 to 9 degrees, or is a cylinder or a ball of 60 to 200 mm. It has one to five holes drilled along z, up to
-three bosses and two pockets, and up to three stains. Gloss loses readings where the top mirrors the
+three bosses and two pockets, and one to five stains. Gloss loses readings where the top mirrors the
 laser's beam at the sensor. On a flat top that place lies beyond the part or is a stripe across all of
 it, since laser and sensor travel along x together; a ball leaves a round hole, and a cylinder that falls
 with y an oval one.
@@ -42,6 +42,9 @@ SHADOW = 0.35
 CLEAR = 4.5
 # Least width of what is to be found, pitches.
 LEAST = 10.5
+# So many stains swallow nearly all light: a node of the range image has several readings, and of one that has lost
+# two in three it still is known where the surface is.
+BLACK = 0.7
 # Least material under what is deepest, millimetres.
 BOTTOM = 1.5
 # Within the clear ground around a hole no more readings than that are lost to gloss.
@@ -59,13 +62,14 @@ class Plan:
         self.top = first.choice(("flat", "leaning", "cylinder", "ball"))
         self.holes = first.randint(1, 5)
         self.bosses, self.pockets = first.randint(0, 3), first.randint(0, 2)
-        self.stains = first.randint(0, 3)
+        self.stains = first.randint(1, 5)
         self.table_seen = first.random() >= NO_TABLE
         dice = self.dice = random.Random(f"glossy part {seed} {attempt}")
         self.pitch = dice.uniform(0.3, 0.5)
         self.noise = math.exp(dice.uniform(math.log(0.02), math.log(0.1)))
         self.clear = CLEAR * self.pitch
-        self.glare = dice.uniform(0.5, 1.0)
+        # On tops without a mirror all is salt and pepper at most; the others shall have holes.
+        self.glare = dice.uniform(0.5 if self.top in ("flat", "leaning") else 0.7, 1.0)
 
 
 class Made:
@@ -164,7 +168,7 @@ def stain(plan, made):
     radius, rim = dice.uniform(0.8, 4.0), dice.uniform(0.5, 3.0)
     footprint = made.place(plan, lambda at: Circle(at, 2.0 * radius + rim), plan.clear)
     made.stains.append({"centre_mm": list(footprint.at), "radius_mm": radius, "rim_mm": rim,
-                        "loss": dice.uniform(0.6, 1.0)})
+                        "loss": dice.uniform(0.95, 1.0) if dice.random() < BLACK else dice.uniform(0.6, 0.95)})
 
 
 def topped(plan, made):
