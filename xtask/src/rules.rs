@@ -46,11 +46,13 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("toolpath", &["range-image"]),
     ("terraces", &["nurbs"]),
     ("fill", &["nurbs", "range-image"]),
+    ("gaps", &["fill", "range-image"]),
     ("features", &["nurbs", "range-image", "segment", "terraces"]),
     (
         "pipeline",
         &[
             "faces",
+            "gaps",
             "range-image",
             "reconstruct",
             "regrid",

@@ -15,6 +15,7 @@ pub mod features;
 mod file;
 mod filed;
 mod further;
+mod holes;
 mod manifest;
 mod meshes;
 pub mod picture;

@@ -7,6 +7,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::holes::{EvidenceReport, FillReport, HoleReport, RaysReport};
+
 use crate::further::{
     SkinReport, SkinSettingsReport, SurfaceReport, SurfaceSettingsReport, ToolpathReport,
     ToolpathSettingsReport,
@@ -33,6 +35,9 @@ pub struct Report {
     /// Nodes that belong to no region.
     #[serde(default)]
     pub crumbs: CrumbsReport,
+    /// What became of the holes of the range image; absent where none were to be closed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fill: Option<FillReport>,
     /// The neighbours whose shapes were made to touch along a line.
     #[serde(default)]
     pub tangent: RegularitiesReport,
@@ -133,6 +138,12 @@ pub struct SettingsReport {
     /// What becomes of regions whose surfaces join smoothly: `split` or `keep`.
     #[serde(default)]
     pub smooth_joins: String,
+    /// Which holes of the range image are closed: `off`, `auto` or `all`.
+    #[serde(default)]
+    pub fill: String,
+    /// Largest of them.
+    #[serde(default)]
+    pub fill_max_size_mm: f64,
     /// Region of interest, least and greatest x; `null` where there is no limit.
     #[serde(default)]
     pub roi_x_mm: [Option<f64>; 2],

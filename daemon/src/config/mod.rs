@@ -3,6 +3,7 @@
 //! A key that does not exist, or a value that cannot be, is refused with its line and a
 //! way out; nothing is silently ignored.
 
+mod fill;
 mod formats;
 mod further;
 mod http;
@@ -25,6 +26,7 @@ use std::time::Duration;
 use relief_api::{PlanRequest, THE_SCANNER};
 use serde::{Deserialize, Serialize};
 
+pub use fill::{FillConfig, FillMode};
 pub use further::{
     KnotsChoice, MachineChoice, OfChoice, PatternChoice, SkinConfig, SkinMethod, SurfaceConfig,
     ToolpathConfig,
@@ -64,6 +66,8 @@ pub struct Config {
     pub regrid: RegridConfig,
     /// From the range image to regions.
     pub segment: SegmentConfig,
+    /// Which holes of the range image are closed.
+    pub fill: FillConfig,
     /// From regions to trimmed surfaces.
     pub reconstruct: ReconstructConfig,
     /// What is left in the spool.
@@ -252,6 +256,7 @@ impl Config {
         Processing {
             regrid: self.regrid.clone(),
             segment: self.segment.clone(),
+            fill: self.fill.clone(),
             reconstruct: self.reconstruct.clone(),
             deliverables: self.deliverables.clone(),
         }

@@ -39,7 +39,7 @@ impl Processing {
             let Some(table) = sections.and_then(|s| s.get_mut(section)?.as_object_mut()) else {
                 return Err(wrong(format!(
                     "there is no section [{section}] that a scan can override; there are \
-                     regrid, segment, reconstruct and deliverables"
+                     regrid, segment, fill, reconstruct and deliverables"
                 )));
             };
             put(table, name, value);

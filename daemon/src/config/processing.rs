@@ -8,6 +8,7 @@ use pipeline::Settings;
 use scan_files::recommended_pitch_mm;
 use serde::{Deserialize, Serialize};
 
+use super::fill::FillConfig;
 use super::further::{self, SkinConfig, SurfaceConfig, ToolpathConfig};
 use super::regularities::{Regularize, RegularizeUnits};
 use super::{formats, value};
@@ -21,6 +22,8 @@ pub struct Processing {
     pub regrid: RegridConfig,
     /// From the range image to regions.
     pub segment: SegmentConfig,
+    /// Which holes of the range image are closed.
+    pub fill: FillConfig,
     /// From regions to trimmed surfaces.
     pub reconstruct: ReconstructConfig,
     /// What is left in the spool.
@@ -345,6 +348,7 @@ impl Processing {
         }
         self.regrid.apply(&mut settings.regrid);
         self.segment.apply(&mut settings.segment);
+        self.fill.apply(&mut settings.fill);
         set(
             &mut settings.background,
             self.segment.background.map(|policy| match policy {

@@ -57,6 +57,8 @@ pub enum NodeRole {
     Masked,
     /// It belongs to a region of the part.
     Part,
+    /// It belongs to a region of the part without having been measured: a hole was closed.
+    Filled,
     /// It belongs to a removed region, or is a scrap in its plane.
     Background,
     /// It belongs to no region.

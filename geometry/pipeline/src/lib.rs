@@ -14,6 +14,7 @@ mod background;
 mod claims;
 mod columns;
 mod extent;
+mod filling;
 mod kinds;
 mod method;
 mod neighbourhood;
@@ -27,6 +28,11 @@ mod settings;
 pub use background::{BackgroundPolicy, Crumb, NodeRole, UnknownPolicy};
 pub use columns::{Columns, InMemory, ReadAgainError};
 pub use extent::{Extent, finest_pitch_mm, no_surface, unusual_size};
+pub use filling::Filling;
+pub use gaps::{
+    Cause as FillCause, Counts as RayCounts, Decision as FillDecision, Evidence as FillEvidence,
+    Gap, Mode as FillMode, Settings as FillSettings, UnknownMode as UnknownFillMode,
+};
 pub use kinds::{Basis, Kinds, RegionKind, SmoothJoins, UnknownKinds};
 pub use method::{Method, UnknownMethod};
 pub use observer::{Observer, Stage};

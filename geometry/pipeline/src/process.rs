@@ -9,6 +9,7 @@ use segment::SegmentError;
 
 use crate::claims;
 use crate::columns::{Columns, InMemory, ReadAgainError, Within};
+use crate::filling::{Filling, fill};
 use crate::kinds::samples::{OnRegion, of_regions};
 use crate::kinds::{RegionKind, kinds};
 use crate::outlines::{self, Removed, SettledNodes, settle_nodes};
@@ -40,6 +41,8 @@ pub struct Outcome {
     /// Nodes beside borders that the samples around them gave to another region than the segmentation
     /// did, with their height on its surface: where faces run out in tips, most of all.
     pub claimed_nodes: usize,
+    /// What became of its holes; `None` where none were to be closed.
+    pub filling: Option<Filling>,
     /// The part's range image with the nodes beside its borders and outlines decided anew. The
     /// reconstruction's metrics are against it. `None` where there were no samples to decide them by:
     /// then they are against the range image as it was.
@@ -259,6 +262,8 @@ fn in_view(
     let columns = within.as_ref().map(|within| within as &dyn Columns);
     let view = view.within(roi.x_mm, roi.y_mm);
     let mut part = divide(image, &view, settings, observer)?;
+    let mut warnings = Vec::new();
+    let filling = fill(image, &mut part, columns, settings, &mut warnings, observer)?;
     let mut unlabelled = 0;
     let part_image = part.image.as_ref().unwrap_or(image);
     let is_relief = settings.reconstruct.method == Method::Relief;
@@ -327,6 +332,7 @@ fn in_view(
                     by the nodes, half a pitch less sharp";
         reconstruction.warnings.push(told.to_owned());
     }
+    reconstruction.warnings.extend(warnings);
     let notes = tied.regularities.iter().flat_map(|own| &own.notes);
     reconstruction.warnings.extend(notes.cloned());
     if unlabelled > 0 {
@@ -363,6 +369,7 @@ fn in_view(
         regularities: tied.regularities,
         reconstruction,
         claimed_nodes,
+        filling,
         settled,
         stages: vec![Stage::Segment, Stage::Reconstruct],
     })

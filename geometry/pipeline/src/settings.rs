@@ -4,7 +4,7 @@ use reconstruct::ReconstructSettings;
 use regrid::{Estimator, RegridSettings};
 use segment::SegmentSettings;
 
-use crate::{BackgroundPolicy, Kinds, Method, SmoothJoins};
+use crate::{BackgroundPolicy, FillSettings, Kinds, Method, SmoothJoins};
 
 /// The settings of every stage that can change the result.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +15,8 @@ pub struct Settings {
     pub segment: SegmentSettings,
     /// What is done with a recognised table or back plane.
     pub background: BackgroundPolicy,
+    /// Which enclosed holes of the range image are closed; method `relief` only.
+    pub fill: FillSettings,
     /// Which kinds of surface faces may be of; method `relief` only.
     pub kinds: Kinds,
     /// Whether regions whose surfaces join smoothly are taken apart; kinds `auto` of method
@@ -53,7 +55,7 @@ impl Regularize {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{stage}: {message}")]
 pub struct SettingsError {
-    /// The stage it belongs to: `regrid`, `segment` or `reconstruct`.
+    /// The stage it belongs to: `regrid`, `segment`, `fill` or `reconstruct`.
     pub stage: &'static str,
     /// What is wrong with it, and its limits.
     pub message: String,
@@ -67,6 +69,7 @@ impl Settings {
             regrid: RegridSettings::with_pitch(pitch_mm),
             segment: SegmentSettings::default(),
             background: BackgroundPolicy::default(),
+            fill: FillSettings::default(),
             kinds: Kinds::default(),
             smooth_joins: SmoothJoins::default(),
             regularize: Regularize::default(),
@@ -117,6 +120,9 @@ impl Settings {
         self.segment
             .validate()
             .map_err(|error| wrong("segment", &error))?;
+        self.fill
+            .validate()
+            .map_err(|error| wrong("fill", &error))?;
         if let Regularize::On(settings) = &self.regularize {
             settings
                 .validate()

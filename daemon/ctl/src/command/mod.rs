@@ -9,6 +9,7 @@ pub(crate) mod doctor;
 pub(crate) mod features;
 pub(crate) mod fetch;
 pub(crate) mod fill;
+mod fill_image;
 mod grid;
 pub(crate) mod jobs;
 pub(crate) mod laser;

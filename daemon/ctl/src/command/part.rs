@@ -4,6 +4,8 @@ use pipeline::{BackgroundPolicy, Settings};
 use relief_api::SettingOverrides;
 use serde_json::json;
 
+use crate::command::fill_image::FillImageArgs;
+
 /// Where a limit is left out. Nothing is scanned from a kilometre away, and JSON has no
 /// infinity.
 const OPEN_MM: f64 = 1e6;
@@ -32,6 +34,8 @@ pub(crate) struct PartArgs {
     /// Leave out regions that cover less, seen from the camera, square millimetres
     #[arg(long, value_name = "MM2")]
     minimum_area_mm2: Option<f64>,
+    #[command(flatten)]
+    fill: FillImageArgs,
 }
 
 /// Least and greatest coordinate, millimetres.
@@ -87,6 +91,7 @@ impl PartArgs {
         if let Some(area_mm2) = self.minimum_area_mm2 {
             settings.segment.minimum_area_mm2 = area_mm2;
         }
+        self.fill.apply(&mut settings.fill);
     }
 
     /// The same as overrides of the service's settings.
@@ -112,6 +117,7 @@ impl PartArgs {
         if let Some(area_mm2) = self.minimum_area_mm2 {
             put("segment.minimum_area_mm2", json!(area_mm2));
         }
+        self.fill.add_to(overrides);
     }
 }
 

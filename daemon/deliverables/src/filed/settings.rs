@@ -107,6 +107,8 @@ fn told(settings: &SettingsReport) -> Vec<(&'static str, String)> {
             "segment.minimum_area_mm2",
             settings.minimum_area_mm2.to_string(),
         ),
+        ("fill.mode", settings.fill.clone()),
+        ("fill.max_size_mm", settings.fill_max_size_mm.to_string()),
         ("deliverables.entities", settings.iges_entities.to_string()),
         ("deliverables.step", settings.step.clone()),
         ("deliverables.step_units", settings.step_units.clone()),

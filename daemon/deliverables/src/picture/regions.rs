@@ -52,6 +52,7 @@ pub(super) fn draw(
         match role {
             NodeRole::Masked => None,
             NodeRole::Part => Some(dimmed(colour(label), light.min(1.05))),
+            NodeRole::Filled => Some(hatched(colour(label), column, row)),
             NodeRole::Background => Some(dimmed(BACKGROUND, (0.4 + 0.6 * light).min(1.05))),
             NodeRole::Crumb => Some(CRUMB),
         }
@@ -62,6 +63,11 @@ pub(super) fn draw(
     let height = plot.height().max(LEGEND_HEIGHT);
     legend(&mut plot, &listed(notes), &others(outcome), height);
     plot.canvas
+}
+
+/// What was closed and not measured: the region's colour and white in turn, node by node.
+fn hatched(own: Rgb, column: usize, row: usize) -> Rgb {
+    if (column + row) % 2 == 0 { own } else { PAPER }
 }
 
 /// A colour of its own for each region: a tested palette first, then hues by the golden
@@ -205,6 +211,12 @@ fn others(outcome: &Outcome) -> Vec<Entry> {
                 text: format!("{kind}, {nodes} nodes, left out"),
             });
         }
+    }
+    if let Some(filling) = outcome.filling.as_ref().filter(|f| !f.filled.is_empty()) {
+        entries.push(Entry {
+            colour: PAPER,
+            text: format!("chequered: {} nodes of closed holes", filling.filled.len()),
+        });
     }
     let crumbs = &outcome.crumbs;
     if !crumbs.is_empty() {

@@ -1,0 +1,487 @@
+//! Gaps found, decided and closed.
+
+use std::collections::BTreeMap;
+
+use range_image::{Cancelled, Column, Monitor, RangeImage, RegionMap};
+use rayon::prelude::*;
+
+use crate::carry::{Given, carried};
+use crate::find::{Place, gaps};
+use crate::odds::{Evidence, Usual};
+use crate::rays::{Part, Rays, Steps, Tally};
+use crate::report::{Cause, Decision, Gap};
+use crate::settings::{Mode, Settings};
+use crate::shadow::{Sensor, Shadows, Spot};
+use crate::sight::Sight;
+
+/// Goes through the columns of a scan, in their order, until one is refused with `false`.
+pub type Visit<'a, E> = dyn FnMut(&mut dyn FnMut(&Column) -> bool) -> Result<(), E> + 'a;
+
+/// A range image with gaps closed.
+#[derive(Debug, Clone)]
+pub struct Closed {
+    /// The range image.
+    pub image: RangeImage,
+    /// Its regions.
+    pub regions: RegionMap,
+    /// Nodes that were given a value and a region, ascending, as [`RangeImage::raw_z_mm`] has them.
+    pub filled: Vec<usize>,
+    /// Every gap: what is hidden behind something first, then the others, each by place.
+    pub gaps: Vec<Gap>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Closes the gaps of a range image that are no openings; see the [crate].
+///
+/// `columns` goes through the samples that the image was made of; without it, nodes stand for rays.
+///
+/// # Errors
+/// What `columns` says, or cancelled.
+pub fn close<E: From<Cancelled>>(
+    sight: &Sight<'_>,
+    regions: &RegionMap,
+    settings: &Settings,
+    columns: Option<&mut Visit<'_, E>>,
+    monitor: &dyn Monitor,
+) -> Result<Closed, E> {
+    let mut work = Work {
+        sight,
+        settings,
+        labels: regions.raw_labels().to_vec(),
+        given: BTreeMap::new(),
+        gaps: Vec::new(),
+    };
+    let first = gaps(sight, &work.labels);
+    let (close, keep) = (
+        work.at(&first, &settings.close_mm),
+        work.at(&first, &settings.keep_mm),
+    );
+    let named = |found: &[Option<usize>], is: usize| found.contains(&Some(is));
+    let mut warnings = Vec::new();
+    for (places, found) in [(&settings.close_mm, &close), (&settings.keep_mm, &keep)] {
+        let none = places
+            .iter()
+            .zip(found)
+            .filter(|(_, found)| found.is_none());
+        warnings.extend(none.map(|(place, _)| {
+            format!(
+                "there is no hole in the range image near x {}, y {}",
+                place[0], place[1]
+            )
+        }));
+    }
+    // What is kept by name is out of it, whatever happens around it.
+    let mut asked = Vec::new();
+    let mut open = Vec::new();
+    for (index, place) in first.into_iter().enumerate() {
+        if named(&keep, index) {
+            work.note(&place, None, Decision::Kept, Cause::Asked);
+            asked.push(place.nodes[0]);
+        } else if named(&close, index) {
+            open.push((place, true));
+        } else {
+            open.push((place, false));
+        }
+    }
+    let small = open.iter().filter(|(place, is_asked)| {
+        !is_asked && place.size() * sight.image.pitch_mm() <= settings.max_size_mm
+    });
+    let small: Vec<&Place> = small.map(|(place, _)| place).collect();
+    work.close_hidden(&small, monitor)?;
+    let must: Vec<usize> = open
+        .iter()
+        .filter(|(_, is_asked)| *is_asked)
+        .map(|(place, _)| place.nodes[0])
+        .collect();
+    let rest = gaps(sight, &work.labels);
+    let rest = rest
+        .into_iter()
+        .filter(|place| {
+            !asked
+                .iter()
+                .any(|node| place.nodes.binary_search(node).is_ok())
+        })
+        .collect();
+    work.close_others(rest, &must, columns, monitor)?;
+    Ok(work.finish(regions, warnings))
+}
+
+struct Work<'a> {
+    sight: &'a Sight<'a>,
+    settings: &'a Settings,
+    labels: Vec<u16>,
+    /// What closed nodes were given.
+    given: BTreeMap<usize, Given>,
+    gaps: Vec<Gap>,
+}
+
+/// Nodes so near to something higher, pitches, are left to its border.
+const FOOT: f64 = 1.5;
+/// Gaps so narrow between surfaces at a step are the step's, pitches.
+const STEP: f64 = 3.0;
+/// Nodes so near to a gap's border, pitches, are at its rim.
+const RIM: f64 = 1.5;
+/// Fewer rays inside tell nothing alone.
+const FEWEST_RAYS: f64 = 6.0;
+/// Rings of nodes around a gap whose rays are counted, from which on.
+const RINGS: usize = 5;
+const FROM_RING: usize = 2;
+/// Rings around what may be hidden in which something seen counts against it.
+const SEEN_RINGS: usize = 6;
+/// A place names the gap whose nearest node is so near, pitches, or in it.
+const NAMED: f64 = 3.0;
+
+/// A gap about to be decided.
+struct Case {
+    place: Place,
+    /// What its nodes are given if it is closed; empty where no surface reaches it.
+    given: BTreeMap<usize, Given>,
+    /// The regions that reach it, ascending.
+    regions: Vec<u16>,
+    has_step: bool,
+}
+
+impl Work<'_> {
+    /// The gap that each place names.
+    fn at(&self, gaps: &[Place], places: &[[f64; 2]]) -> Vec<Option<usize>> {
+        let image = self.sight.image;
+        let pitch_mm = image.pitch_mm();
+        let far = |place: [f64; 2], node: usize| {
+            let (column, row) = self.sight.grid().place(node);
+            let (x, y) = (image.x_mm(column) - place[0], image.y_mm(row) - place[1]);
+            libm::sqrt(x * x + y * y) / pitch_mm
+        };
+        let nearest = |place: &[f64; 2]| {
+            let each = gaps.iter().enumerate().map(|(index, gap)| {
+                let each = gap.nodes.iter().map(|node| far(*place, *node));
+                (each.fold(f64::INFINITY, f64::min), index)
+            });
+            each.min_by(|a, b| a.0.total_cmp(&b.0))
+                .filter(|(far, _)| *far <= NAMED)
+                .map(|(_, index)| index)
+        };
+        places.iter().map(nearest).collect()
+    }
+
+    fn note(
+        &mut self,
+        place: &Place,
+        case: Option<(&Case, Option<Evidence>)>,
+        decision: Decision,
+        cause: Cause,
+    ) {
+        let given = case.map(|(case, _)| &case.given);
+        let regions = case.map_or_else(
+            || place.beside.keys().copied().collect(),
+            |(case, _)| case.regions.clone(),
+        );
+        self.gaps.push(Gap {
+            centre_mm: self.sight.centre_mm(&place.nodes, given, place),
+            size_mm: place.size() * self.sight.image.pitch_mm(),
+            nodes: place.nodes.len(),
+            regions,
+            decision,
+            cause,
+            evidence: case.and_then(|(_, evidence)| evidence),
+        });
+    }
+
+    /// Gives nodes that something higher hides to the surface that it hides.
+    fn close_hidden(&mut self, places: &[&Place], monitor: &dyn Monitor) -> Result<(), Cancelled> {
+        let sight = self.sight;
+        let shadows = Shadows::new(sight, &self.labels);
+        let reached: Vec<BTreeMap<u16, BTreeMap<usize, f64>>> = places
+            .par_iter()
+            .map(|place| carried(sight, &self.labels, place).heights())
+            .collect();
+        monitor.check()?;
+        let sensor = self.sensor(places, &reached, &shadows);
+        monitor.check()?;
+        for (place, reached) in places.iter().zip(&reached) {
+            let mut given = BTreeMap::new();
+            for &node in &place.nodes {
+                let mut heights: Vec<(f64, u16)> = reached
+                    .iter()
+                    .filter_map(|(&region, heights)| Some((*heights.get(&node)?, region)))
+                    .collect();
+                heights.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+                let hidden = heights
+                    .into_iter()
+                    .find(|&(z_mm, _)| shadows.hides(Spot { node, z_mm }, sensor));
+                if let Some((z_mm, region)) = hidden {
+                    given.insert(node, Given { region, z_mm });
+                }
+            }
+            if given.is_empty() {
+                continue;
+            }
+            let mut regions: Vec<u16> = given.values().map(|own| own.region).collect();
+            regions.sort_unstable();
+            regions.dedup();
+            let nodes: Vec<usize> = given.keys().copied().collect();
+            self.gaps.push(Gap {
+                centre_mm: sight.centre_mm(&nodes, Some(&given), place),
+                size_mm: place.size() * sight.image.pitch_mm(),
+                nodes: nodes.len(),
+                regions,
+                decision: Decision::Closed,
+                cause: Cause::Hidden,
+                evidence: None,
+            });
+            self.take(given);
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, given: BTreeMap<usize, Given>) {
+        for (node, own) in &given {
+            self.labels[*node] = own.region;
+        }
+        self.given.extend(given);
+    }
+
+    /// Where the sensor stands, by what is missing beside steps.
+    fn sensor(
+        &self,
+        places: &[&Place],
+        reached: &[BTreeMap<u16, BTreeMap<usize, f64>>],
+        shadows: &Shadows<'_>,
+    ) -> Option<Sensor> {
+        let sight = self.sight;
+        let mut missing = Vec::new();
+        let mut seen = BTreeMap::new();
+        for (place, reached) in places.iter().zip(reached) {
+            let mut has_step = false;
+            for &node in &place.nodes {
+                let heights = reached.values().filter_map(|heights| heights.get(&node));
+                let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), z| {
+                    (a.min(*z), b.max(*z))
+                });
+                if high - low > sight.step_mm {
+                    has_step = true;
+                    missing.push(Spot { node, z_mm: low });
+                }
+            }
+            if has_step {
+                let border = place.beside.values().flatten().copied();
+                let around = sight
+                    .grid()
+                    .rings(border, SEEN_RINGS, |node| self.labels[node] != 0);
+                seen.extend(around);
+            }
+        }
+        let seen: Vec<Spot> = seen
+            .into_keys()
+            .filter_map(|node| {
+                let z_mm = sight.point(node)?.z;
+                Some(Spot { node, z_mm })
+            })
+            .collect();
+        shadows.sensor(&missing, &seen)
+    }
+
+    /// Decides about what nothing hides.
+    fn close_others<E: From<Cancelled>>(
+        &mut self,
+        places: Vec<Place>,
+        must: &[usize],
+        columns: Option<&mut Visit<'_, E>>,
+        monitor: &dyn Monitor,
+    ) -> Result<(), E> {
+        let pitch_mm = self.sight.image.pitch_mm();
+        let is_asked = |place: &Place| {
+            let mut names = must.iter();
+            names.any(|node| place.nodes.binary_search(node).is_ok())
+        };
+        let (small, large): (Vec<Place>, Vec<Place>) = places.into_iter().partition(|place| {
+            is_asked(place) || place.size() * pitch_mm <= self.settings.max_size_mm
+        });
+        let cases: Vec<Case> = small
+            .into_par_iter()
+            .map(|place| self.case(place, is_asked))
+            .collect();
+        monitor.check()?;
+        let (tallies, usual) = self.counted(&cases, columns, monitor)?;
+        for (case, tally) in cases.into_iter().zip(tallies) {
+            let evidence = evidence(&tally, &usual);
+            let told = evidence.is_some();
+            let (decision, cause) = if case.given.is_empty() {
+                let cause = if case.has_step {
+                    Cause::Step
+                } else {
+                    Cause::NoSurface
+                };
+                (Decision::Kept, cause)
+            } else if is_asked(&case.place) || self.settings.mode == Mode::All {
+                (Decision::Closed, Cause::Asked)
+            } else {
+                evidence.map_or((Decision::Closed, Cause::NoRay), |own| verdict(&own))
+            };
+            if cause == Cause::Step && case.place.size() <= STEP {
+                continue;
+            }
+            self.note(
+                &case.place,
+                Some((&case, evidence.filter(|_| told))),
+                decision,
+                cause,
+            );
+            if decision == Decision::Closed {
+                self.take(case.given);
+            }
+        }
+        for place in large {
+            self.note(&place, None, Decision::Kept, Cause::Size);
+        }
+        Ok(())
+    }
+
+    /// What a gap would be given.
+    fn case(&self, place: Place, is_asked: impl Fn(&Place) -> bool) -> Case {
+        let all = carried(self.sight, &self.labels, &place);
+        let ground = all.ground(self.sight.step_mm);
+        let regions = ground.regions().collect();
+        let has_step = ground.higher.is_some();
+        let mut given = if has_step && place.size() <= STEP && !is_asked(&place) {
+            BTreeMap::new()
+        } else {
+            ground.given(self.sight, &place)
+        };
+        if let Some(higher) = &ground.higher {
+            let feet: Vec<usize> = higher
+                .iter()
+                .filter_map(|region| place.beside.get(region))
+                .flatten()
+                .copied()
+                .collect();
+            let grid = self.sight.grid();
+            given.retain(|node, _| feet.iter().all(|foot| grid.distance(*node, *foot) > FOOT));
+        }
+        Case {
+            place,
+            given,
+            regions,
+            has_step,
+        }
+    }
+
+    /// What the rays tell of each gap, and of the scan.
+    fn counted<E: From<Cancelled>>(
+        &self,
+        cases: &[Case],
+        columns: Option<&mut Visit<'_, E>>,
+        monitor: &dyn Monitor,
+    ) -> Result<(Vec<Tally>, Usual), E> {
+        let sight = self.sight;
+        let grid = sight.grid();
+        let z = self.labels.iter().zip(sight.image.raw_z_mm());
+        // Where nothing was measured, nothing is told of how usual it is that rays are lost.
+        let mut surface_mm: Vec<f64> = z
+            .map(|(label, z)| if *label != 0 { *z } else { f64::NAN })
+            .collect();
+        let mut tags = vec![None; surface_mm.len()];
+        for (index, case) in cases.iter().enumerate() {
+            let border = case
+                .regions
+                .iter()
+                .filter_map(|own| case.place.beside.get(own));
+            let around = grid.rings(border.flatten().copied(), RINGS, |node| {
+                case.regions.contains(&self.labels[node])
+            });
+            for (node, step) in around {
+                if step >= FROM_RING && tags[node].is_none() {
+                    tags[node] = Some((index as u32, Part::Around));
+                }
+            }
+        }
+        for (index, case) in cases.iter().enumerate() {
+            for (node, depth) in case.place.nodes.iter().zip(&case.place.depth) {
+                if let Some(given) = case.given.get(node) {
+                    surface_mm[*node] = given.z_mm;
+                    let part = if *depth > RIM {
+                        Part::Inside
+                    } else {
+                        Part::Rim
+                    };
+                    tags[*node] = Some((index as u32, part));
+                }
+            }
+        }
+        let Some(visit) = columns else {
+            return Ok(crate::rays::of_nodes(
+                sight,
+                &surface_mm,
+                &tags,
+                cases.len(),
+            ));
+        };
+        let mut steps = Steps::default();
+        let mut go_on = Ok(());
+        visit(&mut |column| {
+            steps.take(sight, column);
+            go_on = monitor.check();
+            go_on.is_ok()
+        })?;
+        go_on?;
+        let Some(step) = steps.finish() else {
+            return Ok(crate::rays::of_nodes(
+                sight,
+                &surface_mm,
+                &tags,
+                cases.len(),
+            ));
+        };
+        let mut rays = Rays::new(sight, step, surface_mm, tags, cases.len());
+        let mut go_on = Ok(());
+        visit(&mut |column| {
+            rays.take(column);
+            go_on = monitor.check();
+            go_on.is_ok()
+        })?;
+        go_on?;
+        Ok(rays.finish())
+    }
+
+    fn finish(self, regions: &RegionMap, warnings: Vec<String>) -> Closed {
+        let mut image = self.sight.image.clone();
+        let rows = image.rows().max(1);
+        for (node, own) in &self.given {
+            image.set_z_mm(node / rows, node % rows, Some(own.z_mm));
+        }
+        let regions = if self.given.is_empty() {
+            regions.clone()
+        } else {
+            RegionMap::new(&image, self.labels)
+        };
+        Closed {
+            image,
+            regions,
+            filled: self.given.into_keys().collect(),
+            gaps: self.gaps,
+            warnings,
+        }
+    }
+}
+
+/// What rays tell of a gap; `None` where none went there.
+fn evidence(tally: &Tally, usual: &Usual) -> Option<Evidence> {
+    let inside = if tally.inside.all() < FEWEST_RAYS {
+        tally.inside.with(tally.rim)
+    } else {
+        tally.inside
+    };
+    (inside.all() > 0.0).then(|| Evidence::new(inside, tally.around, usual))
+}
+
+fn verdict(evidence: &Evidence) -> (Decision, Cause) {
+    if evidence.log_odds_of_chance < 0.0 {
+        (Decision::Closed, Cause::Chance)
+    } else if evidence.log_odds < 0.0 {
+        (Decision::Closed, Cause::Surface)
+    } else if evidence.inside.below > evidence.inside.on_surface {
+        (Decision::Kept, Cause::Below)
+    } else {
+        (Decision::Kept, Cause::NoReturn)
+    }
+}
