@@ -50,7 +50,7 @@ BOTTOM = 1.5
 # Within the clear ground around a hole no more readings than that are lost to gloss.
 GLARE_AT_HOLES = 0.1
 # Where more are lost than this, the range image has a hole; and how large those shall be, millimetres.
-GLARE_HOLE, GLARE_LEAST_MM, GLARE_MOST_MM = 0.4, 2.0, 12.0
+GLARE_HOLE, GLARE_LEAST_MM, GLARE_MOST_MM = 0.6, 2.0, 12.0
 
 
 class Plan:
