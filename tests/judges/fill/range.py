@@ -36,15 +36,17 @@ def run(words):
 
 
 def one(options, seed):
-    """Makes, scans and converts a part, as far as that has not been done, and judges it."""
+    """Makes, scans, converts and judges a part."""
     out = options.out
-    run([sys.executable, "-B", HERE / "range_parts.py", "--out", out, seed])
+    if not options.kept:
+        # The scanner leaves alone what it has scanned.
+        (out / f"{seed}.seen.json").unlink(missing_ok=True)
+        run([sys.executable, "-B", HERE / "range_parts.py", "--anew", "--out", out, seed])
     run([options.scanner, "scan", out, seed])
     answers = {}
     for name, more in (("off", ()), ("on", FILL)):
         if name == "on" and options.off:
             continue
-        # Anew each time: the command may be another one.
         igs, report = out / f"{seed}.{name}.igs", out / f"{seed}.{name}.json"
         # One scan on each processor.
         run([options.relief, "convert", out / f"{seed}.scan", "-o", igs, "--report", report, "--threads", 1, *more])
@@ -67,12 +69,13 @@ def main():
     parser.add_argument("--out", type=pathlib.Path, required=True, help="folder of parts, scans and answers")
     parser.add_argument("--seeds", type=seeds, help="1..=50 is for judging, 1001 and above for tuning")
     parser.add_argument("--short", action="store_true", help="the first six parts")
+    parser.add_argument("--kept", action="store_true", help="with parts and scans that an earlier run has left")
     parser.add_argument("--off", action="store_true", help="without filling: what there is to be filled")
     parser.add_argument("--write", type=pathlib.Path, help="put the tables into this page")
     options = parser.parse_args()
     whole = range(JUDGING[0], JUDGING[1] + 1)
     options.seeds = options.seeds or (range(SHORT[0], SHORT[1] + 1) if options.short else whole)
-    if options.write and (options.off or options.seeds != whole):
+    if options.write and (options.off or options.kept or options.seeds != whole):
         sys.exit("--write wants the whole judgement")
     options.out.mkdir(parents=True, exist_ok=True)
     range_planted.run()
