@@ -40,7 +40,14 @@ fn inner_loops(at: &Path) -> usize {
 }
 
 fn convert(at: &Path, more: &[&str]) -> Value {
-    let options = ["convert", "slope.xyz", "--pitch-mm", "0.5", "--report", "r.json"];
+    let options = [
+        "convert",
+        "slope.xyz",
+        "--pitch-mm",
+        "0.5",
+        "--report",
+        "r.json",
+    ];
     let output = relief(at, &[&options[..], more].concat());
     assert!(output.status.success(), "{output:?}");
     report(at)
@@ -59,7 +66,10 @@ fn an_opening_stays_and_a_dull_place_is_closed_unless_the_user_says_otherwise() 
     let told = convert(at, &["--fill", "auto", "--pictures", "pictures"]);
     check("report.schema.json", &told);
     let holes = told["fill"]["holes"].as_array().unwrap();
-    let opening = holes.iter().find(|hole| hole["why"] == "no-return").unwrap();
+    let opening = holes
+        .iter()
+        .find(|hole| hole["why"] == "no-return")
+        .unwrap();
     assert_eq!(opening["decision"], "kept");
     assert!(opening["evidence"]["log_odds"].as_f64().unwrap() > 0.0);
     let others = holes.iter().filter(|hole| hole["why"] != "no-return");
@@ -79,12 +89,17 @@ fn an_opening_stays_and_a_dull_place_is_closed_unless_the_user_says_otherwise() 
     let told = convert(at, &["--fill", "all", "--fill-keep=0,0"]);
     assert_eq!(inner_loops(at), 1);
     let opening = told["fill"]["holes"].as_array().unwrap();
-    let opening = opening.iter().find(|hole| hole["why"] == "asked" && hole["decision"] == "kept");
+    let opening = opening
+        .iter()
+        .find(|hole| hole["why"] == "asked" && hole["decision"] == "kept");
     assert!(opening.is_some());
 
     let told = convert(at, &["--fill-max-mm", "3", "--fill-keep=40,40"]);
     let warnings = told["warnings"].to_string();
-    assert!(warnings.contains("no hole in the range image near x 40, y 40"), "{warnings}");
+    assert!(
+        warnings.contains("no hole in the range image near x 40, y 40"),
+        "{warnings}"
+    );
     let holes = told["fill"]["holes"].as_array().unwrap();
     assert!(holes.iter().any(|hole| hole["why"] == "size"), "{holes:?}");
 }

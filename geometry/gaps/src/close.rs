@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::carry::{Given, carried};
 use crate::find::{Place, gaps};
 use crate::odds::{Evidence, Usual};
-use crate::rays::{Part, Rays, Steps, Tally};
+use crate::rays::{Depth, Rays, Steps, Tally};
 use crate::report::{Cause, Decision, Gap};
 use crate::settings::{Mode, Settings};
 use crate::shadow::{Sensor, Shadows, Spot};
@@ -120,13 +120,13 @@ struct Work<'a> {
 const FOOT: f64 = 1.5;
 /// Gaps so narrow between surfaces at a step are the step's, pitches.
 const STEP: f64 = 3.0;
-/// Nodes so near to a gap's border, pitches, are at its rim.
-const RIM: f64 = 1.5;
+/// From this depth on rays are well inside a gap.
+const INSIDE: Depth = 2;
 /// Fewer rays inside tell nothing alone.
 const FEWEST_RAYS: f64 = 6.0;
-/// Rings of nodes around a gap whose rays are counted, from which on.
+/// Rings of nodes around a gap whose rays are counted, the border apart: there rays are lost at openings,
+/// too.
 const RINGS: usize = 5;
-const FROM_RING: usize = 2;
 /// Rings around what may be hidden in which something seen counts against it.
 const SEEN_RINGS: usize = 6;
 /// A place names the gap whose nearest node is so near, pitches, or in it.
@@ -304,7 +304,7 @@ impl Work<'_> {
         monitor.check()?;
         let (tallies, usual) = self.counted(&cases, columns, monitor)?;
         for (case, tally) in cases.into_iter().zip(tallies) {
-            let evidence = evidence(&tally, &usual);
+            let evidence = evidence(&case.place, &tally, &usual);
             let told = evidence.is_some();
             let (decision, cause) = if case.given.is_empty() {
                 let cause = if case.has_step {
@@ -318,7 +318,8 @@ impl Work<'_> {
             } else {
                 evidence.map_or((Decision::Closed, Cause::NoRay), |own| verdict(&own))
             };
-            if cause == Cause::Step && case.place.size() <= STEP {
+            // Beside every step some nodes belong to neither side.
+            if case.given.is_empty() && case.place.beside.len() > 1 && case.place.size() <= STEP {
                 continue;
             }
             self.note(
@@ -390,8 +391,8 @@ impl Work<'_> {
                 case.regions.contains(&self.labels[node])
             });
             for (node, step) in around {
-                if step >= FROM_RING && tags[node].is_none() {
-                    tags[node] = Some((index as u32, Part::Around));
+                if tags[node].is_none() {
+                    tags[node] = Some((index as u32, -(step as Depth)));
                 }
             }
         }
@@ -399,12 +400,8 @@ impl Work<'_> {
             for (node, depth) in case.place.nodes.iter().zip(&case.place.depth) {
                 if let Some(given) = case.given.get(node) {
                     surface_mm[*node] = given.z_mm;
-                    let part = if *depth > RIM {
-                        Part::Inside
-                    } else {
-                        Part::Rim
-                    };
-                    tags[*node] = Some((index as u32, part));
+                    let depth = libm::round(*depth).min(f64::from(Depth::MAX)) as Depth;
+                    tags[*node] = Some((index as u32, depth));
                 }
             }
         }
@@ -465,13 +462,13 @@ impl Work<'_> {
 }
 
 /// What rays tell of a gap; `None` where none went there.
-fn evidence(tally: &Tally, usual: &Usual) -> Option<Evidence> {
-    let inside = if tally.inside.all() < FEWEST_RAYS {
-        tally.inside.with(tally.rim)
-    } else {
-        tally.inside
-    };
-    (inside.all() > 0.0).then(|| Evidence::new(inside, tally.around, usual))
+fn evidence(place: &Place, tally: &Tally, usual: &Usual) -> Option<Evidence> {
+    let mut inside = tally.of(INSIDE..);
+    if inside.all() < FEWEST_RAYS {
+        inside = tally.of(1..);
+    }
+    let rings = [tally.of(-1..=-1), tally.of(-2..=-2), tally.of(..=-3)];
+    (inside.all() > 0.0).then(|| Evidence::new(inside, &rings, usual, place.size()))
 }
 
 fn verdict(evidence: &Evidence) -> (Decision, Cause) {

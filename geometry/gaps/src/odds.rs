@@ -66,24 +66,28 @@ pub(crate) struct Usual {
 const ON_OPENING: f64 = 0.01;
 /// Share of what comes back out of an opening from below.
 const BELOW_OPENING: f64 = 0.9;
+/// Openings narrower than so many pitches are that rare among gaps as narrow.
+const NARROW: f64 = 2.5;
+const RARE: f64 = 0.01;
 /// Share of gloss and stains that end as sharply as openings do.
 const SHARP: f64 = 0.1;
 
 impl Evidence {
-    pub(crate) fn new(inside: Counts, around: Counts, usual: &Usual) -> Self {
+    /// `rings` are the rays that went around it, ring by ring from its border outwards; `size` is the
+    /// gap's, pitches.
+    pub(crate) fn new(inside: Counts, rings: &[Counts], usual: &Usual, size: f64) -> Self {
         let astray = usual.astray;
         let [on, below, above] = [inside.on_surface, inside.below, inside.above].map(f64::from);
         let share = log_beta(f64::from(inside.lost) + 1.0, inside.returned() + 1.0);
         let half = libm::log(0.5 * astray);
-        let opening =
-            share + on * libm::log(ON_OPENING) + below * libm::log(BELOW_OPENING) + above * half;
+        let rare = if size < NARROW { libm::log(RARE) } else { 0.0 };
+        let opening = rare
+            + share
+            + on * libm::log(ON_OPENING)
+            + below * libm::log(BELOW_OPENING)
+            + above * half;
         let returned = on * libm::log(1.0 - astray) + (below + above) * half;
-        // Around an opening as many are lost as anywhere; around what glares, any share.
-        let (lost, back) = (f64::from(around.lost), around.returned());
-        let as_usual = lost * libm::log(usual.lost) + back * libm::log(1.0 - usual.lost);
-        let any = log_beta(lost + 1.0, back + 1.0);
-        let gloss =
-            share + returned + log_sum(libm::log(1.0 - SHARP) + any - as_usual, libm::log(SHARP));
+        let gloss = share + returned + blurred(rings, usual);
         // Chance had every place of the scan to leave such a gap in.
         let chance = libm::log(usual.rays.max(1.0))
             + f64::from(inside.lost) * libm::log(usual.lost)
@@ -91,11 +95,31 @@ impl Evidence {
             + returned;
         Self {
             inside,
-            around,
+            around: rings
+                .iter()
+                .fold(Counts::default(), |sum, own| sum.with(*own)),
             log_odds: opening - log_sum(gloss, chance),
             log_odds_of_chance: opening - chance,
         }
     }
+}
+
+/// How much likelier the rays around a gap are if it is blurred than if its border is an opening's,
+/// around which as many are lost as anywhere: logarithm of the ratio.
+///
+/// What is blurred reaches out by one ring, or two, and so on, as likely each, with any share of rays
+/// lost in each ring that it reaches.
+fn blurred(rings: &[Counts], usual: &Usual) -> f64 {
+    let mut reached = 0.0;
+    let mut sum = libm::log(SHARP);
+    for ring in rings {
+        let (lost, back) = (f64::from(ring.lost), ring.returned());
+        let as_usual = lost * libm::log(usual.lost) + back * libm::log(1.0 - usual.lost);
+        reached += log_beta(lost + 1.0, back + 1.0) - as_usual;
+        let own = libm::log((1.0 - SHARP) / rings.len() as f64);
+        sum = log_sum(sum, own + reached);
+    }
+    sum
 }
 
 /// Logarithm of Euler's beta function.
@@ -129,7 +153,7 @@ mod tests {
     }
 
     fn odds(inside: Counts, around: Counts) -> f64 {
-        Evidence::new(inside, around, &USUAL).log_odds
+        Evidence::new(inside, &[around], &USUAL, 6.0).log_odds
     }
 
     #[test]
@@ -147,6 +171,14 @@ mod tests {
         let nothing = counts(0, 0, 0, 100);
         assert!(odds(nothing, counts(300, 2, 2, 6)) > 1.0);
         assert!(odds(nothing, counts(150, 2, 2, 150)) < -5.0);
+    }
+
+    #[test]
+    fn a_border_that_is_blurred_by_one_ring_tells() {
+        let rings = |first: u32| [counts(75 - first, 0, 0, first), counts(300, 0, 0, 6)];
+        let odds = |first| Evidence::new(counts(0, 0, 0, 120), &rings(first), &USUAL, 9.0).log_odds;
+        assert!(odds(3) > 0.5);
+        assert!(odds(14) < -5.0);
     }
 
     #[test]

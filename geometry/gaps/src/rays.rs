@@ -1,28 +1,29 @@
 //! The rays of a scan that went to gaps and to what is around them, those that came back with nothing
 //! included.
 
+use std::collections::BTreeMap;
+use std::ops::RangeBounds;
+
 use range_image::Column;
 
 use crate::odds::{Counts, Usual};
 use crate::sight::Sight;
 
-/// What a node is to a gap.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Part {
-    /// Inside it, away from its border.
-    Inside,
-    /// Inside it at its border.
-    Rim,
-    /// Of a region around it, a little away from its border.
-    Around,
+/// How many nodes inside a gap a node lies: from 1 on within it, 0 and less in the regions around it.
+pub(crate) type Depth = i8;
+
+/// Counts of a gap by depth.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Tally {
+    pub(crate) by_depth: BTreeMap<Depth, Counts>,
 }
 
-/// Counts of a gap.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Tally {
-    pub(crate) inside: Counts,
-    pub(crate) rim: Counts,
-    pub(crate) around: Counts,
+impl Tally {
+    /// Counts of some depths together.
+    pub(crate) fn of(&self, depths: impl RangeBounds<Depth>) -> Counts {
+        let each = self.by_depth.range(depths);
+        each.fold(Counts::default(), |sum, (_, own)| sum.with(*own))
+    }
 }
 
 /// Rays counted by what they met.
@@ -33,10 +34,12 @@ pub(crate) struct Rays<'a> {
     /// Heights of surfaces at nodes; NaN where there is none.
     surface_mm: Vec<f64>,
     /// To which gap a node belongs, and how.
-    tags: Vec<Option<(u32, Part)>>,
+    tags: Vec<Option<(u32, Depth)>>,
     near_mm: f64,
     tallies: Vec<Tally>,
     elsewhere: Counts,
+    /// Of each column the share of rays on surfaces that are lost.
+    lost: Vec<f64>,
 }
 
 /// Most rays in a row that are taken for lost.
@@ -45,6 +48,8 @@ const MOST_LOST: f64 = 4000.0;
 /// between nodes, comes from it.
 const NEAR: f64 = 6.0;
 const NEAR_PITCHES: f64 = 0.3;
+/// Fewer rays of a column tell no share.
+const FEWEST: f64 = 20.0;
 /// Shares are never taken to be less.
 const LEAST_LOST: f64 = 1e-3;
 const LEAST_ASTRAY: f64 = 2e-3;
@@ -54,7 +59,7 @@ impl<'a> Rays<'a> {
         sight: &'a Sight<'a>,
         step: f64,
         surface_mm: Vec<f64>,
-        tags: Vec<Option<(u32, Part)>>,
+        tags: Vec<Option<(u32, Depth)>>,
         gaps: usize,
     ) -> Self {
         Self {
@@ -65,6 +70,7 @@ impl<'a> Rays<'a> {
             near_mm: NEAR * sight.noise_mm + NEAR_PITCHES * sight.image.pitch_mm(),
             tallies: vec![Tally::default(); gaps],
             elsewhere: Counts::default(),
+            lost: Vec::new(),
         }
     }
 
@@ -83,6 +89,7 @@ impl<'a> Rays<'a> {
             .filter(|(ray, _)| ray.is_finite())
             .collect();
         rays.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let so_far = self.elsewhere;
         let mut before: Option<(f64, f64)> = None;
         for (ray, z_mm) in rays {
             if let Some((last, last_z_mm)) = before {
@@ -97,6 +104,11 @@ impl<'a> Rays<'a> {
             self.count(own, ray, z_mm, Some(z_mm));
             before = Some((ray, z_mm));
         }
+        let rays = self.elsewhere.all() - so_far.all();
+        if rays >= FEWEST {
+            let lost = self.elsewhere.lost - so_far.lost;
+            self.lost.push(f64::from(lost) / rays);
+        }
     }
 
     /// Counts a ray that came back from a height, or did not. `near_mm` is where what it meets is sought
@@ -109,13 +121,9 @@ impl<'a> Rays<'a> {
 
     fn tell(&mut self, node: usize, height_mm: f64, returned_mm: Option<f64>) {
         let counts = match self.tags[node] {
-            Some((gap, part)) => {
+            Some((gap, depth)) => {
                 let tally = &mut self.tallies[gap as usize];
-                match part {
-                    Part::Inside => &mut tally.inside,
-                    Part::Rim => &mut tally.rim,
-                    Part::Around => &mut tally.around,
-                }
+                tally.by_depth.entry(depth).or_default()
             }
             None => &mut self.elsewhere,
         };
@@ -170,13 +178,15 @@ impl<'a> Rays<'a> {
     }
 
     /// What was counted for each gap, and on surfaces elsewhere.
-    pub(crate) fn finish(self) -> (Vec<Tally>, Usual) {
+    pub(crate) fn finish(mut self) -> (Vec<Tally>, Usual) {
         let of = self.elsewhere;
+        // The median of columns does not mind where it glares.
+        let lost = median(&mut self.lost).unwrap_or_else(|| f64::from(of.lost) / of.all().max(1.0));
         let share = |part: f64, all: f64, least: f64| (part / all.max(1.0)).clamp(least, 0.5);
         let astray = f64::from(of.below) + f64::from(of.above);
         let usual = Usual {
             rays: of.all(),
-            lost: share(f64::from(of.lost), of.all(), LEAST_LOST),
+            lost: lost.clamp(LEAST_LOST, 0.5),
             astray: share(astray, of.returned(), LEAST_ASTRAY),
         };
         (self.tallies, usual)
@@ -192,7 +202,7 @@ const STEEPEST: f64 = 4.0;
 pub(crate) fn of_nodes(
     sight: &Sight<'_>,
     surface_mm: &[f64],
-    tags: &[Option<(u32, Part)>],
+    tags: &[Option<(u32, Depth)>],
     gaps: usize,
 ) -> (Vec<Tally>, Usual) {
     let mut rays = Rays::new(sight, 1.0, surface_mm.to_vec(), tags.to_vec(), gaps);

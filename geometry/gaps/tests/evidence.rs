@@ -168,7 +168,11 @@ fn an_opening_that_returns_nothing_is_kept_unless_the_user_says_otherwise() {
             ..auto()
         },
     );
-    assert!(nowhere.warnings[0].contains("no hole"), "{:?}", nowhere.warnings);
+    assert!(
+        nowhere.warnings[0].contains("no hole"),
+        "{:?}",
+        nowhere.warnings
+    );
 }
 
 #[test]
@@ -181,7 +185,10 @@ fn gloss_is_closed_by_what_is_lost_around_it() {
     let found = closed(&scanned(&scene), &auto());
     let large = found.gaps.iter().max_by_key(|gap| gap.nodes).unwrap();
     assert!(large.nodes > 50, "{large:?}");
-    assert_eq!((large.decision, large.cause), (Decision::Closed, Cause::Surface));
+    assert_eq!(
+        (large.decision, large.cause),
+        (Decision::Closed, Cause::Surface)
+    );
 }
 
 #[test]
