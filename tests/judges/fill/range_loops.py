@@ -31,6 +31,8 @@ BELONGS = 0.5
 # A drilled hole is kept if no face on the top covers so much of its mouth; a needless loop is closed if faces cover
 # so much of what it left out.
 KEPT, CLOSED = 0.8, 0.9
+# A stain is black from this loss on.
+BLACK = 0.95
 # A loop of off.igs is known again in on.igs by so much of the smaller one's area.
 SAME = 0.1
 
@@ -123,7 +125,8 @@ class Truth:
         self.face = self.block.copy()
         for _, mouth in self.openings:
             self.face &= ~mouth
-        self.stained = self.stains(scan["stains"])
+        self.stained = self.stains([one for one in scan["stains"] if one["loss"] < BLACK])
+        self.black = self.stains([one for one in scan["stains"] if one["loss"] >= BLACK])
         self.glaring = self.glares(scan)
         self.hidden = self.shadows(scan)
 
@@ -200,7 +203,8 @@ class Truth:
 
     def cause(self, inside):
         """What may have made a needless loop; the loop by its places, a little beyond it."""
-        for name, places in (("stain", self.stained), ("gloss", self.glaring), ("shadow", self.hidden)):
+        for name, places in (("black", self.black), ("stain", self.stained), ("gloss", self.glaring),
+                             ("shadow", self.hidden)):
             if (inside & places).any():
                 return name
         return "other"

@@ -42,9 +42,6 @@ SHADOW = 0.35
 CLEAR = 4.5
 # Least width of what is to be found, pitches.
 LEAST = 10.5
-# So many stains swallow nearly all light: a node of the range image has several readings, and of one that has lost
-# two in three it still is known where the surface is.
-BLACK = 0.7
 # Least material under what is deepest, millimetres.
 BOTTOM = 1.5
 # Within the clear ground around a hole no more readings than that are lost to gloss.
@@ -168,7 +165,7 @@ def stain(plan, made):
     radius, rim = dice.uniform(0.8, 4.0), dice.uniform(0.5, 3.0)
     footprint = made.place(plan, lambda at: Circle(at, 2.0 * radius + rim), plan.clear)
     made.stains.append({"centre_mm": list(footprint.at), "radius_mm": radius, "rim_mm": rim,
-                        "loss": dice.uniform(0.95, 1.0) if dice.random() < BLACK else dice.uniform(0.6, 0.95)})
+                        "loss": dice.uniform(0.6, 1.0)})
 
 
 def topped(plan, made):

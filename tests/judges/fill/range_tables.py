@@ -8,7 +8,7 @@ BEGIN = "## Parts\n"
 # Shares that are asked for: of drilled holes that are kept, of needless loops that are closed.
 KEPT_BAR, CLOSED_BAR = 1.0, 0.98
 SIZES_MM = (0.0, 2.0, 5.0, 10.0, 15.0, float("inf"))
-CAUSES = {"stain": "a stain", "gloss": "gloss", "shadow": "a boss's shadow", "other": "nothing of these",
+CAUSES = {"black": "a black stain", "stain": "another stain", "gloss": "gloss", "shadow": "a boss's shadow", "other": "nothing of these",
           "table": "on the table", "elsewhere": "on another face"}
 
 
