@@ -47,7 +47,7 @@ BOTTOM = 1.5
 # Within the clear ground around a hole no more readings than that are lost to gloss.
 GLARE_AT_HOLES = 0.1
 # Where more are lost than this, the range image has a hole; and how large those shall be, millimetres.
-GLARE_HOLE, GLARE_LEAST_MM, GLARE_MOST_MM = 0.6, 2.0, 12.0
+GLARE_HOLE, GLARE_LEAST_MM, GLARE_MOST_MM = 0.8, 2.0, 12.0
 
 
 class Plan:
@@ -66,7 +66,7 @@ class Plan:
         self.noise = math.exp(dice.uniform(math.log(0.02), math.log(0.1)))
         self.clear = CLEAR * self.pitch
         # On tops without a mirror all is salt and pepper at most; the others shall have holes.
-        self.glare = dice.uniform(0.5 if self.top in ("flat", "leaning") else 0.7, 1.0)
+        self.glare = dice.uniform(0.5 if self.top in ("flat", "leaning") else 0.9, 1.0)
 
 
 class Made:
