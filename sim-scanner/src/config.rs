@@ -14,7 +14,7 @@ use crate::endpoint::usb::{self, Attachment, Personality, UsbError, UsbServer};
 use crate::line::LineFaults;
 use crate::preset::{self, Overrides, Preset, SetupError};
 use crate::replay::{Replay, ReplayError};
-use crate::scene::{Body, Material, Mesh, Scene, StlError};
+use crate::scene::{Body, Material, Mesh, Scene, Stain, StlError};
 use crate::source::Source;
 
 /// What stands on the table.
@@ -89,6 +89,8 @@ pub struct SimConfig {
     pub table_plane: bool,
     /// A plane is in view, this far behind the object, millimetres.
     pub back_plane_mm: Option<f64>,
+    /// Stains of the object. Play no part for a recording.
+    pub stains: Vec<Stain>,
 }
 
 /// Why a simulated scanner cannot be made.
@@ -158,7 +160,9 @@ impl SimConfig {
                 "the back plane must stand 0 to 500 mm behind the object, not {distance_mm}"
             ))));
         }
-        let scene = self.with_surroundings(scene, material);
+        let scene = self
+            .with_surroundings(scene, material)
+            .with_stains(self.stains.clone());
         let (mut scanner, proposed) = self.preset.set_up(scene, &self.overrides, self.seed)?;
         // The window reaches to the plane behind.
         if let Some(distance_mm) = self.back_plane_mm {

@@ -90,6 +90,14 @@ struct Cli {
     #[arg(long, value_name = "P")]
     dropouts: Option<f64>,
 
+    /// Probability of a lost sample where the object's gloss mirrors the beam at the sensor
+    #[arg(long, value_name = "P", requires = "glare_width_deg")]
+    glare: Option<f64>,
+
+    /// Angle between mirrored beam and sensor over which that fades (1 sigma), degrees
+    #[arg(long, value_name = "D", requires = "glare")]
+    glare_width_deg: Option<f64>,
+
     /// Range (or y and z) per count, mm [paper: 0.1]
     #[arg(long, value_name = "C")]
     range_count_mm: Option<f64>,
@@ -216,6 +224,8 @@ impl Cli {
                 outlier_clusters: self.outlier_clusters,
                 mixed: self.mixed,
                 dropouts: self.dropouts,
+                glare: self.glare,
+                glare_width_deg: self.glare_width_deg,
                 jitter_mm: self.jitter_mm,
                 backlash_mm: self.backlash_mm,
             },
@@ -236,6 +246,7 @@ impl Cli {
             line: self.faults.line,
             table_plane: self.table_plane,
             back_plane_mm: self.back_plane_mm,
+            stains: Vec::new(),
         }
     }
 }
@@ -402,6 +413,10 @@ mod tests {
             "0.2",
             "--dropouts",
             "0.01",
+            "--glare",
+            "0.9",
+            "--glare-width-deg",
+            "2",
             "--line-rate",
             "0",
             "--faults",
@@ -436,6 +451,7 @@ mod tests {
             &["sim-scanner", "--usbip", "3240"],
             &["sim-scanner", "--pty", "l", "--line-rate", "fast"],
             &["sim-scanner", "--pty", "l", "--faults", "flip"],
+            &["sim-scanner", "--pty", "l", "--glare", "1"],
             &[
                 "sim-scanner",
                 "--pty",

@@ -36,6 +36,12 @@ pub struct NoiseModel {
     pub dropouts: f64,
     /// No light comes back beyond this angle of incidence, radians.
     pub incidence_max_rad: f64,
+    /// Probability that a reading is lost where a glossy surface mirrors the beam straight at
+    /// the sensor, which then sees nothing but the glare.
+    pub glare: f64,
+    /// Angle between mirrored beam and sensor over which that fades, radians: the probability
+    /// is `glare` exp(-(angle / `glare_width_rad`)^2 / 2).
+    pub glare_width_rad: f64,
 }
 
 impl NoiseModel {
@@ -56,6 +62,8 @@ impl NoiseModel {
             mixed: 0.0,
             dropouts: 0.0,
             incidence_max_rad: 1.5,
+            glare: 0.0,
+            glare_width_rad: 0.0,
         }
     }
 
@@ -72,6 +80,7 @@ impl NoiseModel {
             ("outlier clusters", self.outlier_clusters),
             ("mixed", self.mixed),
             ("dropouts", self.dropouts),
+            ("glare", self.glare),
         ];
         for (name, value) in shares {
             if !(0.0..=1.0).contains(&value) {
@@ -90,6 +99,13 @@ impl NoiseModel {
         }
         if !(self.speckle_cell_mm > 0.0 && self.speckle_cell_mm.is_finite()) {
             return Err("the speckle cell must have a size above 0 mm".into());
+        }
+        // Beyond a right angle no mirror sends light to the side it came from.
+        if !(0.0..=core::f64::consts::FRAC_PI_2).contains(&self.glare_width_rad) {
+            return Err(format!(
+                "the glare's width must lie between 0 and 90 degrees, not {}",
+                self.glare_width_rad.to_degrees()
+            ));
         }
         Ok(())
     }
@@ -168,6 +184,9 @@ impl NoiseModel {
         if lost < losing || cos < libm::cos(self.incidence_max_rad) {
             return None;
         }
+        if self.is_swallowed(key, spot) {
+            return None;
+        }
         let (surface_mm, mut kind) = self.place(spot, mix)?;
         let factor = if wide < self.tail_share {
             self.tail_factor
@@ -201,6 +220,28 @@ impl NoiseModel {
             saturated: light > 255.0,
             kind,
         })
+    }
+
+    /// Whether the reading is lost to gloss or to a stain.
+    ///
+    /// Draws of its own: those of the other mistakes stay as they are on a surface without.
+    fn is_swallowed(&self, key: SampleKey, spot: &Spot) -> bool {
+        let blinded = self.blinded(spot.mirror_off_rad);
+        if blinded <= 0.0 && spot.stained <= 0.0 {
+            return false;
+        }
+        let mut draws = key.draws(Purpose::Loss, key.sample);
+        let (by_gloss, by_stain) = (draws.uniform(), draws.uniform());
+        by_gloss < blinded || by_stain < spot.stained
+    }
+
+    /// Probability that the sensor is blinded by a beam mirrored past it at this angle, radians.
+    fn blinded(&self, off_rad: f64) -> f64 {
+        if self.glare <= 0.0 || self.glare_width_rad <= 0.0 {
+            return 0.0;
+        }
+        let off = off_rad / self.glare_width_rad;
+        self.glare * libm::exp(-off * off / 2.0)
     }
 
     /// Range of the surface that is taken for the spot's, step edges considered.

@@ -40,6 +40,10 @@ pub struct Spot {
     pub axis_seen: bool,
     /// Set where the spot lies on a step edge or a silhouette.
     pub step: Option<Step>,
+    /// Angle between the beam as a mirror would send it on and the way to the sensor, radians.
+    pub mirror_off_rad: f64,
+    /// Probability that a stain on the surface swallows the light.
+    pub stained: f64,
 }
 
 /// What a step edge does to the range that a sensor reports.
@@ -129,8 +133,17 @@ impl Optics {
             lit: gathered.here + gathered.other,
             axis_seen,
             step: gathered.step(self.baseline_mm, range_mm, beams.len() > 1),
+            mirror_off_rad: mirror_off_rad(direction, &hit, sensor),
+            stained: scene.stained(&hit),
         })
     }
+}
+
+/// Angle between the mirrored beam and the way from the hit to the sensor, radians.
+fn mirror_off_rad(direction: Vec3, hit: &Hit, sensor_mm: Vec3) -> f64 {
+    let mirrored = direction - hit.normal * (2.0 * hit.normal.dot(direction));
+    let towards = sensor_mm - hit.point_mm;
+    libm::atan2(mirrored.cross(towards).length(), mirrored.dot(towards))
 }
 
 fn nearest(returns: &[Option<Hit>]) -> Option<Hit> {
@@ -310,6 +323,27 @@ mod tests {
         assert!((share - 0.15).abs() < 1e-9, "{share}");
         let inside = optics.look(&scene, 0.0, angle_to(&optics, 0.5, 20.0));
         assert_eq!(inside.and_then(|spot| spot.step), None);
+    }
+
+    #[test]
+    fn a_mirror_halfway_between_laser_and_sensor_blinds() {
+        // The laser straight above the place that is looked at, the sensor beside it.
+        for ((x, y), turn) in [
+            ((0.0, 150.0), 0.0),
+            ((0.0, 150.0), 0.04),
+            ((90.0, 0.0), 0.0),
+        ] {
+            let optics = optics((x, y), 0.1);
+            let to_sensor = libm::atan2(libm::hypot(x, y), 750.0);
+            // The normal halves the angle; turned by an angle, it turns the beam by twice that.
+            let (sin, cos) = libm::sincos(to_sensor / 2.0 + turn);
+            let aside = Vec3::new(x, y, 0.0).normalize();
+            let normal = aside * sin + Vec3::Z * cos;
+            let offset_mm = normal.dot(Vec3::new(0.0, 4.0, 0.0));
+            let scene = scene(vec![Surface::Plane { normal, offset_mm }]);
+            let spot = optics.look(&scene, 0.0, 0.0).expect("an endless plane");
+            assert!((spot.mirror_off_rad - 2.0 * turn).abs() < 1e-9, "{spot:?}");
+        }
     }
 
     #[test]

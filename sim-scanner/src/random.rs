@@ -26,6 +26,8 @@ pub enum Purpose {
     Scene = 7,
     /// Mishaps of the device.
     Mishap = 8,
+    /// Readings lost to gloss and to stains.
+    Loss = 9,
 }
 
 /// A stream of draws.

@@ -1,4 +1,5 @@
-//! Lets trimesh, libigl and CGAL judge `relief fill`, side by side with MeshLab and MeshFix.
+//! Lets trimesh, libigl and CGAL judge `relief fill`, side by side with MeshLab and MeshFix, and
+//! OpenCASCADE what `relief convert --fill` makes of range images.
 
 use anyhow::Result;
 use clap::Args;
@@ -16,19 +17,30 @@ const PACKAGES: [&str; 6] = [
 ];
 /// Where the tables go.
 const PAGE: &str = "docs/studies/fill-judged.md";
+/// Where those of range images go.
+const RANGE_PAGE: &str = "docs/studies/fill-range.md";
 
 #[derive(Debug, Args)]
 pub(crate) struct Options {
     /// Fewer holes, smaller meshes.
     #[arg(long)]
     pub(crate) short: bool,
-    /// Put the tables into `docs/studies/fill-judged.md`.
+    /// Put the tables into `docs/studies/fill-judged.md`, or `docs/studies/fill-range.md`.
     #[arg(long, conflicts_with = "short")]
     pub(crate) write: bool,
+    /// Judge filled range images instead: scans of glossy, stained parts with drilled holes.
+    #[arg(long)]
+    pub(crate) range: bool,
+    /// Those parts: 1..=50 are for judging, 1001 and above may be looked at in tuning.
+    #[arg(long, value_name = "A..=B", requires = "range", conflicts_with_all = ["short", "write"])]
+    pub(crate) seeds: Option<String>,
 }
 
 /// Fills holes whose surfaces are known, and what else there is of holes, and has it judged.
 pub(crate) fn run(options: &Options) -> Result<()> {
+    if options.range {
+        return range(options);
+    }
     let place = shell::root().join("target/judges/fill");
     let python = judge::environment(&place, &PACKAGES)?;
     shell::run("cargo", &["build", "--release", "--bin", "relief"])?;
@@ -45,3 +57,30 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     });
     shell::run(&python, &words)
 }
+
+/// Scans parts whose openings are known, fills their range images, and has the IGES files judged.
+fn range(options: &Options) -> Result<()> {
+    let place = shell::root().join("target/judges");
+    let python = judge::python(&place, &[])?;
+    let programs = ["build", "--release", "--bin", "relief", "--bin", SCANNER];
+    shell::run("cargo", &programs)?;
+    let program = |name| shell::target().join("release").join(name);
+    let relief = program("relief").display().to_string();
+    let scanner = program(SCANNER).display().to_string();
+    let out = place.join("fill-range").display().to_string();
+    let check = "tests/judges/fill/range.py";
+    let mut words = vec!["-B", check, &relief, &scanner, "--out", &out];
+    if let Some(seeds) = &options.seeds {
+        words.extend(["--seeds", seeds]);
+    }
+    words.extend(options.short.then_some("--short"));
+    words.extend(if options.write {
+        &["--write", RANGE_PAGE][..]
+    } else {
+        &[]
+    });
+    shell::run(&python, &words)
+}
+
+/// The program that scans parts.
+const SCANNER: &str = "study-features";

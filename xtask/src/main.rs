@@ -48,9 +48,10 @@ enum Chore {
     ///
     /// Needs Python 3; installs the judge's packages into `target/judges/toolpath`.
     JudgeToolpath(toolpath::Options),
-    /// Let trimesh, libigl and CGAL judge `relief fill`, side by side with MeshLab and MeshFix.
+    /// Let trimesh, libigl and CGAL judge `relief fill`, side by side with MeshLab and MeshFix; or, with
+    /// `--range`, OpenCASCADE the holes that `relief convert --fill` closes and keeps.
     ///
-    /// Needs Python 3; installs the judge's packages into `target/judges/fill`.
+    /// Needs Python 3; installs the judge's packages into `target/judges`.
     JudgeFill(fillings::Options),
     /// Let OpenCASCADE judge solids of random parts, rebuilt from their features.
     ///
@@ -150,10 +151,14 @@ fn full() -> anyhow::Result<()> {
         surfaces: 20,
         linuxcnc: true,
     })?;
-    fillings::run(&fillings::Options {
-        short: false,
-        write: false,
-    })?;
+    for range in [false, true] {
+        fillings::run(&fillings::Options {
+            short: false,
+            write: false,
+            range,
+            seeds: None,
+        })?;
+    }
     solids::run(&solids::Options { parts: 500 })?;
     vm::run(&vm::Vm::Usb(vm::Options::default()))?;
     fuzz::run(&fuzz::Options {

@@ -60,6 +60,10 @@ pub struct Overrides {
     pub mixed: Option<f64>,
     /// See [`NoiseModel::dropouts`].
     pub dropouts: Option<f64>,
+    /// See [`NoiseModel::glare`].
+    pub glare: Option<f64>,
+    /// See [`NoiseModel::glare_width_rad`]; here in degrees.
+    pub glare_width_deg: Option<f64>,
     /// See [`Mechanics::jitter_mm`].
     pub jitter_mm: Option<f64>,
     /// See [`Mechanics::backlash_mm`].
@@ -191,6 +195,9 @@ impl Preset {
         check(overrides)?;
         let noise = overrides.apply_to(base.noise);
         noise.validate().map_err(SetupError::Setting)?;
+        for stain in &scene.stains {
+            stain.validate().map_err(SetupError::Setting)?;
+        }
         let (low, high) = scene.object_extent_mm();
         let (view_low, view_high) = scene.view_extent_mm();
         let middle = (low + high) / 2.0;
@@ -290,6 +297,10 @@ impl Overrides {
             outlier_clusters: self.outlier_clusters.unwrap_or(noise.outlier_clusters),
             mixed: self.mixed.unwrap_or(noise.mixed),
             dropouts: self.dropouts.unwrap_or(noise.dropouts),
+            glare: self.glare.unwrap_or(noise.glare),
+            glare_width_rad: self
+                .glare_width_deg
+                .map_or(noise.glare_width_rad, f64::to_radians),
             ..noise
         }
     }

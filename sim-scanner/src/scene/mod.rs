@@ -5,12 +5,14 @@ mod exact;
 pub mod figures;
 mod mesh;
 mod solid;
+mod stain;
 
 pub use benches::{cylinder_on_table, house_before_plane, house_on_table};
 pub use exact::FaceSurface;
 pub use figures::{cylinder, figure, groove, house};
 pub use mesh::{Mesh, MeshFace, StlError, TRIANGLES_MAX};
 pub use solid::{ConvexSolid, Surface};
+pub use stain::Stain;
 
 use crate::Vec3;
 
@@ -76,6 +78,8 @@ pub struct Scene {
     pub object_bodies: usize,
     /// Lower and upper corner of what a proposed scan takes in, if more than the object.
     pub view_mm: Option<(Vec3, Vec3)>,
+    /// Patches of the object that swallow light.
+    pub stains: Vec<Stain>,
 }
 
 impl Scene {
@@ -86,6 +90,7 @@ impl Scene {
             object_bodies: object.len(),
             bodies: object.into_iter().map(|body| (body, material)).collect(),
             view_mm: None,
+            stains: Vec::new(),
         }
     }
 
@@ -106,6 +111,25 @@ impl Scene {
     pub fn with_view_mm(mut self, low: Vec3, high: Vec3) -> Self {
         self.view_mm = Some((low, high));
         self
+    }
+
+    /// Stains the object; its surroundings stay clean.
+    #[must_use]
+    pub fn with_stains(mut self, stains: Vec<Stain>) -> Self {
+        self.stains = stains;
+        self
+    }
+
+    /// Probability that a stain swallows the light of a spot there: of several the strongest.
+    #[must_use]
+    pub fn stained(&self, hit: &Hit) -> f64 {
+        if hit.face.body >= self.object_bodies {
+            return 0.0;
+        }
+        self.stains
+            .iter()
+            .map(|stain| stain.loss_at(hit.point_mm))
+            .fold(0.0, f64::max)
     }
 
     fn with_half_space(mut self, normal: Vec3, offset_mm: f64, material: Material) -> Self {

@@ -68,6 +68,12 @@ struct Options {
     /// Probability of a lost sample at normal incidence
     #[arg(long, value_name = "P")]
     dropouts: Option<f64>,
+    /// Probability of a lost sample where gloss mirrors the beam at the sensor
+    #[arg(long, value_name = "P", requires = "glare_width_deg")]
+    glare: Option<f64>,
+    /// Angle between mirrored beam and sensor over which that fades, degrees
+    #[arg(long, value_name = "D", requires = "glare")]
+    glare_width_deg: Option<f64>,
     /// The road from samples to surfaces: relief or shim-lee
     #[arg(long, value_name = "METHOD")]
     method: Option<String>,
@@ -114,6 +120,8 @@ impl Options {
                 outliers: self.outliers,
                 mixed: self.mixed,
                 dropouts: self.dropouts,
+                glare: self.glare,
+                glare_width_deg: self.glare_width_deg,
                 ..Overrides::default()
             },
             seed: self.seed,

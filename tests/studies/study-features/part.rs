@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use relief_tests::stl::triangles;
 use serde::Deserialize;
 use sim_scanner::Vec3;
-use sim_scanner::scene::{Body, FaceSurface, Material, Mesh, MeshFace, Scene, Surface};
+use sim_scanner::scene::{Body, FaceSurface, Material, Mesh, MeshFace, Scene, Stain, Surface};
 
 /// How a part is scanned.
 #[derive(Debug, Clone, Deserialize)]
@@ -21,6 +21,19 @@ pub(crate) struct Conditions {
     pub(crate) outliers: f64,
     pub(crate) mixed: f64,
     pub(crate) dropouts: f64,
+    /// Gloss: see [`sim_scanner::noise::NoiseModel::glare`].
+    #[serde(default)]
+    pub(crate) glare: f64,
+    #[serde(default)]
+    pub(crate) glare_width_deg: f64,
+    #[serde(default)]
+    pub(crate) stains: Vec<ToldStain>,
+    /// Distance of the laser from the part's middle, and of the sensor from the laser along y,
+    /// millimetres; those of the preset unless told.
+    #[serde(default)]
+    pub(crate) standoff_mm: Option<f64>,
+    #[serde(default)]
+    pub(crate) baseline_mm: Option<f64>,
     pub(crate) spot_radius_mm: f64,
     /// Height of the table that the part lies on, where it is seen.
     pub(crate) table_z_mm: Option<f64>,
@@ -28,6 +41,26 @@ pub(crate) struct Conditions {
     pub(crate) view_mm: [[f64; 3]; 2],
     /// Samples outside of it are not taken: lower and upper x and y.
     pub(crate) window_mm: Option<[[f64; 2]; 2]>,
+}
+
+/// A patch that swallows light: see [`Stain`].
+#[derive(Debug, Clone, Deserialize)]
+pub(crate) struct ToldStain {
+    centre_mm: [f64; 2],
+    radius_mm: f64,
+    rim_mm: f64,
+    loss: f64,
+}
+
+impl ToldStain {
+    fn stain(&self) -> Stain {
+        Stain {
+            centre_mm: self.centre_mm.into(),
+            radius_mm: self.radius_mm,
+            rim_mm: self.rim_mm,
+            loss: self.loss,
+        }
+    }
 }
 
 #[derive(Debug, Deserialize)]
@@ -115,6 +148,8 @@ pub(crate) fn read(folder: &Path, name: &str) -> Result<(Scene, usize, Condition
     if let Some(z_mm) = told.scan.table_z_mm {
         scene = scene.with_back_plane(z_mm, Material::PAPER);
     }
+    let stains = told.scan.stains.iter().map(ToldStain::stain).collect();
+    let scene = scene.with_stains(stains);
     let [low, high] = told.scan.view_mm;
     let scene = scene.with_view_mm(Vec3::from_array(low), Vec3::from_array(high));
     Ok((scene, told.faces.len(), told.scan))

@@ -46,10 +46,16 @@ pub(crate) fn scan(folder: &Path, name: &str) -> Result<Seen> {
         outliers: Some(conditions.outliers),
         mixed: Some(conditions.mixed),
         dropouts: Some(conditions.dropouts),
+        glare: Some(conditions.glare),
+        glare_width_deg: Some(conditions.glare_width_deg),
+        standoff_mm: conditions.standoff_mm,
         ..Overrides::default()
     };
     let (mut scanner, sweep) = Preset::Paper.set_up(scene, &overrides, conditions.seed)?;
     scanner.optics.spot_radius_mm = conditions.spot_radius_mm;
+    if let Some(baseline_mm) = conditions.baseline_mm {
+        scanner.optics.baseline_mm = (0.0, baseline_mm);
+    }
     let mut seen = Seen {
         samples: 0,
         on_part: 0,

@@ -92,6 +92,8 @@ fn source(args: &Args) -> Result<Source, Failure> {
         outliers: args.outliers,
         mixed: args.mixed,
         dropouts: args.dropouts,
+        glare: args.glare,
+        glare_width_deg: args.glare_width_deg,
         ..Overrides::default()
     };
     let (scanner, proposed) = model

@@ -40,6 +40,23 @@ pub(crate) struct Args {
     /// Share of rays that bring no sample [default: 0.001]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     dropouts: Option<f64>,
+    /// Share of rays lost where the object's gloss mirrors them straight at the sensor
+    /// [default: 0]
+    #[arg(
+        long,
+        value_name = "SHARE",
+        allow_negative_numbers = true,
+        requires = "glare_width_deg"
+    )]
+    glare: Option<f64>,
+    /// Angle between mirrored ray and sensor over which that fades (1 sigma), degrees
+    #[arg(
+        long,
+        value_name = "DEG",
+        allow_negative_numbers = true,
+        requires = "glare"
+    )]
+    glare_width_deg: Option<f64>,
     #[command(flatten)]
     regularize: RegularizeArgs,
 }
