@@ -1,5 +1,7 @@
 //! Holes of small scenes, made of rays as a scanner sends them: what is kept and what is closed.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on says where")]
+
 use gaps::{Cause, Closed, Decision, Mode, Settings, Sight, close};
 use range_image::{Cancelled, Column, Lattice, RangeImage, RegionMap, Sample, Unmonitored};
 
