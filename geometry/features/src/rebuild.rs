@@ -54,8 +54,7 @@ pub fn rebuilt(recognition: &Recognition) -> Result<Rebuilt, RebuildError> {
     let mut assumed = Vec::new();
     let top_mm = block.heights_mm.0;
     let bottom_mm = block.heights_mm.1.unwrap_or_else(|| {
-        let ends = features.iter().filter_map(|f| f.heights_mm.1);
-        let lowest = ends.fold(top_mm, f64::min);
+        let lowest = features.iter().filter_map(lowest_mm).fold(top_mm, f64::min);
         let length = block.dimension("length").map_or(0.0, |d| d.value_mm);
         assumed.push(
             "the block's bottom, which was not seen, lies under its deepest floor".to_owned(),
@@ -95,6 +94,20 @@ pub fn rebuilt(recognition: &Recognition) -> Result<Rebuilt, RebuildError> {
     Ok(Rebuilt { part, assumed })
 }
 
+/// Where a feature ends at its deepest; `None` where that was not seen.
+fn lowest_mm(feature: &Feature) -> Option<f64> {
+    let end_mm = feature.heights_mm.1?;
+    Some(match (&feature.bottom, feature.outline) {
+        (Bottom::Tip(slope), Shape::Circle(circle)) => end_mm - slope * circle.radius_mm,
+        // A surface lies within the hull of its control points.
+        (Bottom::FreeForm(surface), _) => {
+            let heights = surface.points().iter().map(|[z_mm]| *z_mm);
+            heights.fold(end_mm, f64::min)
+        }
+        _ => end_mm,
+    })
+}
+
 fn floor(feature: &Feature, assumed: &mut Vec<String>) -> Floor {
     if feature.through {
         return Floor::Through;
@@ -128,7 +141,7 @@ struct Edges {
     is_sharp: bool,
 }
 
-/// Of a corner's radius, how wide an edge in it is made where it is wider.
+/// Of a corner's radius, how wide an edge in it may be.
 const IN_CORNER: f64 = 0.95;
 
 impl Edges {
@@ -143,26 +156,24 @@ impl Edges {
         };
         // Those within the outline, whose corners become narrower.
         let within = match feature.lie {
-            Some(Lie::Hollow) => &mut own.lower,
-            _ => &mut own.upper,
+            Some(Lie::Hollow) => &own.lower,
+            _ => &own.upper,
         };
         let Some(edge) = within else {
             return own;
         };
-        let (width, limit) = (width_mm(edge), IN_CORNER * rectangle.corner_mm);
-        if width <= limit {
+        if width_mm(edge) <= IN_CORNER * rectangle.corner_mm {
             return own;
         }
-        // A small radius that is not told is that of a sharp corner between two samples.
-        if feature.dimension("corner_radius").is_none() {
-            own.is_sharp = true;
-        } else {
+        // A small radius that is not told is that of a sharp corner between two samples. One that is
+        // told costs less of the surface than an edge that is made narrower all around.
+        own.is_sharp = true;
+        if feature.dimension("corner_radius").is_some() {
             assumed.push(format!(
-                "{} {}: its treated edge is {limit:.3} mm wide instead of {width:.3}, as its corners \
-                 allow",
+                "{} {}: its corners are made sharp, since its treated edge is wider than they are \
+                 round",
                 feature.class, feature.id
             ));
-            narrow(edge, limit / width);
         }
         own
     }
@@ -172,19 +183,6 @@ fn width_mm(edge: &Treatment) -> f64 {
     match edge {
         Treatment::Round { radius_mm } => *radius_mm,
         Treatment::Chamfer { width_mm, .. } => *width_mm,
-    }
-}
-
-fn narrow(edge: &mut Treatment, share: f64) {
-    match edge {
-        Treatment::Round { radius_mm } => *radius_mm *= share,
-        Treatment::Chamfer {
-            width_mm,
-            height_mm,
-        } => {
-            *width_mm *= share;
-            *height_mm *= share;
-        }
     }
 }
 

@@ -4,7 +4,7 @@ use range_image::{Cancelled, Column, Monitor, RangeImage};
 use segment::SegmentError;
 
 use crate::arrangement::{Pattern, patterns};
-use crate::candidate::{Candidate, Lie, candidates, frame_of, top};
+use crate::candidate::{Candidate, Lie, Top, candidates, frame_of, top};
 use crate::chance::Chance;
 use crate::class::Class;
 use crate::code::{Attributes, Form, Sense, code, written};
@@ -12,11 +12,11 @@ use crate::feature::{Bottom, Dimension, Feature};
 use crate::field::{FieldError, field};
 use crate::floor::free_form;
 use crate::frame::Frame;
-use crate::levels::levels;
+use crate::levels::{AROUND, Levels, levels};
 use crate::measure::measured;
 use crate::network::Classifier;
 use crate::outline::Shape;
-use crate::regions::{least_step_mm, regions};
+use crate::regions::{OUTSIDE, Region, least_step_mm, regions};
 use crate::section::section;
 use crate::sight::Sight;
 use crate::treatment::{Kind, Treatment, treatments};
@@ -101,9 +101,18 @@ pub fn recognise(
 ) -> Result<Recognition, RecogniseError> {
     let mut field = field(columns, camera_mm, monitor)?;
     let step_mm = least_step_mm(&field);
-    let regions = regions(&mut field, columns, monitor)?;
-    let levels = levels(&field.image, &regions, step_mm);
+    let mut regions = regions(&mut field, columns, monitor)?;
+    let mut levels = levels(&field.image, &regions, step_mm);
     let top = top(&regions, &levels, step_mm).ok_or(RecogniseError::NoTop)?;
+    if is_above(&levels, &top) {
+        // No part hangs under its table: what was taken for it is something else.
+        levels.levels[usize::from(AROUND)].plane = None;
+        levels.levels[usize::from(AROUND)].is_plane = false;
+        regions.regions[usize::from(OUTSIDE)] = Region::Outside(None);
+        let note =
+            "what surrounds the part lies higher than its top, and is not taken for the table";
+        regions.notes.push(note.to_owned());
+    }
     let frame = frame_of(&top);
     let sight = Sight {
         columns,
@@ -151,6 +160,13 @@ pub fn recognise(
         notes: regions.notes,
         image: field.image,
     })
+}
+
+/// Whether what was taken for the table lies above the part's top.
+fn is_above(levels: &Levels, top: &Top) -> bool {
+    let [x_mm, y_mm] = top.plane.middle_mm;
+    let table = levels.levels[usize::from(AROUND)].plane;
+    table.is_some_and(|table| table.z_mm(x_mm, y_mm) >= top.plane.z_mm(x_mm, y_mm))
 }
 
 /// Candidates with their parents, parents first.

@@ -182,9 +182,9 @@ fn rounded_edges_amid_noise_leave_the_sizes_as_they_are() {
     assert!(solid.warnings.is_empty(), "{:?}", solid.warnings);
 }
 
-/// A fillet that is wider than the corners of its pocket are round is made as wide as these allow.
+/// Where a fillet is wider than the corners of its pocket are round, these are made sharp.
 #[test]
-fn an_edge_that_its_corners_are_too_narrow_for_is_made_narrower() {
+fn corners_that_are_too_narrow_for_an_edge_are_made_sharp() {
     let part = |x: f64, y: f64| {
         let (u, v) = turned(x, y);
         if u.abs() > 40.0 || v.abs() > 25.0 {
@@ -210,7 +210,7 @@ fn an_edge_that_its_corners_are_too_narrow_for_is_made_narrower() {
     let [told] = &made.assumed[..] else {
         panic!("{:?}", made.assumed);
     };
-    assert!(told.contains("as its corners allow"), "{told}");
+    assert!(told.contains("its corners are made sharp"), "{told}");
     let solid = made.part.build().unwrap();
     assert!(solid.warnings.is_empty(), "{:?}", solid.warnings);
 }

@@ -183,6 +183,39 @@ fn a_blank_block_has_no_features_and_without_a_table_no_height() {
     assert!((size(block, "length") - 60.0).abs() < 0.1);
 }
 
+/// A part along the columns on a table that sends nothing back fills the scan from side to side, as a
+/// table does.
+#[test]
+fn the_top_of_a_part_without_a_table_is_no_table_of_its_boss() {
+    let bench = Bench {
+        outliers: 0.0,
+        ..Bench::default()
+    };
+    let part = |x: f64, y: f64| match (within(x - 0.1, y, [60.0, 40.0]), disc(x - 5.0, y, 14.0)) {
+        (false, _) => TABLE_MM,
+        (true, true) => 2.8,
+        (true, false) => 0.0,
+    };
+    let columns: Vec<_> = scan(&bench, &part)
+        .iter()
+        .map(|column| {
+            let samples = column.samples().iter().copied();
+            let seen = samples.filter(|s| s.z_mm > -5.0).collect();
+            range_image::Column::new(column.x_mm(), seen)
+        })
+        .collect();
+    let found = recognise(&columns, Some(bench.camera_mm), &settings(), &Unmonitored).unwrap();
+    let classes: Vec<&str> = found.features.iter().map(|f| f.class.as_str()).collect();
+    assert_eq!(classes, ["block", "boss"], "{:?}", found.features);
+    // Along the columns walls lie between two of them.
+    assert!(
+        (size(&found.features[0], "length") - 60.0).abs() < bench.pitch_mm,
+        "{:?}",
+        found.features[0]
+    );
+    assert!((size(&found.features[1], "height") - 2.8).abs() < 0.05);
+}
+
 #[test]
 fn what_the_scan_cuts_is_told_as_incomplete() {
     let cut = |x: f64, y: f64| {

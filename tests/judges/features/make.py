@@ -100,6 +100,10 @@ def write(folder, seed):
                         table_seen=table_seen)
         except solids.Failed:
             continue
+        except parts.NotAsTold as error:
+            # Where OpenCASCADE has lost a cut, or tools met as they were not planned to.
+            print(f"seed {seed}, attempt {attempt}: {error}", file=sys.stderr)
+            continue
         except Exception as error:  # of OpenCASCADE, which have no common base in Python
             if not type(error).__module__.startswith("OCP"):
                 raise

@@ -300,6 +300,10 @@ def told_height(features, place):
     return None if low is None else (low, high)
 
 
+class NotAsTold(ValueError):
+    """A part that is not what is told of its features."""
+
+
 def check(features, triangles):
     """Whether the part is what is told of it: its height at places all over it."""
     dice = random.Random(len(triangles))
@@ -313,8 +317,8 @@ def check(features, triangles):
     for place, (height, _) in zip(places, from_above(triangles, places)):
         expected = told_height(features, place)
         if expected and not expected[0] - 0.01 <= height <= expected[1] + 0.01:
-            raise ValueError(f"at {place} the part is {height:.3f} high and is told to be "
-                             f"{expected[0]:.3f} to {expected[1]:.3f}")
+            raise NotAsTold(f"at {place} the part is {height:.3f} high and is told to be "
+                            f"{expected[0]:.3f} to {expected[1]:.3f}")
 
 
 def pose(turn_rad, about, to):

@@ -2,7 +2,7 @@
 """The part of Jun and Park, section 7, completed where the paper leaves it open.
 
     python published.py --step FILE
-    python published.py --out DIR [--turn-deg 5] SEED [SEED ...]
+    python published.py --out DIR [--turn-deg 5] [--no-table] SEED [SEED ...]
 
 The paper gives the sizes of Table 3 and four points; it does not say where the pockets and the slot
 lie, nor how high the boss and how deep the hole are, and its picture shows no numbers. Taken here:
@@ -104,15 +104,15 @@ def part():
     return made
 
 
-def conditions(seed, to, turn_deg, pitch_mm):
+def conditions(seed, to, turn_deg, pitch_mm, table_seen):
     """The scan: the box that it covers does not follow the part, which lies a little elsewhere for
     every seed."""
     c, s = abs(math.cos(math.radians(turn_deg))), abs(math.sin(math.radians(turn_deg)))
     half = [(LENGTH * c + WIDTH * s) / 2 + MARGIN_MM, (LENGTH * s + WIDTH * c) / 2 + MARGIN_MM]
-    table = to[2] - HEIGHT
+    low = to[2] - HEIGHT
     return {"seed": seed, "pitch_mm": pitch_mm, "noise_mm": 0.05, "outliers": 0.01, "mixed": 0.1,
-            "dropouts": 0.001, "spot_radius_mm": 0.05, "table_z_mm": table,
-            "view_mm": [[-half[0], -half[1], table], [half[0], half[1], to[2]]], "window_mm": None}
+            "dropouts": 0.001, "spot_radius_mm": 0.05, "table_z_mm": low if table_seen else None,
+            "view_mm": [[-half[0], -half[1], low], [half[0], half[1], to[2]]], "window_mm": None}
 
 
 def main():
@@ -123,6 +123,7 @@ def main():
     parser.add_argument("--turn-deg", type=float, default=5.0)
     parser.add_argument("--pitch-mm", type=float, default=PITCH_MM)
     parser.add_argument("--name", default="published-{turn:g}deg-{seed}")
+    parser.add_argument("--no-table", action="store_true")
     parser.add_argument("--anew", action="store_true")
     arguments = parser.parse_args()
     made = part()
@@ -138,10 +139,11 @@ def main():
         to = (dice.uniform(-0.5, 0.5), dice.uniform(-0.5, 0.5), dice.uniform(-0.5, 0.5))
         own = parts.pose(math.radians(arguments.turn_deg), (LENGTH / 2, WIDTH / 2), to)
         solid, features = parts.placed(made, own)
-        scan = conditions(seed, to, arguments.turn_deg, arguments.pitch_mm)
+        table_seen = not arguments.no_table
+        scan = conditions(seed, to, arguments.turn_deg, arguments.pitch_mm, table_seen)
         parts.write(arguments.out, name, solid, features, scan, seed=seed,
                     turn_deg=arguments.turn_deg, to_mm=list(to), about_mm=[LENGTH / 2, WIDTH / 2],
-                    patterns=[], table_seen=True)
+                    patterns=[], table_seen=table_seen)
         print(f"part {name}: {len(features)} features")
 
 

@@ -10,6 +10,7 @@
 //! beside the scans, and the command is given the scans alone.
 
 mod part;
+mod reduction;
 mod scan;
 mod study;
 

@@ -39,11 +39,11 @@ struct Set {
     with_solids: bool,
 }
 
-struct Study<'a> {
-    options: &'a JudgeOptions,
+pub(crate) struct Study<'a> {
+    pub(crate) options: &'a JudgeOptions,
     root: PathBuf,
-    parts: PathBuf,
-    relief: PathBuf,
+    pub(crate) parts: PathBuf,
+    pub(crate) relief: PathBuf,
 }
 
 impl JudgeOptions {
@@ -96,7 +96,7 @@ fn step_of(found: &Path, part: &str) -> [OsString; 2] {
 }
 
 impl Study<'_> {
-    fn published(&self) -> impl Iterator<Item = u64> {
+    pub(crate) fn published(&self) -> impl Iterator<Item = u64> {
         let most = if self.options.short {
             SHORT_PUBLISHED
         } else {
@@ -169,7 +169,7 @@ impl Study<'_> {
     }
 
     /// Runs a script of the judges'; gives what it prints.
-    fn python(&self, script: &str, words: &[OsString]) -> Result<Vec<u8>> {
+    pub(crate) fn python(&self, script: &str, words: &[OsString]) -> Result<Vec<u8>> {
         let output = self.run_python(script, words)?;
         ensure!(
             output.status.success(),
@@ -271,6 +271,7 @@ impl Study<'_> {
         };
         let mut words: Vec<OsString> = vec!["--turned".into(), of("published")?];
         words.extend(["--straight".into(), of("published-0")?]);
+        words.extend(["--reduction".into(), self.reduction()?.into()]);
         words.extend(["--page".into(), page.into()]);
         self.python("table3.py", &words)?;
         Ok(())

@@ -32,20 +32,39 @@ pub(super) fn sets(sight: &Sight<'_>, top: &Top, step_mm: f64) -> Vec<Vec<u16>> 
             None => first += 1,
         }
     }
+    for set in &mut sets {
+        largest_first(sight, set);
+    }
     sets
 }
 
-fn are_one(sight: &Sight<'_>, one: u16, other: u16, step_mm: f64) -> bool {
+/// Puts the largest of the levels that are seen first: that is measured, and scraps of it are not.
+pub(super) fn largest_first(sight: &Sight<'_>, set: &mut [u16]) {
+    set.sort_by_key(|l| {
+        let level = &sight.levels.levels[usize::from(*l)];
+        (!level.is_seen(), std::cmp::Reverse(level.nodes), *l)
+    });
+}
+
+/// Whether two floors are planes, and the larger runs through the middle of the other.
+fn in_one_plane(sight: &Sight<'_>, one: u16, other: u16, step_mm: f64) -> bool {
     let of = |level: u16| &sight.levels.levels[usize::from(level)];
     let (Some(a), Some(b)) = (of(one).plane, of(other).plane) else {
         return false;
     };
-    let [x, y] = b.middle_mm;
-    let off = (a.z_mm(x, y) - b.z_mm(x, y)).abs();
-    if off > ONE_PLANE * step_mm + 3.0 * a.sigma_mm(x, y)
-        || !of(one).is_plane
-        || !of(other).is_plane
-    {
+    let (large, small) = if a.samples >= b.samples {
+        (a, b)
+    } else {
+        (b, a)
+    };
+    let [x, y] = small.middle_mm;
+    let off = (large.z_mm(x, y) - small.z_mm(x, y)).abs();
+    let within = ONE_PLANE * step_mm + 3.0 * large.sigma_mm(x, y);
+    off <= within && of(one).is_plane && of(other).is_plane
+}
+
+fn are_one(sight: &Sight<'_>, one: u16, other: u16, step_mm: f64) -> bool {
+    if !in_one_plane(sight, one, other, step_mm) {
         return false;
     }
     let between = |level: u16| {
@@ -98,14 +117,18 @@ fn are_one(sight: &Sight<'_>, one: u16, other: u16, step_mm: f64) -> bool {
 const SMOOTH: f64 = 0.6;
 const FEWEST_SMOOTH: usize = 3;
 
-/// Whether two sets run on in each other, and are no two planes that meet.
+/// Whether two sets run on in each other, and are no two planes that meet. Where a narrow neck or the
+/// foot of a wall parts a floor in the segmentation, both pieces are planes, but the same.
 fn run_on(sight: &Sight<'_>, one: &[u16], other: &[u16], step_mm: f64) -> bool {
     let is_plane = |set: &[u16]| {
         let mut levels = set.iter();
         levels.all(|level| sight.levels.levels[usize::from(*level)].is_plane)
     };
     if is_plane(one) && is_plane(other) {
-        return false;
+        let coplanar = |a: u16| other.iter().any(|b| in_one_plane(sight, a, *b, step_mm));
+        if !one.iter().any(|a| coplanar(*a)) {
+            return false;
+        }
     }
     let own = border(
         &sight.field.image,

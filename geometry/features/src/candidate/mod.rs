@@ -6,7 +6,10 @@ mod outlined;
 mod tip;
 mod top;
 
+use std::collections::VecDeque;
+
 use range_image::{Cancelled, Monitor};
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 use crate::border::{Border, border};
 use crate::frame::Frame;
@@ -51,6 +54,8 @@ const LEAST_PITCHES: f64 = 3.0;
 const FEWEST: usize = 9;
 /// Outermost pairs of which at least this share rises are a hollow's.
 const HOLLOW: f64 = 0.2;
+/// Or this share, if it rises to larger planes: slots wider than they are long have short walls.
+const WALLED: f64 = 0.12;
 /// Of which at least this share falls, what stands out.
 const RAISED: f64 = 0.6;
 /// A hollow goes into what at least this share of its walls rise to.
@@ -74,24 +79,34 @@ pub fn candidates(
     let image = &sight.field.image;
     let own_border =
         |is_own: &dyn Fn(u16) -> bool| border(image, sight.regions, sight.levels, step_mm, is_own);
-    let body = own_border(&|level| level != AROUND);
-    let mut found = Vec::new();
-    if let Some(outline) = outlined::outlined(sight, &body, Lie::Body, seed) {
-        found.push(Candidate {
+    let body = || {
+        let body = own_border(&|level| level != AROUND);
+        let outline = outlined::outlined(sight, &body, Lie::Body, seed)?;
+        Some(Candidate {
             levels: top.levels.clone(),
             lie: Lie::Body,
             outline,
             host: AROUND,
             is_cut: body.at_frame as f64 > CUT * (body.pairs.len() + body.at_frame) as f64,
             tip: None,
-        });
-    }
+        })
+    };
     let least_mm = least_pitches.max(LEAST_PITCHES) * sight.field.pitch_mm();
-    let mut sets = merge::sets(sight, top, step_mm);
+    let of_set = |set: Vec<u16>| candidate(sight, set, step_mm, seed, least_mm);
+    // None depends on another until two are one.
+    let each = || -> Vec<Option<Candidate>> {
+        let sets = merge::sets(sight, top, step_mm).into_par_iter();
+        sets.map(|set| monitor.check().ok().and_then(|()| of_set(set)))
+            .collect()
+    };
+    let (body, each) = rayon::join(body, each);
+    monitor.check()?;
+    let mut found: Vec<Candidate> = body.into_iter().collect();
+    let mut open = VecDeque::from(each);
     let mut others: Vec<Candidate> = Vec::new();
-    while let Some(set) = (!sets.is_empty()).then(|| sets.remove(0)) {
+    while let Some(own) = open.pop_front() {
         monitor.check()?;
-        let Some(own) = candidate(sight, set, step_mm, seed, least_mm) else {
+        let Some(own) = own else {
             continue;
         };
         // Pieces of one floor, of which the rest is hidden, have one outline.
@@ -99,11 +114,8 @@ pub fn candidates(
             Some(index) => {
                 let mut both = others.remove(index).levels;
                 both.extend(own.levels);
-                both.sort_by_key(|l| {
-                    let level = &sight.levels.levels[usize::from(*l)];
-                    (!level.is_seen(), std::cmp::Reverse(level.nodes), *l)
-                });
-                sets.insert(0, both);
+                merge::largest_first(sight, &mut both);
+                open.push_front(of_set(both));
             }
             None => others.push(own),
         }
@@ -172,7 +184,7 @@ fn candidate(
     let [rises, falls, level] =
         [Sense::Rises, Sense::Falls, Sense::Level].map(|sense| own.outermost(sense) as f64);
     let all = (rises + falls + level + own.at_frame as f64).max(1.0);
-    let lie = if rises >= HOLLOW * all {
+    let lie = if rises >= HOLLOW * all || walled(sight, &own, &set) as f64 >= WALLED * all {
         Lie::Hollow
     } else if falls >= RAISED * all {
         Lie::Raised
@@ -196,6 +208,18 @@ fn candidate(
         host,
         is_cut: own.at_frame as f64 > CUT * all,
     })
+}
+
+/// How many of the outermost pairs rise to a larger plane: walls of what is cut into that, however
+/// short they are, and no rests of edges.
+fn walled(sight: &Sight<'_>, own: &Border, set: &[u16]) -> usize {
+    let of = |level: u16| &sight.levels.levels[usize::from(level)];
+    let is_plane = set.iter().all(|level| of(*level).is_plane);
+    let is_wall = |level: u16| of(level).is_plane && of(level).nodes > own.nodes;
+    let pairs = own.pairs.iter().filter(|pair| pair.outermost && is_plane);
+    pairs
+        .filter(|pair| pair.sense == Sense::Rises && is_wall(pair.beyond))
+        .count()
 }
 
 /// Of a hollow the highest of the levels that enough of the border rises to: what is cut across

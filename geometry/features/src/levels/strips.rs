@@ -18,8 +18,16 @@ pub(super) fn hosts(
     regions: &Regions,
     contacts: &BTreeMap<(u16, u16), Contact>,
 ) -> Vec<Option<(u16, bool)>> {
+    // Of narrow strips few nodes have others of the strip on the same side: those nearer to a foot.
+    // Where a plane lies on the samples it tells better.
     let slants = |index: usize| match &regions.regions[index] {
-        Region::Part(surface) => surface.slope_rad > LEAST_SLOPE_RAD,
+        Region::Part(surface) => {
+            let tilt_rad = match surface.is_plane {
+                true => surface.plane.tilt_rad(&nalgebra::Vector3::z()),
+                false => 0.0,
+            };
+            surface.slope_rad.max(tilt_rad) > LEAST_SLOPE_RAD
+        }
         _ => false,
     };
     let mean = mean_heights(image, regions);

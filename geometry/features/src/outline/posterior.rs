@@ -112,34 +112,54 @@ pub fn log_likelihood(shape: &Shape, witnesses: &[Witness], pitch_mm: f64) -> f6
     let mut all = witnesses.iter();
     shape.distances(witnesses.iter().map(|w| w.place), |distance| {
         if let Some(witness) = all.next() {
-            sum += of_one(witness, distance, 1.0 / (SHARPNESS * pitch_mm));
+            sum += Heard::of(witness).log_likelihood(distance, 1.0 / (SHARPNESS * pitch_mm));
         }
     });
     sum
 }
 
-/// A logistic edge; beyond some ten widths it is what it is.
-fn of_one(witness: &Witness, distance_mm: f64, scale: f64) -> f64 {
-    let side = if witness.inside {
-        -distance_mm
-    } else {
-        distance_mm
-    };
-    let inwards = (side + witness.slack_mm) * scale;
-    let doubt = witness.doubt;
-    if inwards > 12.0 {
-        libm::log(1.0 - doubt)
-    } else if inwards < -12.0 {
-        libm::log(doubt)
-    } else {
-        let right = 1.0 / (1.0 + libm::exp(-1.7 * inwards));
-        libm::log(doubt + (1.0 - 2.0 * doubt) * right)
+/// A witness, and what is asked of it some ten thousand times.
+#[derive(Debug, Clone, Copy)]
+struct Heard<'a> {
+    witness: &'a Witness,
+    /// Logarithms of how likely it is right, and wrong.
+    log_right: f64,
+    log_wrong: f64,
+}
+
+impl<'a> Heard<'a> {
+    fn of(witness: &'a Witness) -> Self {
+        Self {
+            witness,
+            log_right: libm::log(1.0 - witness.doubt),
+            log_wrong: libm::log(witness.doubt),
+        }
+    }
+
+    /// A logistic edge; beyond some ten widths it is what it is.
+    fn log_likelihood(&self, distance_mm: f64, scale: f64) -> f64 {
+        let witness = self.witness;
+        let side = if witness.inside {
+            -distance_mm
+        } else {
+            distance_mm
+        };
+        let inwards = (side + witness.slack_mm) * scale;
+        let doubt = witness.doubt;
+        if inwards > 12.0 {
+            self.log_right
+        } else if inwards < -12.0 {
+            self.log_wrong
+        } else {
+            let right = 1.0 / (1.0 + libm::exp(-1.7 * inwards));
+            libm::log(doubt + (1.0 - 2.0 * doubt) * right)
+        }
     }
 }
 
 struct Walk<'a> {
     shape: Shape,
-    witnesses: Vec<&'a Witness>,
+    witnesses: Vec<Heard<'a>>,
     sharpness_mm: f64,
     pitch_mm: f64,
     steps: [f64; 6],
@@ -157,7 +177,7 @@ impl<'a> Walk<'a> {
         }
         let mut walk = Self {
             shape: start,
-            witnesses: witnesses.iter().filter(near).collect(),
+            witnesses: witnesses.iter().filter(near).map(Heard::of).collect(),
             sharpness_mm: pitch_mm,
             pitch_mm,
             steps,
@@ -184,7 +204,7 @@ impl<'a> Walk<'a> {
         let shape = self.shape;
         let within = NARROW * self.pitch_mm;
         self.witnesses
-            .retain(|w| shape.distance_mm(w.place).abs() <= within);
+            .retain(|w| shape.distance_mm(w.witness.place).abs() <= within);
         self.thin();
     }
 
@@ -241,9 +261,9 @@ impl<'a> Walk<'a> {
         let scale = 1.0 / self.sharpness_mm;
         let mut sum = 0.0;
         let mut next = 0;
-        let places = self.witnesses.iter().map(|w| w.place);
+        let places = self.witnesses.iter().map(|w| w.witness.place);
         shape.distances(places, |distance| {
-            sum += of_one(self.witnesses[next], distance, scale);
+            sum += self.witnesses[next].log_likelihood(distance, scale);
             next += 1;
         });
         sum
@@ -251,7 +271,7 @@ impl<'a> Walk<'a> {
 
     fn contradicted(&self, shape: &Shape) -> (usize, usize) {
         let (mut far, mut all) = (0, 0);
-        for witness in &self.witnesses {
+        for Heard { witness, .. } in &self.witnesses {
             let distance = shape.distance_mm(witness.place);
             if distance.abs() > NARROW * self.pitch_mm || witness.doubt > 0.1 {
                 continue;

@@ -2,8 +2,11 @@
 
 use range_image::{RangeImage, RegionMap};
 
-/// Of the frame of the image the table takes at least this share ...
-const LEAST_OF_FRAME: f64 = 0.3;
+/// Of the frame of the image the table takes at least this share of so many sides. A part that lies
+/// along the columns, on a table of which nothing is seen, fills the image from side to side: of two
+/// sides it has all ...
+const LEAST_OF_SIDE: f64 = 0.3;
+const LEAST_SIDES: usize = 3;
 /// ... and of its borders with others at least this share rises from it.
 const LEAST_RISING: f64 = 0.9;
 
@@ -24,9 +27,8 @@ const SURROUNDS: f64 = 0.15;
 /// the view's sides stands on it.
 pub(super) fn table(image: &RangeImage, map: &RegionMap) -> Option<u16> {
     let (columns, rows) = (image.columns(), image.rows());
-    let mut of_frame = vec![0_usize; usize::from(map.regions()) + 1];
-    let mut rising = vec![[0_usize; 2]; of_frame.len()];
-    let mut framed = 0;
+    let mut of_sides = vec![[0_usize; 4]; usize::from(map.regions()) + 1];
+    let mut rising = vec![[0_usize; 2]; of_sides.len()];
     let mut across = |a: (usize, usize), b: (usize, usize)| {
         let (la, lb) = (map.label(a.0, a.1), map.label(b.0, b.1));
         let (Some(za), Some(zb)) = (image.z_mm(a.0, a.1), image.z_mm(b.0, b.1)) else {
@@ -45,16 +47,27 @@ pub(super) fn table(image: &RangeImage, map: &RegionMap) -> Option<u16> {
             if row + 1 < rows {
                 across((column, row), (column, row + 1));
             }
-            let at_frame = column == 0 || row == 0 || column + 1 == columns || row + 1 == rows;
-            framed += usize::from(at_frame);
-            if at_frame && map.label(column, row) != 0 {
-                of_frame[usize::from(map.label(column, row))] += 1;
+            let at_sides = [
+                column == 0,
+                column + 1 == columns,
+                row == 0,
+                row + 1 == rows,
+            ];
+            let own = &mut of_sides[usize::from(map.label(column, row))];
+            for (count, is_at) in own.iter_mut().zip(at_sides) {
+                *count += usize::from(is_at);
             }
         }
     }
-    let label = (1..=map.regions()).max_by_key(|l| of_frame[usize::from(*l)])?;
+    let all = |label: u16| of_sides[usize::from(label)].iter().sum::<usize>();
+    let label = (1..=map.regions()).max_by_key(|l| all(*l))?;
     let [falls, rises] = rising[usize::from(label)];
-    let is_around = of_frame[usize::from(label)] as f64 >= LEAST_OF_FRAME * framed.max(1) as f64;
+    let sides = of_sides[usize::from(label)]
+        .iter()
+        .zip([rows, rows, columns, columns])
+        .filter(|(own, length)| **own as f64 >= LEAST_OF_SIDE * *length as f64)
+        .count();
+    let is_around = sides >= LEAST_SIDES;
     let is_below = rises > 0 && rises as f64 >= LEAST_RISING * (rises + falls) as f64;
     (is_around && is_below).then_some(label)
 }

@@ -130,7 +130,15 @@ impl Found {
         strips: &[Strip],
     ) -> Option<Self> {
         let of_strips = Rim::of_strips(sight, found, of, strips);
-        let rim = of_strips.or_else(|| Rim::hinted(sight, found, of, falls))?;
+        // The cone that a drill leaves slants like a countersink; of one around such a hole there is a
+        // strip.
+        let may_hide = !(falls && found[of].tip.is_some());
+        let hinted = || {
+            may_hide
+                .then(|| Rim::hinted(sight, found, of, falls))
+                .flatten()
+        };
+        let rim = of_strips.or_else(hinted)?;
         let edge = rim.edge(sight, found)?;
         let settled = settled(&edge, falls, of_strips.is_some(), sight.field.pitch_mm())?;
         Some(Self {
