@@ -60,9 +60,8 @@ fn cavities(net: &Net, stars: &[Vec<u32>], folds: &[usize], rings: usize) -> Vec
             let beside = corners.iter().flat_map(|&v| &stars[v as usize]);
             own.extend(beside.map(|&t| t as usize));
         }
-        let (met, mut apart): (Vec<_>, Vec<_>) = done
-            .into_iter()
-            .partition(|other| !own.is_disjoint(other));
+        let (met, mut apart): (Vec<_>, Vec<_>) =
+            done.into_iter().partition(|other| !own.is_disjoint(other));
         met.into_iter().for_each(|other| own.extend(other));
         apart.push(own);
         done = apart;
@@ -226,4 +225,73 @@ fn triangulated(
         }
     }
     Some(triangles)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A square of cells whose border stays, one of its inner vertices moved.
+    fn net(moved: DVec3) -> Net {
+        let side = 6_u32;
+        let mut places = Vec::new();
+        let mut number = vec![0; (side * side) as usize];
+        let is_border = |k: u32| {
+            let (x, y) = (k % side, k / side);
+            x == 0 || y == 0 || x == side - 1 || y == side - 1
+        };
+        for border in [true, false] {
+            for k in (0..side * side).filter(|&k| is_border(k) == border) {
+                number[k as usize] = places.len() as u32;
+                places.push(DVec3::new(f64::from(k % side), f64::from(k / side), 0.0));
+            }
+        }
+        let mut triangles = Vec::new();
+        for y in 0..side - 1 {
+            for x in 0..side - 1 {
+                let at = |dx: u32, dy: u32| number[((y + dy) * side + x + dx) as usize];
+                triangles.push([at(0, 0), at(1, 0), at(1, 1)]);
+                triangles.push([at(0, 0), at(1, 1), at(0, 1)]);
+            }
+        }
+        places[number[(side + 1) as usize] as usize] = moved;
+        Net {
+            sizes: vec![1.0; places.len()],
+            normals: vec![DVec3::Z; places.len()],
+            fixed: 4 * (side as usize - 1),
+            places,
+            triangles,
+        }
+    }
+
+    #[test]
+    fn a_vertex_on_the_wrong_side_of_the_border() {
+        let mut own = net(DVec3::new(-0.7, -0.4, 0.0));
+        assert!(!own.folds().is_empty());
+        assert!(cut_folds(&mut own, &|_, _| false) > 0);
+        assert!(own.folds().is_empty());
+        assert!(own.is_manifold());
+        let area: f64 = own.triangles.iter().map(|&t| own.doubled_area(t).z).sum();
+        assert!((area - 50.0).abs() < 1e-9, "{area}");
+    }
+
+    #[test]
+    fn what_is_not_folded_stays() {
+        let mut own = net(DVec3::new(1.1, 0.9, 0.0));
+        let before = own.triangles.clone();
+        assert_eq!(cut_folds(&mut own, &|_, _| false), 0);
+        assert_eq!(own.triangles, before);
+    }
+
+    #[test]
+    fn polygons_that_cross_themselves_are_told() {
+        let at = |x: f64, y: f64| Coord { x, y };
+        let square = [at(0.0, 0.0), at(1.0, 0.0), at(1.0, 1.0), at(0.0, 1.0)];
+        assert!(is_simple(&square));
+        let crossed = [square[0], square[2], square[1], square[3]];
+        assert!(!is_simple(&crossed));
+        let mut around = square;
+        around.reverse();
+        assert!(!is_simple(&around));
+    }
 }
