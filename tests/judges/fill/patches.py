@@ -40,7 +40,7 @@ def read(path):
     faces = []
     explorer = TopExp_Explorer(reader.OneShape(), TopAbs_FACE)
     while explorer.More():
-        faces.append(TopoDS.Face_s(explorer.Current()))
+        faces.append(TopoDS.Face(explorer.Current()))
         explorer.Next()
     return faces
 
