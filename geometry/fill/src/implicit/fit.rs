@@ -76,7 +76,7 @@ pub enum ImplicitError {
 /// How far off the surface the points of equation 4 are, of the distance to the next one.
 const OFFSET: f64 = 0.5;
 /// Variance of a slope over that of a value, in units of the region.
-const SLOPE_VARIANCE: f64 = 1e4;
+const SLOPE_VARIANCE: f64 = 100.0;
 /// Ridges that are looked at, of the matrix's size: from nothing to all smoothed away.
 const LEAST_RIDGE: f64 = 1e-16;
 const MOST_RIDGE: f64 = 1e2;
