@@ -1,4 +1,4 @@
-//! Lets trimesh, libigl and CGAL judge `relief fill`, side by side with MeshLab and MeshFix, and
+//! Lets trimesh, libigl, CGAL and OpenCASCADE judge `relief fill`, side by side with MeshLab and MeshFix, and
 //! OpenCASCADE what `relief convert --fill` makes of range images.
 
 use anyhow::Result;
@@ -7,11 +7,12 @@ use clap::Args;
 use crate::{judge, shell};
 
 /// The judge's packages and its peers, pinned: other releases may judge or fill otherwise.
-const PACKAGES: [&str; 6] = [
+const PACKAGES: [&str; 7] = [
     "pymeshlab==2025.7.post1",
     "pymeshfix==0.18.1",
     "libigl==2.6.3",
     "trimesh==5.2.0",
+    judge::OCP,
     "numpy==2.4.6",
     judge::SCIPY,
 ];

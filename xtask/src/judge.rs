@@ -8,7 +8,9 @@ use clap::Args;
 use crate::{shell, study};
 
 /// The judge's packages, pinned: another OpenCASCADE may judge otherwise.
-const PACKAGES: [&str; 2] = ["cadquery-ocp==8.0.1.1.0", "numpy"];
+const PACKAGES: [&str; 2] = [OCP, "numpy"];
+/// OpenCASCADE.
+pub(crate) const OCP: &str = "cadquery-ocp==8.0.1.1.0";
 
 /// Meshes the files, where that is asked for.
 const GMSH: &str = "gmsh==4.15.2";

@@ -229,6 +229,33 @@ fn tetrahedron() -> Vec<Triangle> {
 }
 
 #[test]
+fn a_mesh_in_metres_is_told_in_millimetres() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("part.stl"), stl(&holed())).unwrap();
+    let metres = |triangle: Triangle| triangle.map(|place| place.map(|c| c / 1e3));
+    let small: Vec<Triangle> = holed().into_iter().map(metres).collect();
+    fs::write(at.join("small.stl"), stl(&small)).unwrap();
+    let [own, unsaid, said] = [
+        &["part.stl"][..],
+        &["small.stl"],
+        &["small.stl", "--units", "m"],
+    ]
+    .map(|words| {
+        let command = [&["fill", "--list", "--json"], words].concat();
+        told(&relief(at, &command))
+    });
+    let is_remarked = |told: &Value| told["warnings"].to_string().contains("--units m");
+    assert_eq!(
+        [&own, &unsaid, &said].map(is_remarked),
+        [false, true, false]
+    );
+    let length = |told: &Value| told["loops"][1]["length_mm"].as_f64().unwrap();
+    assert!((length(&said) / length(&own) - 1.0).abs() < 1e-3);
+    assert!((1e3 * length(&unsaid) / length(&own) - 1.0).abs() < 1e-3);
+}
+
+#[test]
 fn trimmed_surfaces_go_into_iges() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
@@ -272,6 +299,13 @@ fn clear_answers() {
     let mut cut = binary_stl(&tetrahedron());
     cut.truncate(150);
     assert!(told(&cut).contains("is cut off"));
+    let mut cut = ply(&tetrahedron());
+    cut.truncate(cut.len() - 12);
+    let cut = told(cut.as_bytes());
+    assert!(
+        cut.contains("is cut off: it ends before the last of 4 face entries"),
+        "{cut}"
+    );
     assert!(!at.join("out.stl").exists());
     fs::write(at.join("part.stl"), stl(&holed())).unwrap();
     for (arguments, why) in [

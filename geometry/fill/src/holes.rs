@@ -47,6 +47,9 @@ const BORDER_SHARE: f64 = 0.05;
 /// these span less than this, of the area of their part of the mesh.
 const STUMP: f64 = 0.02;
 
+/// Sine of the largest angle at which a gap between an island and the hole around it may rise.
+const LEVEL: f64 = 0.75;
+
 /// Connected parts: for each vertex its part; how far each is across, and its area.
 struct Parts {
     of_vertex: Vec<u32>,
@@ -107,7 +110,7 @@ pub(crate) fn holes(mesh: &TriangleMesh, loops: Vec<Vec<u32>>, stars: &Stars) ->
         .map(|(k, vertices)| measured(mesh, stars, &parts, k + 1, vertices))
         .collect();
     tell_borders(mesh, stars, &parts, &mut holes);
-    tell_islands(mesh, &mut holes);
+    tell_islands(mesh, stars, &mut holes);
     holes
 }
 
@@ -184,8 +187,9 @@ fn tell_borders(mesh: &TriangleMesh, stars: &Stars, parts: &Parts, holes: &mut [
     }
 }
 
-/// A border that lies within a hole of another part is that of an island.
-fn tell_islands(mesh: &TriangleMesh, holes: &mut [Hole]) {
+/// A border that lies within a hole of another part is that of an island: as the hole's mean plane sees
+/// it, or, where the hole bends around too much for that, as the island's border does.
+fn tell_islands(mesh: &TriangleMesh, stars: &Stars, holes: &mut [Hole]) {
     let mut found = Vec::new();
     for (k, island) in holes.iter().enumerate() {
         if island.kind != HoleKind::Border {
@@ -198,13 +202,72 @@ fn tell_islands(mesh: &TriangleMesh, holes: &mut [Hole]) {
                 && encloses(mesh, hole, island)
         });
         let nearest = around.min_by(|a, b| a.size_mm.total_cmp(&b.size_mm));
-        if let Some(hole) = nearest {
-            found.push((k, hole.number));
-        }
+        let number = match nearest {
+            Some(hole) => Some(hole.number),
+            None => surrounding(mesh, stars, holes, island),
+        };
+        found.extend(number.map(|own| (k, own)));
     }
     for (k, number) in found {
         holes[k].kind = HoleKind::Island(number);
     }
+}
+
+/// A place on a loop, the normal of the triangles beside it, and where they lead from it into the loop.
+struct Rim {
+    at: DVec3,
+    normal: DVec3,
+    inward: DVec3,
+}
+
+fn rims(mesh: &TriangleMesh, stars: &Stars, hole: &Hole) -> Vec<Rim> {
+    let count = hole.vertices.len();
+    let rim = |k: usize| {
+        let [before, own, next] = [count - 1, 0, 1].map(|j| hole.vertices[(k + j) % count]);
+        let beside = |from, to| stars.beside(mesh, to, from).normalize_or_zero();
+        let normal = (beside(before, own) + beside(own, next)).normalize_or_zero();
+        let along = mesh.place(next) - mesh.place(before);
+        Rim {
+            at: mesh.place(own),
+            normal,
+            inward: normal.cross(along).normalize_or_zero(),
+        }
+    };
+    (0..count).map(rim).collect()
+}
+
+/// The hole of another part whose rim is the nearest to all of an island's border, and which most of that
+/// border faces across the gap: both lead into it, and neither lies above the other.
+fn surrounding(mesh: &TriangleMesh, stars: &Stars, holes: &[Hole], island: &Hole) -> Option<usize> {
+    let around: Vec<(usize, Rim)> = holes
+        .iter()
+        .filter(|hole| {
+            hole.kind == HoleKind::Hole
+                && hole.component != island.component
+                && hole.size_mm > island.size_mm
+                && hole.centre_mm.distance(island.centre_mm) < hole.size_mm
+        })
+        .flat_map(|hole| {
+            rims(mesh, stars, hole)
+                .into_iter()
+                .map(|own| (hole.number, own))
+        })
+        .collect();
+    let border = rims(mesh, stars, island);
+    let (mut number, mut facing) = (None, 0);
+    for own in &border {
+        let apart = |other: &&(usize, Rim)| other.1.at.distance_squared(own.at);
+        let (hole, rim) = around.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+        if number.is_some_and(|known| known != *hole) {
+            return None;
+        }
+        number = Some(*hole);
+        let gap = (rim.at - own.at).normalize_or_zero();
+        let is_level = gap.dot(own.normal).abs().max(gap.dot(rim.normal).abs()) < LEVEL;
+        let leads = own.inward.dot(gap) > 0.0 && rim.inward.dot(gap) < 0.0;
+        facing += usize::from(is_level && leads && own.normal.dot(rim.normal) > 0.0);
+    }
+    (facing * 3 > border.len() * 2).then_some(number).flatten()
 }
 
 /// Whether a loop lies within another, seen along its normal, and not far off its mean plane.

@@ -70,7 +70,8 @@ pub struct Filled {
     pub old_triangles: usize,
     /// What was mended.
     pub mended: Mended,
-    /// What became of every loop.
+    /// What became of every loop. Their vertices are numbered as [`survey`][crate::survey] has them; where
+    /// triangles were [cleared][Mended::cleared] later ones have other numbers now.
     pub holes: Vec<HoleReport>,
 }
 

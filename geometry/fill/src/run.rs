@@ -135,6 +135,7 @@ pub fn fill(
         join(&mut mesh, patch);
     }
     mended.split_vertices = split_fans(&mut mesh);
+    mended.unused_vertices += mesh.compact();
     Ok(Filled {
         mesh,
         old_triangles,

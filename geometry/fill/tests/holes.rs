@@ -220,6 +220,66 @@ fn an_island_is_joined_to_what_is_around_it() {
 }
 
 #[test]
+fn an_island_in_a_hole_that_no_plane_sees_whole() {
+    // Around more than half of the tube, and an island where nothing is above it.
+    let (mesh, _) = Shape::Torus.mesh(2.0);
+    let turn = |p: DVec3| {
+        let out = libm::hypot(p.x, p.y) - 35.0;
+        (libm::atan2(p.z, out), 35.0 * libm::atan2(p.y, p.x))
+    };
+    let holed = cut(&mesh, |p| {
+        let (around, along) = turn(p);
+        let is_island = around.abs() < 0.4 && along.abs() < 6.0;
+        around.abs() < 2.0 && along.abs() < 14.0 && !is_island
+    });
+    let own = filled(&holed, &Settings::default());
+    let kinds: Vec<HoleKind> = own.holes.iter().map(|own| own.hole.kind).collect();
+    let islands = kinds
+        .iter()
+        .filter(|own| matches!(own, HoleKind::Island(_)));
+    assert_eq!((kinds.len(), islands.count()), (2, 1), "{kinds:?}");
+    assert!(own.open().is_empty(), "{:?}", own.holes);
+    assert!(is_watertight(&own.mesh));
+}
+
+#[test]
+fn vertices_that_no_triangle_has_are_left_out() {
+    let (mut mesh, _) = with_hole(Shape::Sphere, 6.0, 0.3);
+    let before = filled(&mesh, &Settings::default());
+    // First and last.
+    mesh.vertices_mm.insert(0, [1.0, 2.0, 3.0]);
+    mesh.vertices_mm.push([3.0, 2.0, 1.0]);
+    for corner in mesh.triangles.as_flattened_mut() {
+        *corner += 1;
+    }
+    let own = filled(&mesh, &Settings::default());
+    assert_eq!(own.mended.unused_vertices, 2);
+    assert_eq!(own.mesh, before.mesh);
+}
+
+/// A window far around a pipe, every third triangle at its border left as a tooth.
+#[test]
+fn a_ragged_window_in_a_pipe_lies_on_the_pipe() {
+    let (mesh, _) = Shape::Cylinder.mesh(1.5);
+    let is_out = |p: DVec3| libm::atan2(p.y, p.x).abs() < 1.3 && (p.z - 50.0).abs() < 9.0;
+    let at = |v: u32| DVec3::from_array(mesh.vertices_mm[v as usize]);
+    let kept = mesh.triangles.iter().enumerate().filter(|(k, t)| {
+        let count = t.iter().filter(|&&v| is_out(at(v))).count();
+        count == 0 || (count == 1 && k % 3 == 0)
+    });
+    let holed = compacted(&mesh, kept.map(|(_, t)| *t).collect());
+    let own = filled(&holed, &Settings::default());
+    let is_on_surface = |own: &fill::HoleReport| match &own.outcome {
+        Outcome::Filled { kernel, .. } => kernel.is_some(),
+        outcome => *outcome == Outcome::Border,
+    };
+    assert!(own.holes.iter().all(is_on_surface), "{:?}", own.holes);
+    assert_eq!(own.mended.cleared, 0);
+    assert!(rms(&own, Shape::Cylinder) < 1e-3);
+    assert!(border_angle(&own, Shape::Cylinder) < 5.0);
+}
+
+#[test]
 fn holes_that_touch_in_a_vertex() {
     let mesh = grid(20, 20, [false, false], |u, v| {
         DVec3::new(10.0 * u, 10.0 * v, libm::sin(3.0 * u) * v)

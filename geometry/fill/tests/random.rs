@@ -41,9 +41,11 @@ proptest! {
         let (mesh, _) = shape.mesh(5.0);
         let mesh = holed(&mesh, &seeds);
         let own = fill(mesh.clone(), &Settings::default(), &Unmonitored).unwrap();
+        // A torus that is cut through is a bent pipe, and its ends are borders.
+        prop_assume!(!own.holes.iter().any(|own| own.hole.size_mm > shape.size()));
         // Holes may leave islands and touch; what stays open is told.
         prop_assert!(own.open().is_empty(), "{:?}", own.holes);
-        prop_assert!(is_watertight(&own.mesh));
+        prop_assert!(is_watertight(&own.mesh), "{:?}", own.holes);
         for (own, old) in own.mesh.triangles.iter().map(|t| t.map(|v| own.mesh.vertices_mm[v as usize]))
             .zip(mesh.triangles.iter().map(|t| t.map(|v| mesh.vertices_mm[v as usize]))) {
             prop_assert_eq!(own, old);

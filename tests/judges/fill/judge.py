@@ -14,13 +14,14 @@ import sys
 import accuracy
 import many
 import odd
+import patches
 import planted
 import speed
 
 # The page's text ends before this line; the tables follow.
 TABLES = "## Known surfaces\n"
-PACKAGES = ("pymeshlab", "pymeshfix", "libigl", "trimesh", "numpy", "scipy")
-PARTS = ("surfaces", "random", "recorded", "formats", "speed", "odd")
+PACKAGES = ("pymeshlab", "pymeshfix", "libigl", "trimesh", "cadquery-ocp", "numpy", "scipy")
+PARTS = ("surfaces", "patches", "random", "recorded", "formats", "speed", "odd")
 
 
 def main():
@@ -67,6 +68,7 @@ def sections(options, missed):
         yield accuracy.noise_table(rows)
         yield accuracy.verdict([row for row in rows if row["case"].noise])
     for title, name, work in (
+        ("## Trimmed surfaces", "patches", patches.run),
         ("## Many holes", "random", many.random),
         ("## Recorded meshes", "recorded", many.recorded),
         ("## Formats", "formats", many.formats),

@@ -14,6 +14,9 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// Names under which the corners of a face go.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
+/// How the library tells that a file ends too early.
+const CUT: [&str; 2] = ["end of file", "fill whole buffer"];
+
 struct Vertex([f64; 3]);
 
 impl PropertyAccess for Vertex {
@@ -87,7 +90,14 @@ pub(super) fn read(source: &mut impl BufRead, bytes: u64) -> Result<Triangles, R
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
     for element in header.elements.values() {
         let damaged = |error: &dyn std::error::Error| {
-            ReadMeshError(format!("is damaged: {}: {error}", element.name))
+            let told = error.to_string();
+            if CUT.iter().any(|sign| told.contains(sign)) {
+                return ReadMeshError(format!(
+                    "is cut off: it ends before the last of {} {} entries",
+                    element.count, element.name
+                ));
+            }
+            ReadMeshError(format!("is damaged: {}: {told}", element.name))
         };
         match element.name.as_str() {
             "vertex" => {

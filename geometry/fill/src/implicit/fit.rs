@@ -1,6 +1,7 @@
 //! Weights by the conditions.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::assemble::{self, Condition};
 use super::dense::{Reflections, Square, Tridiagonal, dot, eliminate};
@@ -81,6 +82,11 @@ const LEAST_RIDGE: f64 = 1e-16;
 const MOST_RIDGE: f64 = 1e2;
 const RIDGES: usize = 37;
 const REFINEMENTS: usize = 24;
+/// Points are averaged where their noise is above this, in units of the region, and where there are so
+/// many times more of them than the dense part has; so often.
+const NOISY: f64 = 1e-5;
+const WORTH_AVERAGING: f64 = 1.5;
+const AVERAGINGS: usize = 3;
 
 impl Implicit {
     /// The function through samples; `size_mm` is that of the hole or region that it is wanted in.
@@ -203,48 +209,126 @@ fn by_levels(
     settings: &FitSettings,
 ) -> Result<Implicit, ImplicitError> {
     let indices = thinned(samples, frame.unit_mm, settings.most_centres);
-    let conditions = conditions(samples, &indices, frame, settings);
-    let mut matrix = assemble::matrix(settings.kernel, &conditions);
-    let reflections = Reflections::of(assemble::columns(settings.kernel, &conditions));
-    let (size, rank) = (conditions.len(), reflections.rank());
-    if size <= rank + 1 {
-        return Err(ImplicitError::TooFew {
-            count: samples.len(),
-        });
+    let mut conditions = conditions(samples, &indices, frame, settings);
+    let (mut own, mut noise) =
+        Dense::of(&conditions, frame, settings)?.solved(&conditions, settings)?;
+    let is_averaged = settings.smoothing == Smoothing::Likelihood
+        && noise > NOISY
+        && samples.len() as f64 >= WORTH_AVERAGING * indices.len() as f64;
+    if is_averaged {
+        let nearest = nearest(samples, &indices);
+        let mut counts = vec![0_u32; indices.len()];
+        nearest.iter().for_each(|&k| counts[k] += 1);
+        for (condition, &count) in conditions.iter_mut().zip(&counts) {
+            condition.variance = 1.0 / f64::from(count.max(1));
+        }
+        let dense = Dense::of(&conditions, frame, settings)?;
+        for _ in 0..AVERAGINGS {
+            let value = |own: &Implicit, k: usize| own.at(samples[k].place_mm).0 / frame.unit_mm;
+            let values: Vec<f64> = (0..samples.len())
+                .into_par_iter()
+                .map(|k| value(&own, k))
+                .collect();
+            let mut sums = vec![0.0; indices.len()];
+            for (&cell, value) in nearest.iter().zip(&values) {
+                sums[cell] += value;
+            }
+            for (k, &index) in indices.iter().enumerate() {
+                conditions[k].wanted = values[index] - sums[k] / f64::from(counts[k].max(1));
+            }
+            (own, noise) = dense.solved(&conditions, settings)?;
+        }
     }
-    reflections.both_sides(&mut matrix);
-    let mut right = assemble::wanted(&conditions);
-    reflections.forward(&mut right);
-    // What no polynomial explains.
-    let rest = size - rank;
-    let mut inner = Square::zero(rest);
-    for (row, own) in inner.values.chunks_mut(rest).enumerate() {
-        own.copy_from_slice(&matrix.row(rank + row)[rank..]);
-    }
-    let tridiagonal = Tridiagonal::of(inner);
-    let mut turned = right[rank..].to_vec();
-    tridiagonal.forward(&mut turned);
-    let ridged = ridge(&tridiagonal, &turned, settings.smoothing).ok_or(ImplicitError::Singular)?;
-    let mut weights = vec![0.0; size];
-    weights[rank..].copy_from_slice(&ridged.solution);
-    tridiagonal.back(&mut weights[rank..]);
-    let head: Vec<f64> = (0..rank)
-        .map(|k| right[k] - dot(&matrix.row(k)[rank..], &weights[rank..]))
-        .collect();
-    let polynomial = reflections.solve_triangle(&head);
-    reflections.back(&mut weights);
-    assemble::unscaled(&conditions, &mut weights);
-    if !weights.iter().chain(&polynomial).all(|w| w.is_finite()) {
-        return Err(ImplicitError::Singular);
-    }
-    let mut own = frame.assembled(settings.kernel, &conditions, &weights, polynomial);
-    own.noise_mm = ridged.noise * frame.unit_mm;
     if samples.len() > indices.len() {
         let exact = settings.smoothing == Smoothing::Exact;
-        let noise = if exact { 0.0 } else { ridged.noise };
+        let noise = if exact { 0.0 } else { noise };
         own.fine = Fine::levels(&own, samples, &indices, noise);
     }
     Ok(own)
+}
+
+/// For each sample the place among these indices of the one that is nearest.
+fn nearest(samples: &[Sample], indices: &[usize]) -> Vec<usize> {
+    let of = |own: &Sample| {
+        let apart = |k: &usize| own.place_mm.distance_squared(samples[indices[*k]].place_mm);
+        let all = (0..indices.len()).min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        all.unwrap_or(0)
+    };
+    samples.par_iter().with_min_len(64).map(of).collect()
+}
+
+/// The system of conditions, made ready for whatever is wanted.
+struct Dense {
+    frame: Frame,
+    kernel: Kernel,
+    reflections: Reflections,
+    /// Upper rows of the matrix, which give the polynomial.
+    head: Vec<Vec<f64>>,
+    tridiagonal: Tridiagonal,
+}
+
+impl Dense {
+    fn of(
+        conditions: &[Condition],
+        frame: Frame,
+        settings: &FitSettings,
+    ) -> Result<Self, ImplicitError> {
+        let mut matrix = assemble::matrix(settings.kernel, conditions);
+        let reflections = Reflections::of(assemble::columns(settings.kernel, conditions));
+        let (size, rank) = (conditions.len(), reflections.rank());
+        if size <= rank + 1 {
+            return Err(ImplicitError::TooFew { count: size });
+        }
+        reflections.both_sides(&mut matrix);
+        // What no polynomial explains.
+        let rest = size - rank;
+        let mut inner = Square::zero(rest);
+        for (row, own) in inner.values.chunks_mut(rest).enumerate() {
+            own.copy_from_slice(&matrix.row(rank + row)[rank..]);
+        }
+        Ok(Self {
+            frame,
+            kernel: settings.kernel,
+            reflections,
+            head: (0..rank).map(|k| matrix.row(k)[rank..].to_vec()).collect(),
+            tridiagonal: Tridiagonal::of(inner),
+        })
+    }
+
+    /// The function, and the standard deviation of points in units of the region.
+    fn solved(
+        &self,
+        conditions: &[Condition],
+        settings: &FitSettings,
+    ) -> Result<(Implicit, f64), ImplicitError> {
+        let (size, rank) = (conditions.len(), self.reflections.rank());
+        let mut right = assemble::wanted(conditions);
+        self.reflections.forward(&mut right);
+        let mut turned = right[rank..].to_vec();
+        self.tridiagonal.forward(&mut turned);
+        let ridged =
+            ridge(&self.tridiagonal, &turned, settings.smoothing).ok_or(ImplicitError::Singular)?;
+        let mut weights = vec![0.0; size];
+        weights[rank..].copy_from_slice(&ridged.solution);
+        self.tridiagonal.back(&mut weights[rank..]);
+        let head: Vec<f64> = self
+            .head
+            .iter()
+            .zip(&right)
+            .map(|(row, right)| right - dot(row, &weights[rank..]))
+            .collect();
+        let polynomial = self.reflections.solve_triangle(&head);
+        self.reflections.back(&mut weights);
+        assemble::unscaled(conditions, &mut weights);
+        if !weights.iter().chain(&polynomial).all(|w| w.is_finite()) {
+            return Err(ImplicitError::Singular);
+        }
+        let mut own = self
+            .frame
+            .assembled(self.kernel, conditions, &weights, polynomial);
+        own.noise_mm = ridged.noise * self.frame.unit_mm;
+        Ok((own, ridged.noise))
+    }
 }
 
 struct Ridged {

@@ -34,6 +34,8 @@ pub struct Mended {
     /// Vertices added so that every fan of triangles that met others only in one has its own; they are
     /// split once holes are closed, since holes may touch in a vertex.
     pub split_vertices: usize,
+    /// Vertices that no triangle has, or has any more, left out.
+    pub unused_vertices: usize,
 }
 
 impl Mended {
@@ -75,6 +77,7 @@ pub(crate) fn mend(mesh: &mut TriangleMesh, weld_mm: Option<f64>) -> Result<Mend
     drop_duplicates(mesh, &mut done);
     part_edges(mesh, &mut done);
     turn(mesh, &mut done);
+    done.unused_vertices = mesh.compact();
     Ok(done)
 }
 

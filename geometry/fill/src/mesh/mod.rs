@@ -46,6 +46,29 @@ impl TriangleMesh {
         Ok(())
     }
 
+    /// Leaves out vertices that no triangle has; how many.
+    pub(crate) fn compact(&mut self) -> usize {
+        let mut is_used = vec![false; self.vertices_mm.len()];
+        for &vertex in self.triangles.as_flattened() {
+            is_used[vertex as usize] = true;
+        }
+        let before = self.vertices_mm.len();
+        let mut new_of = vec![0_u32; before];
+        let mut count = 0;
+        for vertex in 0..before {
+            if is_used[vertex] {
+                new_of[vertex] = count as u32;
+                self.vertices_mm[count] = self.vertices_mm[vertex];
+                count += 1;
+            }
+        }
+        self.vertices_mm.truncate(count);
+        for corner in self.triangles.as_flattened_mut() {
+            *corner = new_of[*corner as usize];
+        }
+        before - count
+    }
+
     pub(crate) fn place(&self, vertex: u32) -> glam::DVec3 {
         glam::DVec3::from_array(self.vertices_mm[vertex as usize])
     }

@@ -5,6 +5,7 @@
 //!   --> onto the surface --> all of its vertices --> refined to the size of what is around, relaxed
 //! ```
 
+mod cavity;
 mod cover;
 mod fair;
 mod grow;

@@ -289,7 +289,7 @@ impl Net {
     }
 
     /// Leaves out new vertices that no triangle has.
-    fn compact(&mut self) {
+    pub(crate) fn compact(&mut self) {
         let mut is_used = vec![false; self.places.len()];
         is_used[..self.fixed].fill(true);
         for &corner in self.triangles.as_flattened() {

@@ -3,6 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::cavity::cut_folds;
 use super::net::{Net, Placed};
 use crate::implicit::Implicit;
 
@@ -15,6 +16,10 @@ const DAMPING: f64 = 0.6;
 
 /// Rounds in which folds are smoothed out.
 const UNFOLDING: usize = 30;
+/// Rounds in which those that are left are cut out.
+const CUTTING: usize = 4;
+/// A net is folded for good where every so many-th of its triangles is.
+const MOST_FOLDED: usize = 8;
 
 /// Splits, flips, collapses and relaxes until edges have the wanted lengths; new vertices lie on the
 /// surface where they reach it. False where there would be more vertices than `most`.
@@ -46,6 +51,22 @@ pub(crate) fn refine(
     }
     net.flip(is_forbidden);
     unfold(net, surface, is_forbidden);
+    for _ in 0..CUTTING {
+        let folds = net.folds().len();
+        let is_hopeless = folds * MOST_FOLDED > net.triangles.len();
+        if surface.is_none() || is_hopeless || cut_folds(net, is_forbidden) == 0 {
+            break;
+        }
+        for _ in 0..RELAXING {
+            net.split(&place);
+            net.flip(is_forbidden);
+            if net.places.len() > most {
+                return false;
+            }
+            relax(net, surface);
+        }
+        net.flip(is_forbidden);
+    }
     true
 }
 

@@ -26,6 +26,29 @@ pub struct TrimmedPatch {
     pub off_mm: f64,
 }
 
+impl TrimmedPatch {
+    /// The same with all lengths in space multiplied, as where a mesh was of another unit.
+    #[must_use]
+    pub fn scaled(&self, by: f64) -> Self {
+        let places = |own: &[[f64; 3]]| own.iter().map(|p| p.map(|c| c * by)).collect();
+        let own = &self.surface;
+        let knots = (own.u_knots().clone(), own.v_knots().clone());
+        // As many points as before, so that neither fails.
+        let surface = BSplineSurface::new(knots.0, knots.1, places(own.points()));
+        let curve = |own: &BSplineCurve<3>| {
+            let new = BSplineCurve::new(own.knots().clone(), places(own.points()));
+            new.unwrap_or_else(|_| own.clone())
+        };
+        Self {
+            hole: self.hole,
+            surface: surface.unwrap_or_else(|_| self.surface.clone()),
+            parameter_curves: self.parameter_curves.clone(),
+            space_curves: self.space_curves.iter().map(curve).collect(),
+            off_mm: by * self.off_mm,
+        }
+    }
+}
+
 /// The parameters of a point's foot on a surface (equations 6 and 7), from a first guess.
 pub(super) fn foot(surface: &BSplineSurface, place: DVec3, from: [f64; 2]) -> Option<[f64; 2]> {
     let domains = [surface.u_knots().domain(), surface.v_knots().domain()];

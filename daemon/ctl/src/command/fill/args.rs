@@ -7,7 +7,11 @@ use fill::{Kernel, Method, Precision, Settings};
 use jiff::Timestamp;
 use mesh_files::TriangleFormat;
 
+use crate::command::units::UnitName;
 use crate::failure::Failure;
+
+/// Meshes smaller than this are probably in other units than assumed, millimetres.
+const SMALL_PART_MM: f64 = 2.0;
 
 /// Close the holes of a triangle mesh, without a service
 ///
@@ -29,7 +33,11 @@ pub(crate) struct Args {
     /// Write the fillings as trimmed surfaces, too: IGES, for each hole that its mean plane sees whole
     #[arg(long, value_name = "OUT.igs")]
     pub(super) patches: Option<PathBuf>,
-    /// Longest edge of new triangles, in the mesh's unit; default: as long as those around each hole
+    /// Unit of the coordinates in the file, which the written mesh keeps; default: millimetres. Whatever
+    /// is told and said elsewhere, and the IGES file, is in millimetres
+    #[arg(long, value_name = "UNIT", value_enum)]
+    units: Option<UnitName>,
+    /// Longest edge of new triangles, millimetres; default: as long as those around each hole
     #[arg(long = "max-edge", value_name = "MM")]
     max_edge_mm: Option<f64>,
     /// Leave these loops open, by their numbers
@@ -48,8 +56,8 @@ pub(crate) struct Args {
     /// Radial function of the implicit surface; default: quintic, and thin-plate with --method yoo
     #[arg(long, value_name = "KERNEL", value_enum)]
     kernel: Option<KernelName>,
-    /// Vertices of borders that are so near to each other are one, in the mesh's unit; default: what
-    /// rounding to 32 bits can part
+    /// Vertices of borders that are so near to each other are one, millimetres; default: what rounding to
+    /// 32 bits can part
     #[arg(long = "weld", value_name = "MM")]
     weld_mm: Option<f64>,
     /// Time to be written into the IGES file; default: SOURCE_DATE_EPOCH, or when the input was changed
@@ -85,6 +93,28 @@ pub(super) fn kernel_name(kernel: Kernel) -> &'static str {
 }
 
 impl Args {
+    /// Millimetres to a unit of the file's coordinates.
+    pub(super) fn in_mm(&self) -> f64 {
+        self.units.map_or(1.0, |own| own.units().in_mm())
+    }
+
+    /// Why the coordinates are probably not in millimetres, if so and nobody said.
+    pub(super) fn units_suspected(&self, places: &[[f64; 3]]) -> Option<String> {
+        let mut extent = [(f64::INFINITY, f64::NEG_INFINITY); 3];
+        for place in places {
+            for (own, c) in extent.iter_mut().zip(place) {
+                *own = (own.0.min(*c), own.1.max(*c));
+            }
+        }
+        let size_mm = extent.iter().map(|own| own.1 - own.0).fold(0.0, f64::max);
+        (self.units.is_none() && size_mm < SMALL_PART_MM).then(|| {
+            format!(
+                "the mesh is only {size_mm:.3} mm across, taken as millimetres; if the file is in metres \
+                 or inches, say so with --units m or --units inch"
+            )
+        })
+    }
+
     /// The settings, for output in a precision.
     pub(super) fn settings(&self, precision: Precision) -> Result<Settings, Failure> {
         let settings = Settings {
@@ -98,10 +128,10 @@ impl Args {
                 KernelName::Triharmonic => Kernel::Triharmonic,
                 KernelName::Quintic => Kernel::Quintic,
             }),
-            max_edge_mm: self.max_edge_mm,
+            max_edge_mm: self.max_edge_mm.map(|own| own / self.in_mm()),
             keep: self.keep.iter().copied().collect(),
             force: self.close.iter().copied().collect(),
-            weld_mm: self.weld_mm,
+            weld_mm: self.weld_mm.map(|own| own / self.in_mm()),
             precision,
             patches: self.patches.is_some(),
         };

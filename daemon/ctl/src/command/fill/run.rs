@@ -50,6 +50,7 @@ pub(super) struct MendedFigures {
     pub(super) one_sided_edges: usize,
     pub(super) triangles_cleared: usize,
     pub(super) split_vertices: usize,
+    pub(super) unused_vertices: usize,
 }
 
 /// A loop and what became of it.
@@ -139,6 +140,7 @@ fn work(args: &Args, shown: &Shown) -> Result<Told, Failure> {
         vertices_mm: vertices,
         triangles,
     };
+    let suspected = args.units_suspected(&mesh.vertices_mm);
     if args.list {
         let (vertices, triangles) = (mesh.vertices_mm.len(), mesh.triangles.len());
         let survey = fill::survey(mesh, &settings).map_err(refused)?;
@@ -146,12 +148,19 @@ fn work(args: &Args, shown: &Shown) -> Result<Told, Failure> {
             input: args.mesh.clone(),
             output: None,
             patches: None,
-            vertices: vertices - survey.mended.welded_equal,
+            vertices: vertices - survey.mended.welded_equal - survey.mended.unused_vertices,
             triangles,
             new_triangles: 0,
-            warnings: mending(&survey.mended),
+            warnings: suspected
+                .into_iter()
+                .chain(mending(&survey.mended))
+                .collect(),
             mended: (&survey.mended).into(),
-            loops: survey.holes.iter().map(LoopFigures::of).collect(),
+            loops: survey
+                .holes
+                .iter()
+                .map(|own| LoopFigures::of(own, args.in_mm()))
+                .collect(),
         });
     }
     places::check_file(&output)?;
@@ -174,7 +183,7 @@ fn work(args: &Args, shown: &Shown) -> Result<Told, Failure> {
             .map_err(io::Error::other)
     })
     .map_err(|error| cannot(&output, &error))?;
-    let mut told = told(args, output, &filled);
+    let mut told = told(args, output, &filled, suspected);
     if let Some(path) = &args.patches {
         patches(args, path, &filled, &mut told)?;
     }
@@ -190,7 +199,9 @@ fn patches(args: &Args, path: &Path, filled: &Filled, told: &mut Told) -> Result
     let mut found = Vec::new();
     for own in &filled.holes {
         match &own.patch {
-            Some(Ok(patch)) => found.push((format!("hole-{}", patch.hole), patch)),
+            Some(Ok(patch)) => {
+                found.push((format!("hole-{}", patch.hole), patch.scaled(args.in_mm())));
+            }
             Some(Err(reason)) => told.warnings.push(format!(
                 "hole {} has no trimmed surface: {reason}",
                 own.hole.number
@@ -225,8 +236,9 @@ fn patches(args: &Args, path: &Path, filled: &Filled, told: &mut Told) -> Result
     Ok(())
 }
 
-fn told(args: &Args, output: PathBuf, filled: &Filled) -> Told {
-    let mut warnings = mending(&filled.mended);
+fn told(args: &Args, output: PathBuf, filled: &Filled, suspected: Option<String>) -> Told {
+    let mut warnings: Vec<String> = suspected.into_iter().collect();
+    warnings.extend(mending(&filled.mended));
     warnings.extend(remarks(&filled.holes));
     Told {
         input: args.mesh.clone(),
@@ -236,7 +248,11 @@ fn told(args: &Args, output: PathBuf, filled: &Filled) -> Told {
         triangles: filled.mesh.triangles.len(),
         new_triangles: filled.mesh.triangles.len() - filled.old_triangles,
         mended: (&filled.mended).into(),
-        loops: filled.holes.iter().map(LoopFigures::with).collect(),
+        loops: filled
+            .holes
+            .iter()
+            .map(|own| LoopFigures::with(own, args.in_mm()))
+            .collect(),
         warnings,
     }
 }
@@ -255,12 +271,14 @@ impl From<&Mended> for MendedFigures {
             one_sided_edges: own.one_sided_edges,
             triangles_cleared: own.cleared,
             split_vertices: own.split_vertices,
+            unused_vertices: own.unused_vertices,
         }
     }
 }
 
 impl LoopFigures {
-    fn of(hole: &Hole) -> Self {
+    /// `in_mm`: millimetres to a unit of the mesh.
+    fn of(hole: &Hole, in_mm: f64) -> Self {
         let (kind, within) = match hole.kind {
             HoleKind::Hole => ("hole", None),
             HoleKind::Border => ("border", None),
@@ -271,9 +289,9 @@ impl LoopFigures {
             kind,
             within,
             edges: hole.vertices.len(),
-            length_mm: hole.length_mm,
-            size_mm: hole.size_mm,
-            centre_mm: hole.centre_mm.to_array(),
+            length_mm: in_mm * hole.length_mm,
+            size_mm: in_mm * hole.size_mm,
+            centre_mm: (in_mm * hole.centre_mm).to_array(),
             outcome: None,
             reason: None,
             trimmed: None,
@@ -281,8 +299,8 @@ impl LoopFigures {
         }
     }
 
-    fn with(own: &HoleReport) -> Self {
-        let mut told = Self::of(&own.hole);
+    fn with(own: &HoleReport, in_mm: f64) -> Self {
+        let mut told = Self::of(&own.hole, in_mm);
         told.outcome = Some(match &own.outcome {
             Outcome::Filled {
                 kernel,
@@ -296,7 +314,7 @@ impl LoopFigures {
                 told.filling = Some(Filling {
                     kernel: kernel.map(kernel_name),
                     points: *points,
-                    noise_mm: *noise_mm,
+                    noise_mm: in_mm * noise_mm,
                     vertices: *vertices,
                     triangles: *triangles,
                 });
@@ -376,6 +394,13 @@ fn mending(own: &Mended) -> Vec<String> {
             format!(
                 "{} split where parts of the mesh met in nothing else",
                 vertices(own.split_vertices)
+            ),
+        ),
+        (
+            own.unused_vertices,
+            format!(
+                "{} that no triangle has left out",
+                vertices(own.unused_vertices)
             ),
         ),
     ];

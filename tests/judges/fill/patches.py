@@ -1,0 +1,86 @@
+"""Trimmed surfaces of holes, `--patches`, read by OpenCASCADE and held against the area of what was cut out."""
+
+import accuracy
+import fillers
+import numpy as np
+import surfaces
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepGProp import BRepGProp
+from OCP.GProp import GProp_GProps
+from OCP.IFSelect import IFSelect_RetDone
+from OCP.IGESControl import IGESControl_Reader
+from OCP.TopAbs import TopAbs_FACE
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopoDS import TopoDS
+
+SIZES = (3, 10, 20)
+# How far an area may be off, per cent of the truth's.
+AREA_PERCENT = 2.0
+# OpenCASCADE's own error of an area.
+PRECISION = 1e-6
+
+
+def area(v, f):
+    return 0.5 * np.linalg.norm(np.cross(v[f[:, 1]] - v[f[:, 0]], v[f[:, 2]] - v[f[:, 0]]), axis=1).sum()
+
+
+def cut_area(case, seed):
+    """Of the triangles that the hole was cut out of."""
+    rng = np.random.default_rng([seed, list(surfaces.ALL).index(case.name), case.size, case.ragged])
+    hole = case.surface.hole(rng, case.size / 100, case.ragged)
+    return area(*case.surface.whole(rng, hole, case.edge)) - area(case.v, case.f)
+
+
+def read(path):
+    """The faces of an IGES file, millimetres."""
+    reader = IGESControl_Reader()
+    if reader.ReadFile(str(path)) != IFSelect_RetDone:
+        return None
+    reader.TransferRoots()
+    faces = []
+    explorer = TopExp_Explorer(reader.OneShape(), TopAbs_FACE)
+    while explorer.More():
+        faces.append(TopoDS.Face(explorer.Current()))
+        explorer.Next()
+    return faces
+
+
+def run(options, folder, missed):
+    lines = ["| surface | hole, % | face | valid | area, mm2 | cut out, mm2 | off, % |", "| --- | ---: | --- | --- |" + " ---: |" * 3]
+    for name in surfaces.ALL:
+        for size in SIZES[1:2] if options.short else SIZES:
+            case = accuracy.Case(options.seed, name, size, False, False, folder)
+            written = folder / f"{case.source.stem}.igs"
+            written.unlink(missing_ok=True)
+            target = folder / f"{case.source.stem}-patched.ply"
+            done, told = fillers.ours(options.relief, case.source, target, "--patches", str(written))
+            cells = judged(case, options.seed, done, told, written, missed)
+            lines.append("| " + " | ".join(map(str, [name, size, *cells])) + " |")
+    return "\n".join(lines)
+
+
+def judged(case, seed, done, told, written, missed):
+    where = f"patch of {case.label()}"
+    if done.code != 0:
+        missed.append(f"{where}: ended with {done.code}")
+        return ["none", "", "", "", ""]
+    if not written.exists():
+        # No fault where it is said.
+        is_told = any("no trimmed surface" in warning for warning in told["warnings"])
+        if not is_told:
+            missed.append(f"{where}: neither written nor told")
+        return ["none, and told" if is_told else "none", "", "", f"{cut_area(case, seed):.2f}", ""]
+    faces = read(written)
+    if not faces or len(faces) != 1:
+        missed.append(f"{where}: {len(faces or [])} faces")
+        return ["unread", "", "", "", ""]
+    is_valid = BRepCheck_Analyzer(faces[0]).IsValid()
+    properties = GProp_GProps()
+    BRepGProp.SurfaceProperties_s(faces[0], properties, PRECISION)
+    own, truth = abs(properties.Mass()), cut_area(case, seed)
+    off = 100 * abs(own / truth - 1)
+    if not is_valid:
+        missed.append(f"{where}: not valid")
+    if off > AREA_PERCENT:
+        missed.append(f"{where}: area {off:.2f} % off")
+    return ["read", "yes" if is_valid else "no", f"{own:.4f}", f"{truth:.4f}", f"{off:.3f}"]
