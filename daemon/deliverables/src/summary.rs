@@ -116,7 +116,7 @@ fn range_image(inputs: &Inputs<'_>) -> RangeImageReport {
         z_min_mm: extent.map(|(low, _)| low),
         z_max_mm: extent.map(|(_, high)| high),
         inlier_share: median(image.qualities().map(|quality| quality.inlier_share())),
-        noise_mm: median(image.qualities().map(|quality| f64::from(quality.scale_mm))),
+        noise_mm: image.noise_mm(),
         claimed_nodes: inputs.outcome.claimed_nodes,
         dropped_nodes: settled.map_or(0, |settled| settled.dropped),
         filled_nodes: settled.map_or(0, |settled| settled.filled),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::find::Place;
 use crate::sight::Sight;
-use crate::surface::Carried as Surface;
+use crate::surface::Surface;
 
 /// What a node is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,8 +66,8 @@ pub(crate) fn carried(sight: &Sight<'_>, labels: &[u16], place: &Place) -> Carri
 #[derive(Debug, Clone)]
 pub(crate) struct Ground {
     heights_mm: BTreeMap<u16, BTreeMap<usize, f64>>,
-    /// Regions that stand higher and do not meet it; `None` where there are none.
-    pub(crate) higher: Option<Vec<u16>>,
+    /// Regions that stand higher and do not meet it, ascending.
+    pub(crate) higher: Vec<u16>,
 }
 
 impl Carried {
@@ -101,10 +101,9 @@ impl Carried {
             .heights_mm
             .into_iter()
             .partition(|(_, heights)| meets(heights));
-        let higher: Vec<u16> = above.into_keys().collect();
         Ground {
             heights_mm: ground,
-            higher: Some(higher).filter(|own| !own.is_empty()),
+            higher: above.into_keys().collect(),
         }
     }
 }

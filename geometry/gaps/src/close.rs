@@ -54,58 +54,35 @@ pub fn close<E: From<Cancelled>>(
         gaps: Vec::new(),
     };
     let first = gaps(sight, &work.labels);
-    let (close, keep) = (
-        work.at(&first, &settings.close_mm),
-        work.at(&first, &settings.keep_mm),
-    );
-    let named = |found: &[Option<usize>], is: usize| found.contains(&Some(is));
-    let mut warnings = Vec::new();
-    for (places, found) in [(&settings.close_mm, &close), (&settings.keep_mm, &keep)] {
-        let none = places
-            .iter()
-            .zip(found)
-            .filter(|(_, found)| found.is_none());
-        warnings.extend(none.map(|(place, _)| {
-            format!(
-                "there is no hole in the range image near x {}, y {}",
-                place[0], place[1]
-            )
-        }));
+    let keep = work.named(&first, &settings.keep_mm);
+    let close = work.named(&first, &settings.close_mm);
+    for place in first.iter().filter(|place| keep.names(place)) {
+        work.note(place, None, Decision::Kept, Cause::Asked);
     }
-    // What is kept by name is out of it, whatever happens around it.
-    let mut asked = Vec::new();
-    let mut open = Vec::new();
-    for (index, place) in first.into_iter().enumerate() {
-        if named(&keep, index) {
-            work.note(&place, None, Decision::Kept, Cause::Asked);
-            asked.push(place.nodes[0]);
-        } else if named(&close, index) {
-            open.push((place, true));
-        } else {
-            open.push((place, false));
-        }
-    }
-    let small = open.iter().filter(|(place, is_asked)| {
-        !is_asked && place.size() * sight.image.pitch_mm() <= settings.max_size_mm
-    });
-    let small: Vec<&Place> = small.map(|(place, _)| place).collect();
-    work.close_hidden(&small, monitor)?;
-    let must: Vec<usize> = open
+    let small: Vec<&Place> = first
         .iter()
-        .filter(|(_, is_asked)| *is_asked)
-        .map(|(place, _)| place.nodes[0])
+        .filter(|place| work.is_small(place) && !keep.names(place) && !close.names(place))
         .collect();
-    let rest = gaps(sight, &work.labels);
-    let rest = rest
-        .into_iter()
-        .filter(|place| {
-            !asked
-                .iter()
-                .any(|node| place.nodes.binary_search(node).is_ok())
-        })
-        .collect();
-    work.close_others(rest, &must, columns, monitor)?;
-    Ok(work.finish(regions, warnings))
+    work.close_hidden(&small, monitor)?;
+    let mut rest = gaps(sight, &work.labels);
+    rest.retain(|place| !keep.names(place));
+    work.close_others(rest, &close, columns, monitor)?;
+    let warnings = keep.warnings.into_iter().chain(close.warnings);
+    Ok(work.finish(regions, warnings.collect()))
+}
+
+/// The gaps that the user named, and what to say where there is none.
+struct Named {
+    /// A node of each.
+    nodes: Vec<usize>,
+    warnings: Vec<String>,
+}
+
+impl Named {
+    fn names(&self, place: &Place) -> bool {
+        let mut nodes = self.nodes.iter();
+        nodes.any(|node| place.nodes.binary_search(node).is_ok())
+    }
 }
 
 struct Work<'a> {
@@ -146,8 +123,13 @@ struct Case {
 }
 
 impl Work<'_> {
-    /// The gap that each place names.
-    fn at(&self, gaps: &[Place], places: &[[f64; 2]]) -> Vec<Option<usize>> {
+    fn is_small(&self, place: &Place) -> bool {
+        place.size() * self.sight.image.pitch_mm() <= self.settings.max_size_mm
+    }
+
+    /// The gaps that places name. What is named before stays named, whatever is closed around it: it is
+    /// left alone meanwhile.
+    fn named(&self, gaps: &[Place], places: &[[f64; 2]]) -> Named {
         let image = self.sight.image;
         let pitch_mm = image.pitch_mm();
         let far = |place: [f64; 2], node: usize| {
@@ -155,16 +137,25 @@ impl Work<'_> {
             let (x, y) = (image.x_mm(column) - place[0], image.y_mm(row) - place[1]);
             libm::sqrt(x * x + y * y) / pitch_mm
         };
-        let nearest = |place: &[f64; 2]| {
-            let each = gaps.iter().enumerate().map(|(index, gap)| {
-                let each = gap.nodes.iter().map(|node| far(*place, *node));
-                (each.fold(f64::INFINITY, f64::min), index)
-            });
-            each.min_by(|a, b| a.0.total_cmp(&b.0))
-                .filter(|(far, _)| *far <= NAMED)
-                .map(|(_, index)| index)
+        let mut found = Named {
+            nodes: Vec::new(),
+            warnings: Vec::new(),
         };
-        places.iter().map(nearest).collect()
+        for place in places {
+            let nodes = gaps.iter().flat_map(|gap| &gap.nodes);
+            let nearest = nodes
+                .map(|node| (far(*place, *node), *node))
+                .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+                .filter(|(far, _)| *far <= NAMED);
+            match nearest {
+                Some((_, node)) => found.nodes.push(node),
+                None => found.warnings.push(format!(
+                    "there is no hole in the range image near x {}, y {}",
+                    place[0], place[1]
+                )),
+            }
+        }
+        found
     }
 
     fn note(
@@ -301,27 +292,21 @@ impl Work<'_> {
     fn close_others<E: From<Cancelled>>(
         &mut self,
         places: Vec<Place>,
-        must: &[usize],
+        close: &Named,
         columns: Option<&mut Visit<'_, E>>,
         monitor: &dyn Monitor,
     ) -> Result<(), E> {
-        let pitch_mm = self.sight.image.pitch_mm();
-        let is_asked = |place: &Place| {
-            let mut names = must.iter();
-            names.any(|node| place.nodes.binary_search(node).is_ok())
-        };
-        let (small, large): (Vec<Place>, Vec<Place>) = places.into_iter().partition(|place| {
-            is_asked(place) || place.size() * pitch_mm <= self.settings.max_size_mm
-        });
+        let (small, large): (Vec<Place>, Vec<Place>) = places
+            .into_iter()
+            .partition(|place| close.names(place) || self.is_small(place));
         let cases: Vec<Case> = small
             .into_par_iter()
-            .map(|place| self.case(place, is_asked))
+            .map(|place| self.case(place, close))
             .collect();
         monitor.check()?;
         let (tallies, usual) = self.counted(&cases, columns, monitor)?;
         for (case, tally) in cases.into_iter().zip(tallies) {
             let evidence = evidence(&case.place, &tally, &usual);
-            let told = evidence.is_some();
             let (decision, cause) = if case.given.is_empty() {
                 let cause = if case.has_step {
                     Cause::Step
@@ -329,7 +314,7 @@ impl Work<'_> {
                     Cause::NoSurface
                 };
                 (Decision::Kept, cause)
-            } else if is_asked(&case.place) || self.settings.mode == Mode::All {
+            } else if close.names(&case.place) || self.settings.mode == Mode::All {
                 (Decision::Closed, Cause::Asked)
             } else {
                 evidence.map_or((Decision::Closed, Cause::NoRay), |own| verdict(&own))
@@ -338,12 +323,7 @@ impl Work<'_> {
             if case.given.is_empty() && case.place.beside.len() > 1 && case.place.size() <= STEP {
                 continue;
             }
-            self.note(
-                &case.place,
-                Some((&case, evidence.filter(|_| told))),
-                decision,
-                cause,
-            );
+            self.note(&case.place, Some((&case, evidence)), decision, cause);
             if decision == Decision::Closed {
                 self.take(case.given);
             }
@@ -355,26 +335,25 @@ impl Work<'_> {
     }
 
     /// What a gap would be given.
-    fn case(&self, place: Place, is_asked: impl Fn(&Place) -> bool) -> Case {
+    fn case(&self, place: Place, close: &Named) -> Case {
         let all = carried(self.sight, &self.labels, &place);
         let ground = all.ground(self.sight.step_mm);
         let regions = ground.regions().collect();
-        let has_step = ground.higher.is_some();
-        let mut given = if has_step && place.size() <= STEP && !is_asked(&place) {
+        let has_step = !ground.higher.is_empty();
+        let mut given = if has_step && place.size() <= STEP && !close.names(&place) {
             BTreeMap::new()
         } else {
             ground.given(self.sight, &place)
         };
-        if let Some(higher) = &ground.higher {
-            let feet: Vec<usize> = higher
-                .iter()
-                .filter_map(|region| place.beside.get(region))
-                .flatten()
-                .copied()
-                .collect();
-            let grid = self.sight.grid();
-            given.retain(|node, _| feet.iter().all(|foot| grid.distance(*node, *foot) > FOOT));
-        }
+        let feet: Vec<usize> = ground
+            .higher
+            .iter()
+            .filter_map(|region| place.beside.get(region))
+            .flatten()
+            .copied()
+            .collect();
+        let grid = self.sight.grid();
+        given.retain(|node, _| feet.iter().all(|foot| grid.distance(*node, *foot) > FOOT));
         self.leave_extrapolations(&mut given);
         Case {
             place,

@@ -15,14 +15,14 @@ const AROUND: i64 = 2;
 /// Points of the dense part of the solver: gaps are many, and what is around them is smooth.
 const MOST_CENTRES: usize = 250;
 
-/// A surface over the plane.
-pub(crate) struct Carried {
-    surface: Implicit,
+/// The surface of a region around a gap.
+pub(crate) struct Surface {
+    implicit: Implicit,
     reach_mm: f64,
 }
 
-impl Carried {
-    /// The surface of a region around a gap; `None` where there is too little of it.
+impl Surface {
+    /// That of a region; `None` where there is too little of it.
     pub(crate) fn new(
         sight: &Sight<'_>,
         labels: &[u16],
@@ -53,16 +53,16 @@ impl Carried {
             ..FitSettings::default()
         };
         let size_mm = (size * pitch_mm).max(2.0 * pitch_mm);
-        let surface = Implicit::fit(&samples, size_mm, &settings).ok()?;
+        let implicit = Implicit::fit(&samples, size_mm, &settings).ok()?;
         Some(Self {
-            surface,
+            implicit,
             reach_mm: size_mm * REACH,
         })
     }
 
     /// Its height at x and y of a place, sought from the place's z.
     pub(crate) fn height_mm(&self, from_mm: DVec3) -> Option<f64> {
-        let on = self.surface.along(from_mm, DVec3::Z, self.reach_mm)?;
+        let on = self.implicit.along(from_mm, DVec3::Z, self.reach_mm)?;
         Some(on.z)
     }
 }

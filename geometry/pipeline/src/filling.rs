@@ -39,7 +39,7 @@ pub(crate) fn fill(
         measured: image,
         camera_mm: columns.and_then(Columns::camera_mm),
         step_mm: settings.segment.step_factor * image.pitch_mm(),
-        noise_mm: noise_mm(image),
+        noise_mm: image.noise_mm().unwrap_or(0.0),
     };
     let mut visit = columns.map(|columns| {
         |take: &mut dyn FnMut(&range_image::Column) -> bool| {
@@ -71,15 +71,4 @@ pub(crate) fn fill(
         filled,
         gaps,
     }))
-}
-
-/// Median of what the samples at nodes stray by; 0 where nothing is known of it.
-fn noise_mm(image: &RangeImage) -> f64 {
-    let scales = image.qualities().map(|own| f64::from(own.scale_mm));
-    let mut scales: Vec<f64> = scales.collect();
-    if scales.is_empty() {
-        return 0.0;
-    }
-    let middle = scales.len() / 2;
-    *scales.select_nth_unstable_by(middle, f64::total_cmp).1
 }

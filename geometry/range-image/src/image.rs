@@ -200,6 +200,16 @@ impl RangeImage {
             .map(|(_, quality)| *quality)
     }
 
+    /// Median of what the inliers at nodes stray by, millimetres: the noise of single samples; `None`
+    /// where nothing is known of it.
+    #[must_use]
+    pub fn noise_mm(&self) -> Option<f64> {
+        let mut scales: Vec<f32> = self.qualities().map(|own| own.scale_mm).collect();
+        let middle = scales.len() / 2;
+        (!scales.is_empty())
+            .then(|| f64::from(*scales.select_nth_unstable_by(middle, f32::total_cmp).1))
+    }
+
     /// Number of nodes that have a value.
     #[must_use]
     pub fn valid_nodes(&self) -> usize {
