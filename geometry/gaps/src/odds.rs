@@ -182,6 +182,14 @@ mod tests {
     }
 
     #[test]
+    fn narrow_openings_need_more() {
+        let lost = counts(0, 0, 0, 7);
+        let ordinary = counts(177, 1, 1, 4);
+        let odds = |size| Evidence::new(lost, &[ordinary], &USUAL, size).log_odds;
+        assert!(odds(4.0) > 0.0 && odds(1.5) < 0.0);
+    }
+
+    #[test]
     fn chance_takes_few_rays_and_not_many() {
         let ordinary = counts(60, 1, 0, 1);
         assert!(odds(counts(0, 0, 0, 2), ordinary) < 0.0);
