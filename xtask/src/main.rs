@@ -121,6 +121,17 @@ fn main() -> anyhow::Result<()> {
     }
 }
 
+/// Packages with random tests, as `cargo` takes them.
+const RANDOM_TESTS: &[&str] = &[
+    "-pcompare",
+    "-pfill",
+    "-pscanner-driver",
+    "-pscan-record",
+    "-pscanner-protocol",
+    "-pterraces",
+    "-ptoolpath",
+];
+
 fn full() -> anyhow::Result<()> {
     shell::run("cargo", &["fmt", "--all", "--check"])?;
     shell::run(
@@ -137,6 +148,14 @@ fn full() -> anyhow::Result<()> {
     rules::check()?;
     units::check()?;
     shell::run("cargo", &["test", "--workspace"])?;
+    // The first tier's random tests have one seed; here each run has another, and prints it.
+    let seed = std::time::UNIX_EPOCH.elapsed()?.as_secs().to_string();
+    eprintln!("PROPTEST_RNG_SEED={seed}");
+    shell::run_with(
+        "cargo",
+        &[&["test"], RANDOM_TESTS].concat(),
+        &[("PROPTEST_RNG_SEED", seed)],
+    )?;
     judge::run(&judge::Options {
         seeds: 10,
         freecad: true,
