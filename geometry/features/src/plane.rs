@@ -39,6 +39,12 @@ impl Plane {
         Vector3::new(-self.values.y, -self.values.z, 1.0).normalize()
     }
 
+    /// Rise over run.
+    #[must_use]
+    pub fn slope(&self) -> f64 {
+        (self.values.y * self.values.y + self.values.z * self.values.z).sqrt()
+    }
+
     /// Angle between the normal and another unit vector, radians.
     #[must_use]
     pub fn tilt_rad(&self, axis: &Vector3<f64>) -> f64 {

@@ -93,6 +93,45 @@ fn holes_through_in_a_row_and_one_with_the_tip_of_a_drill() {
 }
 
 #[test]
+fn of_a_drilled_hole_seen_from_the_side_a_part_of_the_tip_tells_the_shoulder() {
+    let part = |x: f64, y: f64| {
+        let (u, v) = turned(x, y);
+        if u.abs() > 40.0 || v.abs() > 25.0 {
+            return -20.0;
+        }
+        let from_drilled = off(u + 10.0, v + 10.0);
+        if from_drilled < 4.6 {
+            return -12.0 - 0.6 * (4.6 - from_drilled);
+        }
+        0.0
+    };
+    let bench = Bench {
+        pitch_mm: 0.35,
+        noise_mm: 0.08,
+        // The near wall hides more than half of the tip.
+        camera_mm: [40.0, 120.0],
+        x_mm: (-50.0, 50.0),
+        ..Bench::default()
+    };
+    let settings = Settings {
+        teller: Teller::Network(Classifier::shipped()),
+        seed: 1,
+        least_pitches: Settings::USUAL_PITCHES,
+    };
+    let columns = scan(&bench, &part);
+    let found = recognise(&columns, Some(bench.camera_mm), &settings, &Unmonitored).unwrap();
+    let holes = of(&found, "hole");
+    assert_eq!(holes.len(), 1, "{:?}", found.features);
+    let depth = holes[0].dimension("depth").unwrap();
+    assert!(
+        (depth.value_mm - 12.0).abs() < 3.0 * depth.sigma_mm + 0.05,
+        "{depth:?}"
+    );
+    assert!(depth.sigma_mm < 0.3, "{depth:?}");
+    assert!(matches!(holes[0].bottom, Bottom::Tip(slope) if (slope - 0.6).abs() < 0.1));
+}
+
+#[test]
 fn a_countersunk_hole_a_chamfered_pocket_and_a_rounded_boss() {
     let part = |x: f64, y: f64| {
         let (u, v) = turned(x, y);

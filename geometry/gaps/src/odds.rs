@@ -67,10 +67,9 @@ const ON_OPENING: f64 = 0.01;
 /// Share of what comes back out of an opening from below.
 const BELOW_OPENING: f64 = 0.9;
 /// Openings narrower than so many pitches are that rare among gaps as narrow.
-const NARROW: f64 = 2.5;
-const RARE: f64 = 0.01;
+const RARE: [(f64, f64); 2] = [(2.5, 0.01), (4.0, 0.1)];
 /// Share of gloss and stains that end as sharply as openings do.
-const SHARP: f64 = 0.1;
+const SHARP: f64 = 0.2;
 
 impl Evidence {
     /// `rings` are the rays that went around it, ring by ring from its border outwards; `size` is the
@@ -80,7 +79,8 @@ impl Evidence {
         let [on, below, above] = [inside.on_surface, inside.below, inside.above].map(f64::from);
         let share = log_beta(f64::from(inside.lost) + 1.0, inside.returned() + 1.0);
         let half = libm::log(0.5 * astray);
-        let rare = if size < NARROW { libm::log(RARE) } else { 0.0 };
+        let rarity = RARE.iter().find(|(narrow, _)| size < *narrow);
+        let rare = rarity.map_or(0.0, |(_, share)| libm::log(*share));
         let opening = rare
             + share
             + on * libm::log(ON_OPENING)

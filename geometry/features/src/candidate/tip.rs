@@ -1,6 +1,7 @@
 //! The cone that a drill leaves at the bottom of a hole.
 
 use crate::outline::Shape;
+use crate::plane::Plane;
 use crate::sight::Sight;
 
 /// A cone that is deepest in the middle, as heights over the distance from there.
@@ -27,7 +28,9 @@ pub(super) fn tip(sight: &Sight<'_>, level: u16, shape: &Shape) -> Option<Tip> {
         return None;
     };
     let own = sight.levels.levels.get(usize::from(level))?;
-    if own.is_plane || !own.is_seen() {
+    // Of a narrow cone whose walls hide most of it a leaning plane is seen.
+    let is_floor = |plane: Plane| own.is_plane && plane.slope() < SLOPES.start;
+    if own.plane.is_none_or(is_floor) {
         return None;
     }
     let region = *own.regions.first()?;

@@ -10,6 +10,7 @@ mod fill;
 mod hidden;
 mod margin;
 mod pieces;
+mod slivers;
 mod strays;
 mod surface;
 mod table;
@@ -117,6 +118,10 @@ pub fn regions(
     crumbs::kept(image, &mut labels, &mut next, step_mm);
     monitor.check()?;
     let (mut surfaces, mut table) = surface::surfaces(field, columns, &labels, usize::from(next));
+    let any = slivers::joined(image, &mut labels, &surfaces, field.noise_mm);
+    if any {
+        (surfaces, table) = surface::surfaces(field, columns, &labels, usize::from(next));
+    }
     if strays::unlabel(image, &mut labels, &surfaces, field.noise_mm) {
         crumbs::kept(image, &mut labels, &mut next, step_mm);
         (surfaces, table) = surface::surfaces(field, columns, &labels, usize::from(next));

@@ -135,7 +135,7 @@ impl Found {
         let may_hide = !(falls && found[of].tip.is_some());
         let hinted = || {
             may_hide
-                .then(|| Rim::hinted(sight, found, of, falls))
+                .then(|| Rim::hinted(sight, found, of, falls, !strips.is_empty()))
                 .flatten()
         };
         let rim = of_strips.or_else(hinted)?;

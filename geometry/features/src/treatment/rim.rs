@@ -32,10 +32,11 @@ const FOOT: f64 = 0.15;
 const TOP: f64 = 0.1;
 /// Where there is no strip: samples so far from the wall, pitches, lie neither on the face nor on
 /// what is beyond by so many standard deviations, and there are as many as make this many rows along
-/// the outline.
+/// the outline; fewer where a strip is seen along a part of it.
 const BESIDE_PITCHES: core::ops::Range<f64> = 0.6..6.0;
 const BETWEEN: f64 = 3.0;
 const ROWS: f64 = 0.5;
+const ROWS_BESIDE_STRIP: f64 = 0.2;
 /// So far, pitches, such a section is taken to reach at least.
 const HINTED_PITCHES: f64 = 4.0;
 
@@ -77,12 +78,13 @@ impl Rim {
     }
 
     /// The rim, or foot, where too many samples lie neither on the face nor beyond it, though nothing
-    /// was segmented there: amid much noise sections are narrower than regions can be.
+    /// was segmented there, or not all along: amid much noise sections are narrower than regions can be.
     pub(super) fn hinted(
         sight: &Sight<'_>,
         found: &[Candidate],
         of: usize,
         falls: bool,
+        has_strip: bool,
     ) -> Option<Self> {
         let candidate = &found[of];
         let own = *candidate.levels.first()?;
@@ -118,7 +120,8 @@ impl Rim {
             .filter(|own| (within..depth_mm - within).contains(&own.height_mm))
             .map(|own| shape.distance_mm(own.at).abs())
             .collect();
-        let least = ROWS * length_mm(&shape) / pitch_mm;
+        let rows = if has_strip { ROWS_BESIDE_STRIP } else { ROWS };
+        let least = rows * length_mm(&shape) / pitch_mm;
         if (offs.len() as f64) < least.max(FEWEST as f64) {
             return None;
         }
