@@ -25,7 +25,7 @@ import range_tables
 # The largest hole that is to be filled, millimetres.
 MOST_MM = 15.0
 JUDGING, TUNING = (1, 50), 1001
-SHORT = (1, 6)
+SHORT = (51, 56)
 FILL = ("--fill", "auto", "--fill-max-mm", str(MOST_MM))
 
 
@@ -59,7 +59,7 @@ def seeds(text):
     try:
         return range(int(first), int(last or first) + 1)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text} is not like 1..=50") from None
+        raise argparse.ArgumentTypeError(f"{text} is not like 51..=100") from None
 
 
 def main():
@@ -67,7 +67,7 @@ def main():
     parser.add_argument("relief", help="the command")
     parser.add_argument("scanner", help="study-features, which scans")
     parser.add_argument("--out", type=pathlib.Path, required=True, help="folder of parts, scans and answers")
-    parser.add_argument("--seeds", type=seeds, help="1..=50 is for judging, 1001 and above for tuning")
+    parser.add_argument("--seeds", type=seeds, help="51..=100 is for judging; others have been looked at")
     parser.add_argument("--short", action="store_true", help="the first six parts")
     parser.add_argument("--kept", action="store_true", help="with parts and scans that an earlier run has left")
     parser.add_argument("--off", action="store_true", help="without filling: what there is to be filled")
