@@ -32,7 +32,7 @@ pub(crate) struct Options {
     /// Judge filled range images instead: scans of glossy, stained parts with drilled holes.
     #[arg(long)]
     pub(crate) range: bool,
-    /// Those parts: 1..=50 are for judging, 1001 and above may be looked at in tuning.
+    /// Those parts: 51..=100 are for judging; others have been looked at.
     #[arg(long, value_name = "A..=B", requires = "range", conflicts_with_all = ["short", "write"])]
     pub(crate) seeds: Option<String>,
 }

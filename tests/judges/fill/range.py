@@ -24,7 +24,7 @@ import range_tables
 
 # The largest hole that is to be filled, millimetres.
 MOST_MM = 15.0
-JUDGING, TUNING = (1, 50), 1001
+JUDGING = (51, 100)
 SHORT = (51, 56)
 FILL = ("--fill", "auto", "--fill-max-mm", str(MOST_MM))
 
