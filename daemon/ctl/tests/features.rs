@@ -149,6 +149,54 @@ fn what_cannot_be_is_said() {
             "no [[edit]]",
         ),
         (
+            &[
+                "features",
+                "part.xyz",
+                "--edit",
+                "ninth.toml",
+                "-o",
+                "ninth.toml",
+            ],
+            "is the file of edits itself",
+        ),
+        (
+            &[
+                "features",
+                "part.xyz",
+                "--network",
+                "none.toml",
+                "--step",
+                "none.toml",
+            ],
+            "is the network itself",
+        ),
+        (
+            &[
+                "features",
+                "part.xyz",
+                "--step",
+                "a.out",
+                "--picture",
+                "./a.out",
+            ],
+            "named twice",
+        ),
+        (
+            &[
+                "features",
+                "part.xyz",
+                "--reduced",
+                "a.xyz",
+                "--reduce-angle-deg",
+                "999",
+            ],
+            "0 to 180",
+        ),
+        (
+            &["features", "part.xyz", "--least-pitches", "nan"],
+            "3 to 1000 sample distances",
+        ),
+        (
             &["features", "part.xyz", "--edit", "ninth.toml"],
             "there is no feature 9",
         ),
@@ -157,4 +205,6 @@ fn what_cannot_be_is_said() {
         assert!(told.contains(words), "{arguments:?}: {told}");
         assert!(!at.join("part.features.json").exists());
     }
+    let edits = fs::read_to_string(at.join("ninth.toml")).unwrap();
+    assert!(edits.starts_with("[[edit]]"), "{edits}");
 }

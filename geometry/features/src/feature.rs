@@ -43,7 +43,8 @@ pub struct Feature {
     pub parent: Option<u32>,
     /// Name of its class; `unknown` where the network has no answer.
     pub class: String,
-    /// How sure the network is, 0 to 1.
+    /// How sure the network is of the class, 0 to 1; 1 where the user said so. Of treated edges the share
+    /// of the samples that the section explains.
     pub score: f64,
     /// The code of its section.
     pub code: String,
@@ -70,6 +71,8 @@ pub struct Feature {
     pub through: bool,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// Whether the user changed something of it.
+    pub is_edited: bool,
 }
 
 impl Feature {

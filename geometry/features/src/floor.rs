@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nurbs::{BSplineSurface, KnotVector, Observation, TensorSpline};
 
 use crate::candidate::Candidate;
-use crate::outline::Shape;
+use crate::rebuild::BEYOND_MM;
 use crate::sight::Sight;
 
 /// Sample distances to a span of the knots, and most spans.
@@ -13,8 +13,10 @@ const PITCHES: f64 = 8.0;
 const MOST_SPANS: f64 = 10.0;
 /// How much the control net resists bending, see [`TensorSpline::fit_scattered`].
 const BENDING: f64 = 1e-4;
-/// The surface reaches beyond the outline by this share of its size.
+/// The surface reaches beyond the outline by this share of its size, and by no less than this much more
+/// than what runs out is cut beyond its end, millimetres.
 const BEYOND: f64 = 0.15;
+const MORE_MM: f64 = 0.5;
 
 /// The floor of a candidate, least squares over its samples.
 pub(crate) fn free_form(
@@ -37,11 +39,11 @@ pub(crate) fn free_form(
             weight: 1.0,
         })
         .collect();
-    let (low, high) = extent(&candidate.outline.shape);
+    let (low, high) = candidate.outline.shape.extent();
     let knots = |axis: usize| {
         let size = high[axis] - low[axis];
         let spans = (size / (PITCHES * sight.field.pitch_mm())).clamp(1.0, MOST_SPANS) as usize;
-        let beyond = BEYOND * size;
+        let beyond = (BEYOND * size).max(BEYOND_MM + MORE_MM);
         KnotVector::uniform(3, spans, low[axis] - beyond, high[axis] + beyond).ok()
     };
     let (u_knots, v_knots) = (knots(0)?, knots(1)?);
@@ -57,29 +59,4 @@ pub(crate) fn free_form(
     BSplineSurface::new(fitted.u_knots().clone(), fitted.v_knots().clone(), points)
         .ok()
         .map(Arc::new)
-}
-
-/// The box around an outline along u and v.
-fn extent(shape: &Shape) -> ([f64; 2], [f64; 2]) {
-    match shape {
-        Shape::Circle(circle) => {
-            let [u, v] = circle.centre_mm;
-            let r = circle.radius_mm;
-            ([u - r, v - r], [u + r, v + r])
-        }
-        Shape::Rectangle(own) => {
-            let mut low = [f64::INFINITY; 2];
-            let mut high = [f64::NEG_INFINITY; 2];
-            for a in own.first_mm {
-                for b in own.second_mm {
-                    let place = own.place([a, b]);
-                    for axis in 0..2 {
-                        low[axis] = low[axis].min(place[axis]);
-                        high[axis] = high[axis].max(place[axis]);
-                    }
-                }
-            }
-            (low, high)
-        }
-    }
 }

@@ -37,7 +37,7 @@ pub struct Rebuilt {
 }
 
 /// What runs out is cut this far beyond where it ends, millimetres, so that no skin is left.
-const BEYOND_MM: f64 = 1.0;
+pub(crate) const BEYOND_MM: f64 = 1.0;
 /// Least height of a block under its deepest floor, and share of its length, where no table was
 /// seen.
 const LEAST_UNDER_MM: f64 = 2.0;
@@ -129,8 +129,29 @@ fn floor(feature: &Feature, assumed: &mut Vec<String>) -> Floor {
             },
             Shape::Rectangle(_) => level(rim_mm),
         },
-        (Bottom::FreeForm(surface), Some(_)) => Floor::FreeForm(surface.clone()),
+        (Bottom::FreeForm(surface), Some(_)) if covers(surface, feature) => {
+            Floor::FreeForm(surface.clone())
+        }
+        // Edits may have moved its walls.
+        (Bottom::FreeForm(_), Some(z_mm)) => {
+            assumed.push(format!(
+                "{} {} has a level floor: the one that was measured does not reach its walls",
+                feature.class, feature.id
+            ));
+            level(z_mm)
+        }
     }
+}
+
+/// Whether a floor reaches under all that is cut.
+fn covers(surface: &nurbs::BSplineSurface<1>, feature: &Feature) -> bool {
+    let (low, high) = feature.outline.extent();
+    // Corners move along both axes.
+    let reach_mm = core::f64::consts::SQRT_2 * BEYOND_MM;
+    let domains = [surface.u_knots().domain(), surface.v_knots().domain()];
+    domains.iter().enumerate().all(|(axis, (first, last))| {
+        *first <= low[axis] - reach_mm && high[axis] + reach_mm <= *last
+    })
 }
 
 /// The treated edges of a feature, as its corners allow.

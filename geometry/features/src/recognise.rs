@@ -248,6 +248,7 @@ fn feature(
         bottom: bottom(sight, candidate, own.heights_mm.1),
         through: own.through,
         warnings,
+        is_edited: false,
     }
 }
 
@@ -353,6 +354,7 @@ fn edge(sight: &Sight<'_>, treatment: &Treatment, of: &Feature, id: u32) -> Feat
         bottom: Bottom::Level,
         through: false,
         warnings: Vec::new(),
+        is_edited: false,
     }
 }
 

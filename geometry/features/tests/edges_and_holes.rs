@@ -5,6 +5,7 @@
 mod common;
 
 use common::{Bench, scan};
+use features::edit::{Edit, edit};
 use features::feature::{Bottom, Feature};
 use features::network::Classifier;
 use features::rebuild::rebuilt;
@@ -129,6 +130,52 @@ fn of_a_drilled_hole_seen_from_the_side_a_part_of_the_tip_tells_the_shoulder() {
     );
     assert!(depth.sigma_mm < 0.3, "{depth:?}");
     assert!(matches!(holes[0].bottom, Bottom::Tip(slope) if (slope - 0.6).abs() < 0.1));
+}
+
+#[test]
+fn a_narrow_step_with_a_wavy_floor_is_rebuilt() {
+    let part = |x: f64, y: f64| {
+        let (u, v) = turned(x, y);
+        if u.abs() > 40.0 || v.abs() > 25.0 {
+            return TABLE_MM;
+        }
+        if u > 35.5 {
+            return -4.0 + 0.8 * libm::sin(0.25 * v);
+        }
+        0.0
+    };
+    let mut found = found(&part);
+    let steps = of(&found, "step");
+    assert_eq!(steps.len(), 1, "{:?}", found.features);
+    assert!(
+        matches!(steps[0].bottom, Bottom::FreeForm(_)),
+        "{:?}",
+        steps[0].bottom
+    );
+    let id = steps[0].id;
+    // What is cut goes on beyond where it ends, and the floor with it.
+    let own = rebuilt(&found).unwrap();
+    assert!(own.part.build().is_ok());
+    assert!(
+        !own.assumed.iter().any(|told| told.contains("level floor")),
+        "{:?}",
+        own.assumed
+    );
+    // Made wider than what was measured.
+    let wider = Edit {
+        id,
+        class: None,
+        dimensions_mm: [("width".to_owned(), 12.0)].into(),
+        direction: None,
+    };
+    edit(&mut found, &[wider], Classifier::shipped().classes()).unwrap();
+    let own = rebuilt(&found).unwrap();
+    assert!(own.part.build().is_ok());
+    assert!(
+        own.assumed.iter().any(|told| told.contains("level floor")),
+        "{:?}",
+        own.assumed
+    );
 }
 
 #[test]

@@ -7,7 +7,6 @@ mod common;
 use std::collections::BTreeMap;
 
 use common::{Bench, scan};
-use features::edit::{Edit, EditError, edit};
 use features::feature::Feature;
 use features::network::Classifier;
 use features::rebuild::rebuilt;
@@ -259,55 +258,6 @@ fn too_few_columns_are_refused() {
     let columns = scan(&Bench::default(), &published);
     let error = recognise(&columns[..3], None, &settings(), &Unmonitored).unwrap_err();
     assert!(error.to_string().contains("too few"), "{error}");
-}
-
-#[test]
-fn edits_move_outlines_and_the_solid_follows() {
-    let mut found = found(&Bench::default(), &published);
-    let volume = |found: &Recognition| {
-        let built = rebuilt(found).unwrap().part.build().unwrap();
-        built.solid.check().unwrap();
-        built.solid.volume_mm3
-    };
-    let before = volume(&found);
-    let hole = of(&found, "hole")[0].id;
-    let wider = Edit {
-        id: hole,
-        class: None,
-        dimensions_mm: BTreeMap::from([("diameter".to_owned(), 9.0), ("depth".to_owned(), 12.0)]),
-        direction: None,
-    };
-    edit(&mut found, std::slice::from_ref(&wider)).unwrap();
-    let own = found.features.iter().find(|f| f.id == hole).unwrap();
-    assert_eq!((size(own, "diameter"), size(own, "depth")), (9.0, 12.0));
-    assert_eq!(own.dimension("diameter").unwrap().sigma_mm, 0.0);
-    let area = |diameter: f64| core::f64::consts::PI * diameter * diameter / 4.0;
-    let expected = area(9.0) * 12.0 - area(8.019) * 10.15;
-    let gone = before - volume(&found);
-    assert!(
-        (gone - expected).abs() < 0.02 * expected,
-        "{gone} {expected}"
-    );
-
-    let error = edit(
-        &mut found,
-        &[Edit {
-            id: 99,
-            ..Edit::default()
-        }],
-    )
-    .unwrap_err();
-    assert!(matches!(error, EditError::NoFeature { id: 99, last: 5 }));
-    let none = Edit {
-        id: hole,
-        dimensions_mm: BTreeMap::from([("length".to_owned(), 3.0)]),
-        ..Edit::default()
-    };
-    let error = edit(&mut found, &[none]).unwrap_err();
-    assert!(
-        error.to_string().contains("it has diameter, depth"),
-        "{error}"
-    );
 }
 
 #[test]

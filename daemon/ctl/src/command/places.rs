@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use rustix::fs::{Access, access};
 
+use super::convert::same_file;
 use crate::failure::Failure;
 
 /// A file that is to be written, in a folder that is there.
@@ -23,6 +24,37 @@ pub(crate) fn check_file(file: &Path) -> Result<(), Failure> {
         )));
     }
     check_writable(&folder, file)
+}
+
+/// Files that are written, each a place where one can be: none is one that is read, or another.
+pub(crate) fn check_files(written: &[&Path], read: &[(&str, &Path)]) -> Result<(), Failure> {
+    for (k, file) in written.iter().enumerate() {
+        check_file(file)?;
+        if let Some((what, _)) = read.iter().find(|(_, own)| same_file(own, file)) {
+            return Err(Failure::Usage(format!(
+                "{} is the {what} itself; name another file",
+                file.display()
+            )));
+        }
+        if written[..k].iter().any(|other| same_place(other, file)) {
+            return Err(Failure::Usage(format!(
+                "{} is named twice; give each output a file of its own",
+                file.display()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Whether two names are of one file, which need not be there yet.
+fn same_place(a: &Path, b: &Path) -> bool {
+    let place = |file: &Path| {
+        Some((
+            folder_of(file).canonicalize().ok()?,
+            file.file_name()?.to_owned(),
+        ))
+    };
+    same_file(a, b) || place(a).zip(place(b)).is_some_and(|(a, b)| a == b)
 }
 
 /// A folder for files, which is made if need be.

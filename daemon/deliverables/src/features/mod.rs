@@ -62,7 +62,8 @@ pub struct FeatureEntry {
     /// Its class, or `unknown`.
     #[serde(rename = "type")]
     pub class: String,
-    /// How sure the network is, 0 to 1.
+    /// How sure the network is of the class, 0 to 1; 1 where the user said so. Of treated edges the share
+    /// of the samples that the section explains.
     pub score: f64,
     /// The code of its section (Jun & Park, Table 2).
     pub code: String,
@@ -86,6 +87,9 @@ pub struct FeatureEntry {
     pub thread_guess: Option<&'static str>,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// Whether the user changed something of it; what is theirs has an uncertainty of 0.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub edited: bool,
 }
 
 /// Standard uncertainties, millimetres.
@@ -169,6 +173,7 @@ impl FeatureEntry {
             through: feature.through,
             thread_guess: feature.thread(),
             warnings: feature.warnings.clone(),
+            edited: feature.is_edited,
         }
     }
 }

@@ -55,8 +55,9 @@ pub(crate) fn recognised(
         )));
     }
     columns.sort_by(Column::compare_x);
+    let network = Classifier::shipped();
     let settings = Settings {
-        teller: Teller::Network(Classifier::shipped()),
+        teller: Teller::Network(network),
         seed: inputs.settings.regrid.seed,
         least_pitches: Settings::USUAL_PITCHES,
     };
@@ -64,7 +65,7 @@ pub(crate) fn recognised(
         Ok(recognise(&columns, points.0.camera_mm(), &settings, watch)?)
     })?;
     let edits: Vec<_> = edits.iter().map(EditEntry::edit).collect();
-    edit(&mut found, &edits)
+    edit(&mut found, &edits, network.classes())
         .map_err(|error| Stop::Refused(format!("deliverables.edit: {error}")))?;
     Ok(found)
 }

@@ -115,6 +115,32 @@ impl Shape {
         found
     }
 
+    /// The box around it along u and v: least and greatest, millimetres.
+    #[must_use]
+    pub fn extent(&self) -> ([f64; 2], [f64; 2]) {
+        match self {
+            Self::Circle(circle) => {
+                let [u, v] = circle.centre_mm;
+                let r = circle.radius_mm;
+                ([u - r, v - r], [u + r, v + r])
+            }
+            Self::Rectangle(own) => {
+                let mut low = [f64::INFINITY; 2];
+                let mut high = [f64::NEG_INFINITY; 2];
+                for a in own.first_mm {
+                    for b in own.second_mm {
+                        let place = own.place([a, b]);
+                        for axis in 0..2 {
+                            low[axis] = low[axis].min(place[axis]);
+                            high[axis] = high[axis].max(place[axis]);
+                        }
+                    }
+                }
+                (low, high)
+            }
+        }
+    }
+
     /// Its middle in the plan.
     #[must_use]
     pub fn middle_mm(&self) -> [f64; 2] {

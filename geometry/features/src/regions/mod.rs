@@ -87,14 +87,14 @@ pub fn regions(
         .map(|(first, last)| (first.x_mm(), last.x_mm()));
     let background = segment::background(image, &map, &View { x_mm, y_mm: None });
     let mut known = background.regions.iter();
-    let table = match !known.any(|region| table::surrounds(&map, region.label)) {
+    let table_label = match !known.any(|region| table::surrounds(&map, region.label)) {
         true => table::table(image, &map),
         false => None,
     };
     let is_outside: Vec<bool> = (0..=map.regions())
         .map(|label| {
             let known = background.region(label).is_some() && table::surrounds(&map, label);
-            known || table == Some(label)
+            known || table_label == Some(label)
         })
         .collect();
     // Labels of the part follow the outside's.
@@ -135,7 +135,11 @@ pub fn regions(
         rows: padded.rows(),
         labels,
         regions,
-        notes: background.notes,
+        // What it says of faces that it keeps is not so of the one that is the table.
+        notes: match table_label {
+            Some(_) => Vec::new(),
+            None => background.notes,
+        },
     };
     hidden::hidden(&padded, &mut divided, step_mm);
     fill::fill(&padded, &mut divided, step_mm);

@@ -55,7 +55,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "SEED", hide = true)]
     pub(super) classes_by_chance: Option<u64>,
     /// Leave out features of fewer sample distances across than this
-    #[arg(long, value_name = "N", default_value_t = 6.0)]
+    #[arg(long, value_name = "N", default_value_t = 6.0, value_parser = pitches)]
     pub(super) least_pitches: f64,
     /// Unit of the coordinates in a text or scan file; default: millimetres, or what the file says
     #[arg(long, value_name = "UNIT", value_enum)]
@@ -66,6 +66,16 @@ pub(crate) struct Args {
     /// Threads to use; 0 for all processors. The result does not depend on it
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(super) threads: usize,
+}
+
+/// A least size of features, sample distances.
+fn pitches(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if (3.0..=1000.0).contains(&value) {
+        Ok(value)
+    } else {
+        Err("3 to 1000 sample distances; of less than 3 nothing can be told".to_owned())
+    }
 }
 
 #[derive(Debug, clap::Subcommand)]

@@ -26,7 +26,8 @@ pub(super) struct ReductionArgs {
 }
 
 impl ReductionArgs {
-    fn reduction(self) -> Result<Reduction, Failure> {
+    /// The same as the library has it.
+    pub(super) fn reduction(self) -> Result<Reduction, Failure> {
         let is_distance = self.reduce_distance_mm >= 0.0 && self.reduce_distance_mm.is_finite();
         if !is_distance || !(0.0..=180.0).contains(&self.reduce_angle_deg) {
             return Err(Failure::Usage(
@@ -55,13 +56,12 @@ pub(super) struct ReducedFile {
 /// Writes the points that stay.
 pub(super) fn write(
     path: &Path,
-    args: ReductionArgs,
+    reduction: &Reduction,
     columns: &[Column],
     found: &Recognition,
 ) -> Result<ReducedFile, Failure> {
-    let reduction = args.reduction()?;
     let settings = EdgeSettings::new(found.noise_mm);
-    let reduced = of_columns(columns, found.pitch_mm, &settings, &reduction);
+    let reduced = of_columns(columns, found.pitch_mm, &settings, reduction);
     write_atomically::<std::io::Error>(path, |sink| {
         for [x, y, z] in reduced.lines.iter().flatten() {
             writeln!(sink, "{x} {y} {z}")?;

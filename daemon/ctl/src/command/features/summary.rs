@@ -57,11 +57,19 @@ fn line(feature: &FeatureEntry) -> Vec<String> {
                 .get(name)
                 .copied()
                 .unwrap_or_default();
-            format!("{} {value:.3} ({sigma:.3})", name.replace('_', " "))
+            let name = name.replace('_', " ");
+            // What users gave has none.
+            match feature.edited && sigma == 0.0 {
+                true => format!("{name} {value:.3} (given)"),
+                false => format!("{name} {value:.3} ({sigma:.3})"),
+            }
         })
         .collect();
     if feature.through {
         sizes.push("through".to_owned());
+    }
+    if feature.edited {
+        sizes.push("edited".to_owned());
     }
     if let Some(thread) = feature.thread_guess {
         sizes.push(format!("tapped {thread}? (a guess)"));
