@@ -11,7 +11,7 @@ use crate::implicit::Implicit;
 const FEWEST_CELLS: f64 = 8.0;
 const MOST_CELLS: f64 = 80.0;
 /// How far the surface reaches beyond the loop, of its extent.
-const MARGIN: f64 = 0.15;
+pub(crate) const MARGIN: f64 = 0.15;
 
 /// Why a hole has no base surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -42,12 +42,14 @@ impl Base {
     }
 }
 
-/// Throws a grid of points onto the implicit surface and puts Ferguson patches through it.
+/// Throws a grid of points onto the implicit surface and puts Ferguson patches through it, which reach
+/// beyond the loops by a margin, of their extent.
 pub(crate) fn base(
     surface: &Implicit,
     loops: &[Vec<DVec3>],
     normal: DVec3,
     edge_mm: f64,
+    margin: f64,
 ) -> Result<Base, Unseen> {
     let places: Vec<DVec3> = loops.iter().flatten().copied().collect();
     if normal == DVec3::ZERO || places.is_empty() {
@@ -71,8 +73,8 @@ pub(crate) fn base(
     }
     let extent = (high[0] - low[0]).max(high[1] - low[1]);
     let cells = (extent / edge_mm).clamp(FEWEST_CELLS, MOST_CELLS);
-    let step = extent * (1.0 + 2.0 * MARGIN) / cells;
-    let margin = MARGIN * extent;
+    let step = extent * (1.0 + 2.0 * margin) / cells;
+    let margin = margin * extent;
     let counts = [0, 1].map(|k| {
         let cells = (high[k] - low[k] + 2.0 * margin) / step;
         (cells.ceil() as usize).max(3) + 1
