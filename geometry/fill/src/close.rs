@@ -9,7 +9,7 @@ use crate::patch::{Ground, Patch, Polygon, Trouble, grow};
 use crate::region::{around, edge_length, mean_normal};
 use crate::report::Outcome;
 use crate::settings::{Method, Precision, Settings};
-use crate::yoo::{Base, Elements, MARGIN, Trim, TrimmedPatch, Unseen, base, elements, parts, trim};
+use crate::yoo::{Base, Elements, Throw, Trim, TrimmedPatch, Unseen, base, elements, parts, trim};
 
 /// Points in the dense part of a fit: as many as these times the loop's vertices, between two bounds.
 const CENTRES_PER_VERTEX: usize = 6;
@@ -201,7 +201,7 @@ impl Seen {
     ) -> Result<Self, Unseen> {
         let places = |own: &&Hole| own.vertices.iter().map(|&v| mesh.place(v)).collect();
         let rings: Vec<Vec<DVec3>> = loops.iter().map(places).collect();
-        let base = base(surface, &rings, normal, edge_mm, MARGIN)?;
+        let base = base(surface, &rings, normal, edge_mm, Throw::WHOLE)?;
         let trim = trim(&base, &rings)?;
         Ok(Self {
             base,

@@ -13,7 +13,7 @@ mod ferguson;
 mod parts;
 mod trim;
 
-pub(crate) use base::{Base, MARGIN, Unseen, base};
+pub(crate) use base::{Base, Throw, Unseen, base};
 pub(crate) use elements::elements;
 pub(crate) use parts::{Elements, parts};
 pub use trim::TrimmedPatch;

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec3;
 
-use super::base::{Unseen, base};
+use super::base::{Throw, Unseen, base};
 use super::trim::{TrimmedPatch, trim};
 use crate::implicit::Implicit;
 
@@ -20,9 +20,6 @@ const CONES_DEG: [f64; 4] = [50.0, 38.0, 27.0, 18.0];
 const ROUNDS: usize = 12;
 /// Most regions.
 const MOST: usize = 64;
-/// How far base surfaces reach beyond their loops, of their extents. Beyond what is needed lines along
-/// the normal may miss the surface.
-const MARGIN: f64 = 0.04;
 /// Pieces of an edge between regions.
 const PIECES: usize = 4;
 
@@ -82,7 +79,7 @@ impl Elements<'_> {
             if rings.iter().filter(|own| area(own) > 0.0).count() != 1 {
                 return Err(Unseen::Crossed);
             }
-            let base = base(self.surface, &rings, normal, edge_mm, MARGIN)?;
+            let base = base(self.surface, &rings, normal, edge_mm, Throw::PART)?;
             let patch = trim(&base, &rings)?.patch(hole, &base);
             found.push(patch.ok_or(Unseen::NoElements)?);
         }
