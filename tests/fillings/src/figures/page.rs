@@ -32,8 +32,9 @@ pub(crate) fn page(is_drawn: bool) -> Result<Page> {
          whose meshes holes are cut: so what was in the holes is known. The paper gives no numbers, neither of\n\
          triangles nor of deviations; it says that holes are closed and that the base surface runs smoothly on\n\
          from the model, also beyond it.\n\n\
-         Rows: `--method yoo`, thin plates and Ferguson patches, of which a hole has one where its mean\n\
-         normal sees it whole; and Relief, the default. *Off* is the distance of new vertices from the\n\
+         Rows: `--method yoo`, thin plates and Ferguson patches, and Relief, the default. A hole is one trimmed\n\
+         surface where its mean normal sees it whole, and several where it does not, which is not in the paper;\n\
+         the elements of such a hole are on the implicit surface itself. *Off* is the distance of new vertices from the\n\
          formula, root mean square and largest, in all and the former of the hole's size in the worst hole;\n\
          *border* the largest angle between a new triangle on the border and the formula, beside that of the\n\
          old triangles there. In the pictures what is new is orange, and dark what is seen from behind.\n\n",
@@ -277,7 +278,7 @@ fn row(page: &mut String, name: &str, object: &Object, own: &Filled) {
             _ => continue,
         }
         holes += 1;
-        trimmed += usize::from(matches!(hole.patch, Some(Ok(_))));
+        trimmed += hole.patch.iter().flatten().map(Vec::len).sum::<usize>();
     }
     let least = around.iter().min().copied().unwrap_or_default();
     let most = around.iter().max().copied().unwrap_or_default();
