@@ -1,4 +1,4 @@
-//! The experiments of Shim & Lee 1995, of Koo & Lee and of Jo, Kwon & Han, and the pages about them.
+//! The experiments of Shim & Lee 1995, of Koo & Lee, of Jo, Kwon & Han and of Yoo, and the pages about them.
 
 use std::ffi::OsString;
 
@@ -9,10 +9,11 @@ use crate::{judge, shell, study};
 
 const PROGRAM: &str = "study-reproduction";
 const PAGE: &str = "docs/reproduction.md";
-/// Koo & Lee, and Jo, Kwon & Han: programs that draw their pictures themselves, and their pages.
-const DRAWN: [[&str; 2]; 2] = [
+/// Koo & Lee, Jo, Kwon & Han, and Yoo: programs that draw their pictures themselves, and their pages.
+const DRAWN: [[&str; 2]; 3] = [
     ["study-surfaces", "docs/reproduction-koo-lee.md"],
     ["study-sections", "docs/reproduction-jo-kwon-han.md"],
+    ["study-holes", "docs/reproduction-yoo.md"],
 ];
 /// Jun & Park: the scans of their part, judged by OpenCASCADE's side, fill the page.
 const JUN_PARK: &str = "docs/reproduction-jun-park.md";

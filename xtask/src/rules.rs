@@ -91,7 +91,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "sim-scanner",
         ],
     ),
-    ("relief-fillings", &["fill", "range-image"]),
+    (
+        "relief-fillings",
+        &["fill", "range-image", "relief-surfaces"],
+    ),
     ("relief-tests", &EVERYTHING),
     ("relief-studies", &STUDIES),
     (

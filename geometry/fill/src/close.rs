@@ -9,7 +9,7 @@ use crate::patch::{Ground, Patch, Polygon, Trouble, grow};
 use crate::region::{around, edge_length, mean_normal};
 use crate::report::Outcome;
 use crate::settings::{Method, Precision, Settings};
-use crate::yoo::{Base, Trim, TrimmedPatch, Unseen, base, elements, trim};
+use crate::yoo::{Base, Elements, Throw, Trim, TrimmedPatch, Unseen, base, elements, parts, trim};
 
 /// Points in the dense part of a fit: as many as these times the loop's vertices, between two bounds.
 const CENTRES_PER_VERTEX: usize = 6;
@@ -61,7 +61,7 @@ pub(crate) fn attempts(settings: &Settings) -> Vec<Attempt> {
 pub(crate) struct Closed {
     pub(crate) patch: Patch,
     pub(crate) outcome: Outcome,
-    pub(crate) trimmed: Option<Result<TrimmedPatch, String>>,
+    pub(crate) trimmed: Option<Result<Vec<TrimmedPatch>, String>>,
 }
 
 fn fit_settings(kernel: Kernel, method: Method, points: usize, border: usize) -> FitSettings {
@@ -104,9 +104,10 @@ pub(crate) fn attempted(
         let fit = fit_settings(kernel, settings.method, samples.len(), border);
         Implicit::fit(&samples, hole.size_mm, &fit).ok()
     });
+    let edge_mm = edge((mesh, stars), &loops, settings);
     let seen = surface.as_ref().map(|own| {
         let wanted = settings.patches || matches!(attempt, Attempt::Trimmed(_));
-        wanted.then(|| Seen::of((mesh, stars), &loops, own, mean_normal(&samples), settings))
+        wanted.then(|| Seen::of(mesh, &loops, own, mean_normal(&samples), edge_mm))
     });
     let seen = seen.flatten();
     let mut patch = match (attempt, &seen) {
@@ -138,9 +139,11 @@ pub(crate) fn attempted(
     let trimmed = settings.patches.then(|| match seen {
         Some(Ok(seen)) => {
             let patch = seen.trim.patch(hole.number, &seen.base);
-            patch.ok_or_else(|| Unseen::NoElements.to_string())
+            let patch = patch.ok_or_else(|| Unseen::NoElements.to_string());
+            patch.map(|own| vec![own])
         }
-        Some(Err(unseen)) => Err(unseen.to_string()),
+        Some(Err(_)) => parted(mesh, &patch, surface.as_ref(), hole.number, edge_mm)
+            .map_err(|unseen| unseen.to_string()),
         None => Err("no implicit surface closes it".to_owned()),
     });
     Ok(Closed {
@@ -148,6 +151,37 @@ pub(crate) fn attempted(
         outcome,
         trimmed,
     })
+}
+
+/// How long edges of elements on a base surface are.
+fn edge((mesh, stars): (&TriangleMesh, &Stars), loops: &[&Hole], settings: &Settings) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for &vertex in loops.iter().flat_map(|own| &own.vertices) {
+        sum += edge_length(mesh, stars, vertex);
+        count += 1.0;
+    }
+    let mean_mm = sum / count;
+    settings
+        .max_edge_mm
+        .map_or(mean_mm, |most| (0.75 * most).min(mean_mm))
+}
+
+/// A filling on an implicit surface as several trimmed surfaces.
+fn parted(
+    mesh: &TriangleMesh,
+    patch: &Patch,
+    surface: Option<&Implicit>,
+    hole: usize,
+    edge_mm: f64,
+) -> Result<Vec<TrimmedPatch>, Unseen> {
+    let border = patch.border.iter().map(|&v| mesh.place(v));
+    let places: Vec<DVec3> = border.chain(patch.places.iter().copied()).collect();
+    let own = Elements {
+        surface: surface.ok_or(Unseen::Missed)?,
+        places: &places,
+        triangles: &patch.triangles,
+    };
+    parts(&own, hole, edge_mm)
 }
 
 /// A hole on its base surface.
@@ -159,23 +193,15 @@ struct Seen {
 
 impl Seen {
     fn of(
-        (mesh, stars): (&TriangleMesh, &Stars),
+        mesh: &TriangleMesh,
         loops: &[&Hole],
         surface: &Implicit,
         normal: DVec3,
-        settings: &Settings,
+        edge_mm: f64,
     ) -> Result<Self, Unseen> {
         let places = |own: &&Hole| own.vertices.iter().map(|&v| mesh.place(v)).collect();
         let rings: Vec<Vec<DVec3>> = loops.iter().map(places).collect();
-        let (mut sum, mut count) = (0.0, 0.0);
-        for &vertex in loops.iter().flat_map(|own| &own.vertices) {
-            sum += edge_length(mesh, stars, vertex);
-            count += 1.0;
-        }
-        let edge_mm = settings
-            .max_edge_mm
-            .map_or(sum / count, |most| (0.75 * most).min(sum / count));
-        let base = base(surface, &rings, normal, edge_mm)?;
+        let base = base(surface, &rings, normal, edge_mm, Throw::WHOLE)?;
         let trim = trim(&base, &rings)?;
         Ok(Self {
             base,

@@ -57,8 +57,9 @@ pub struct HoleReport {
     pub hole: Hole,
     /// What became of it.
     pub outcome: Outcome,
-    /// The hole as a trimmed surface, where that was asked for; or why it has none.
-    pub patch: Option<Result<TrimmedPatch, String>>,
+    /// The hole as a trimmed surface, or as several where no direction sees it whole, where that was asked
+    /// for; or why it has none.
+    pub patch: Option<Result<Vec<TrimmedPatch>, String>>,
 }
 
 /// A mesh with its holes closed.

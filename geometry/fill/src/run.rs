@@ -67,7 +67,7 @@ struct Job {
     numbers: BTreeSet<usize>,
     patch: Option<Patch>,
     outcome: Outcome,
-    trimmed: Option<Result<TrimmedPatch, String>>,
+    trimmed: Option<Result<Vec<TrimmedPatch>, String>>,
 }
 
 impl Job {

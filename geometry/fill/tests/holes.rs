@@ -134,7 +134,9 @@ fn the_papers_way_and_its_trimmed_surface() {
         panic!("{:?}", own.holes[0].outcome);
     };
     assert_eq!(kernel, Some(Kernel::ThinPlate));
-    let patch = own.holes[0].patch.as_ref().unwrap().as_ref().unwrap();
+    let [patch] = &own.holes[0].patch.as_ref().unwrap().as_ref().unwrap()[..] else {
+        panic!("several");
+    };
     // Curves in space and in the parameter plane run along each other.
     let (flat, spatial) = (&patch.parameter_curves[0], &patch.space_curves[0]);
     assert_eq!(flat.knots().domain(), spatial.knots().domain());
@@ -147,6 +149,57 @@ fn the_papers_way_and_its_trimmed_surface() {
     }
     assert_eq!(flat.points().first(), flat.points().last());
     assert!(patch.off_mm < 0.05, "{}", patch.off_mm);
+}
+
+#[test]
+fn a_window_around_a_pipe_is_parted_into_trimmed_surfaces() {
+    let (mesh, _) = with_hole(Shape::Cylinder, 1.5, 0.3);
+    let settings = Settings {
+        patches: true,
+        ..Settings::default()
+    };
+    let own = filled(&mesh, &settings);
+    let window = own.holes.iter().find(|own| own.patch.is_some()).unwrap();
+    let parts = window.patch.as_ref().unwrap().as_ref().unwrap();
+    assert!((2..=4).contains(&parts.len()), "{}", parts.len());
+    // Every curve runs on its own surface and on the pipe, and along a neighbour or the window.
+    let at = |p: [f64; 3]| DVec3::from_array(p);
+    let window: Vec<DVec3> = window
+        .hole
+        .vertices
+        .iter()
+        .map(|&v| at(own.mesh.vertices_mm[v as usize]))
+        .collect();
+    for (number, part) in parts.iter().enumerate() {
+        assert_eq!(
+            part.hole,
+            own.holes.iter().position(|h| h.patch.is_some()).unwrap() + 1
+        );
+        for (flat, spatial) in part.parameter_curves.iter().zip(&part.space_curves) {
+            let (first, last) = flat.knots().domain();
+            for k in 0..400 {
+                let t = first + (last - first) * f64::from(k) / 400.0;
+                let place = at(spatial.evaluate(t));
+                let [u, v] = flat.evaluate(t);
+                assert!(at(part.surface.evaluate(u, v)).distance(place) < 1e-4);
+                assert!(Shape::Cylinder.off(place).0.abs() < 1e-3);
+                let others = parts.iter().enumerate().filter(|(k, _)| *k != number);
+                let near = others
+                    .flat_map(|(_, other)| &other.space_curves)
+                    .map(|other| other.closest(place.to_array()).distance)
+                    .fold(f64::INFINITY, f64::min);
+                let to_window = (0..window.len())
+                    .map(|k| {
+                        let (a, b) = (window[k], window[(k + 1) % window.len()]);
+                        let share =
+                            ((place - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+                        place.distance(a.lerp(b, share))
+                    })
+                    .fold(f64::INFINITY, f64::min);
+                assert!(near < 1e-3 || to_window < 0.03, "{near} {to_window}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -36,7 +36,7 @@ fn is_around_the_tube(mesh: &TriangleMesh, hole: &Hole) -> bool {
         .iter()
         .map(|&v| {
             let [x, y, z] = mesh.vertices_mm[v as usize];
-            (z.atan2(x.hypot(y) - RING) / std::f64::consts::FRAC_PI_4).floor() as i32
+            (libm::atan2(z, libm::hypot(x, y) - RING) / std::f64::consts::FRAC_PI_4).floor() as i32
         })
         .collect();
     (-4..4).filter(|part| parts.contains(part)).count() > 4

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail};
 pub const PICTURES: &str = "pictures/reproduction";
 
 /// A page, and its pictures by name.
-pub type Page = (String, Vec<(&'static str, String)>);
+pub type Page = (String, Vec<(&'static str, Vec<u8>)>);
 
 /// Writes a page and its pictures.
 ///
@@ -57,12 +57,7 @@ mod tests {
     fn a_page_is_checked_line_by_line_and_to_its_end() {
         let folder = std::env::temp_dir().join(format!("kept-{}", std::process::id()));
         let path = folder.join("page.md");
-        let page = || {
-            (
-                "one\ntwo\n".to_owned(),
-                vec![("a.svg", "<svg/>".to_owned())],
-            )
-        };
+        let page = || ("one\ntwo\n".to_owned(), vec![("a.svg", b"<svg/>".to_vec())]);
         write(&path, page()).unwrap();
         assert_eq!(
             fs::read(folder.join(PICTURES).join("a.svg")).unwrap(),

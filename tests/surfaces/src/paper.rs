@@ -38,9 +38,15 @@ pub(crate) fn page() -> Result<Page> {
     );
     let section = section()?;
     let pictures = vec![
-        ("koo-lee-figure-4.svg", figure_4(&section, &mut page)?),
-        ("koo-lee-figure-5.svg", figure_5(&section, &mut page)?),
-        ("koo-lee-figure-6.svg", figure_6(&mut page)?),
+        (
+            "koo-lee-figure-4.svg",
+            figure_4(&section, &mut page)?.into(),
+        ),
+        (
+            "koo-lee-figure-5.svg",
+            figure_5(&section, &mut page)?.into(),
+        ),
+        ("koo-lee-figure-6.svg", figure_6(&mut page)?.into()),
     ];
     Ok((page, pictures))
 }

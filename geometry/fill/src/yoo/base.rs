@@ -42,12 +42,106 @@ impl Base {
     }
 }
 
+/// How a grid is thrown.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Throw {
+    /// How far the surface reaches beyond the loop, of its extent.
+    margin: f64,
+    /// Whether nodes that the loops do not enclose may miss the surface; they go on from those beside them.
+    may_miss: bool,
+}
+
+impl Throw {
+    /// Of a whole hole, as the paper has it.
+    pub(crate) const WHOLE: Self = Self {
+        margin: MARGIN,
+        may_miss: false,
+    };
+    /// Of a part of one: lines beyond it may miss the surface.
+    pub(super) const PART: Self = Self {
+        margin: 0.04,
+        may_miss: true,
+    };
+}
+
+/// Nodes so far from a loop count as enclosed, in steps of the grid.
+const BESIDE: f64 = 1.5;
+
+/// Whether loops enclose a place, or it is beside one.
+fn is_enclosed(loops: &[Vec<[f64; 2]>], at: [f64; 2], steps: [f64; 2]) -> bool {
+    let mut is_in = false;
+    for own in loops {
+        for (k, p) in own.iter().enumerate() {
+            let q = own[(k + 1) % own.len()];
+            if (0..2).all(|c| (p[c] - at[c]).abs() < BESIDE * steps[c]) {
+                return true;
+            }
+            if (p[1] > at[1]) != (q[1] > at[1]) {
+                let crossing = p[0] + (at[1] - p[1]) / (q[1] - p[1]) * (q[0] - p[0]);
+                is_in ^= crossing > at[0];
+            }
+        }
+    }
+    is_in
+}
+
+/// Nodes that have none go on from those beside them, by parabolas along rows and columns.
+fn extended(mut nodes: Vec<Option<DVec3>>, counts: [usize; 2]) -> Option<Vec<DVec3>> {
+    while nodes.iter().any(Option::is_none) {
+        let mut next = nodes.clone();
+        for (k, own) in next.iter_mut().enumerate().filter(|(_, own)| own.is_none()) {
+            let place = [(k / counts[1]) as isize, (k % counts[1]) as isize];
+            let (mut sum, mut count) = (DVec3::ZERO, 0.0);
+            for way in [[1, 0], [-1, 0], [0, 1], [0, -1]] {
+                let at = |far: isize| {
+                    let node = [0, 1].map(|c| place[c] + far * way[c]);
+                    let is_there = (0..2).all(|c| (0..counts[c] as isize).contains(&node[c]));
+                    let index =
+                        is_there.then(|| node[0] as usize * counts[1] + node[1] as usize)?;
+                    nodes[index]
+                };
+                if let (Some(a), Some(b), Some(c)) = (at(1), at(2), at(3)) {
+                    sum += 3.0 * (a - b) + c;
+                    count += 1.0;
+                }
+            }
+            *own = (count > 0.0).then(|| sum / count);
+        }
+        if next == nodes {
+            return None;
+        }
+        nodes = next;
+    }
+    nodes.into_iter().collect()
+}
+
+/// Axes across a normal in which loops are as small as can be, within steps of five degrees.
+fn turned([x, y]: [DVec3; 2], places: &[DVec3]) -> [DVec3; 2] {
+    let by = |k: i32| {
+        let (sin, cos) = libm::sincos(f64::from(5 * k).to_radians());
+        [cos * x + sin * y, cos * y - sin * x]
+    };
+    let size = |k: &i32| {
+        let extent = by(*k).map(|axis| {
+            let along = places.iter().map(|p| axis.dot(*p));
+            let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |own, a| {
+                (own.0.min(a), own.1.max(a))
+            });
+            high - low
+        });
+        extent[0] * extent[1]
+    };
+    let best = (0..18).min_by(|a, b| size(a).total_cmp(&size(b)));
+    by(best.unwrap_or_default())
+}
+
 /// Throws a grid of points onto the implicit surface and puts Ferguson patches through it.
 pub(crate) fn base(
     surface: &Implicit,
     loops: &[Vec<DVec3>],
     normal: DVec3,
     edge_mm: f64,
+    throw: Throw,
 ) -> Result<Base, Unseen> {
     let places: Vec<DVec3> = loops.iter().flatten().copied().collect();
     if normal == DVec3::ZERO || places.is_empty() {
@@ -60,6 +154,11 @@ pub(crate) fn base(
     } else {
         [y, x]
     };
+    let axes = if throw.may_miss {
+        turned(axes, &places)
+    } else {
+        axes
+    };
     let origin = places.iter().sum::<DVec3>() / places.len() as f64;
     let seen = |p: DVec3| axes.map(|axis| axis.dot(p - origin));
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
@@ -71,8 +170,8 @@ pub(crate) fn base(
     }
     let extent = (high[0] - low[0]).max(high[1] - low[1]);
     let cells = (extent / edge_mm).clamp(FEWEST_CELLS, MOST_CELLS);
-    let step = extent * (1.0 + 2.0 * MARGIN) / cells;
-    let margin = MARGIN * extent;
+    let step = extent * (1.0 + 2.0 * throw.margin) / cells;
+    let margin = throw.margin * extent;
     let counts = [0, 1].map(|k| {
         let cells = (high[k] - low[k] + 2.0 * margin) / step;
         (cells.ceil() as usize).max(3) + 1
@@ -102,11 +201,31 @@ pub(crate) fn base(
         // What faces away was met from behind.
         (surface.at(found).1.dot(normal) > 0.0).then_some(found)
     };
-    let points: Option<Vec<DVec3>> = (0..counts[0] * counts[1])
+    let mut nodes: Vec<Option<DVec3>> = (0..counts[0] * counts[1])
         .into_par_iter()
         .with_min_len(16)
         .map(thrown)
         .collect();
+    if throw.may_miss {
+        let flat: Vec<Vec<[f64; 2]>> = loops
+            .iter()
+            .map(|own| own.iter().map(|&p| seen(p)).collect())
+            .collect();
+        let is_needed = |k: usize| {
+            let at = [k / counts[1], k % counts[1]];
+            let at = [0, 1].map(|c| first[c] + steps[c] * at[c] as f64);
+            is_enclosed(&flat, at, steps)
+        };
+        if (0..nodes.len()).any(|k| nodes[k].is_none() && is_needed(k)) {
+            return Err(Unseen::Missed);
+        }
+        nodes = extended(nodes, counts)
+            .ok_or(Unseen::Missed)?
+            .into_iter()
+            .map(Some)
+            .collect();
+    }
+    let points: Option<Vec<DVec3>> = nodes.into_iter().collect();
     let grid = Grid {
         columns: counts[0],
         rows: counts[1],

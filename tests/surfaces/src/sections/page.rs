@@ -45,7 +45,7 @@ pub(crate) fn page() -> Result<Page> {
     let mut pictures = curves(&mut page)?;
     let made = skins()?;
     table_1(&made, &mut page);
-    pictures.push(("jo-figure-5.svg", figure_5(&made, &mut page)?));
+    pictures.push(("jo-figure-5.svg", figure_5(&made, &mut page)?.into()));
     table_2(&made, &mut page);
     Ok((page, pictures))
 }
@@ -86,7 +86,7 @@ fn off(curve: &BSplineCurve<3>, points: &[[f64; 3]]) -> [f64; 2] {
 }
 
 /// Figures 1 to 3.
-fn curves(page: &mut String) -> Result<Vec<(&'static str, String)>> {
+fn curves(page: &mut String) -> Result<Vec<(&'static str, Vec<u8>)>> {
     // Sections come in stacks: a second one, that is not drawn.
     let stack = sections(&[DRAWN_AT_MM, DRAWN_AT_MM + 50.0], SEED);
     let curves = section_curves(&stack, DRAWN_TOLERANCE_MM, &Unmonitored)?;
@@ -140,14 +140,17 @@ fn curves(page: &mut String) -> Result<Vec<(&'static str, String)>> {
         places: &polygon,
     };
     Ok(vec![
-        ("jo-figure-1.svg", section(&points, &[interpolating()])),
+        (
+            "jo-figure-1.svg",
+            section(&points, &[interpolating()]).into(),
+        ),
         (
             "jo-figure-2.svg",
-            section(&points, &[approximating(), control]),
+            section(&points, &[approximating(), control]).into(),
         ),
         (
             "jo-figure-3.svg",
-            section(&[], &[interpolating(), approximating()]),
+            section(&[], &[interpolating(), approximating()]).into(),
         ),
     ])
 }

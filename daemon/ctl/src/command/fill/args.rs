@@ -30,7 +30,8 @@ pub(crate) struct Args {
     /// input as NAME-filled, in its format
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
-    /// Write the fillings as trimmed surfaces, too: IGES, for each hole that its mean plane sees whole
+    /// Write the fillings as trimmed surfaces, too: IGES, one for each hole that its mean plane sees whole,
+    /// and several beside each other for others
     #[arg(long, value_name = "OUT.igs")]
     pub(super) patches: Option<PathBuf>,
     /// Unit of the coordinates in the file, which the written mesh keeps; default: millimetres. Whatever

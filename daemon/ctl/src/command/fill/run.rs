@@ -199,8 +199,14 @@ fn patches(args: &Args, path: &Path, filled: &Filled, told: &mut Told) -> Result
     let mut found = Vec::new();
     for own in &filled.holes {
         match &own.patch {
-            Some(Ok(patch)) => {
-                found.push((format!("hole-{}", patch.hole), patch.scaled(args.in_mm())));
+            Some(Ok(parts)) => {
+                for (k, part) in parts.iter().enumerate() {
+                    let name = match parts.len() {
+                        1 => format!("hole-{}", part.hole),
+                        _ => format!("hole-{}-{}", part.hole, k + 1),
+                    };
+                    found.push((name, part.scaled(args.in_mm())));
+                }
             }
             Some(Err(reason)) => told.warnings.push(format!(
                 "hole {} has no trimmed surface: {reason}",
