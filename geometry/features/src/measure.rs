@@ -138,7 +138,7 @@ pub fn measured(
 }
 
 /// Which of a rectangle's axes is its length: along the walls of what runs out, else the longer.
-fn length_axis(rectangle: &Rectangle, class: Option<Class>) -> usize {
+pub(crate) fn length_axis(rectangle: &Rectangle, class: Option<Class>) -> usize {
     let [a, b, c, d] = rectangle.walls;
     let [first, second] = rectangle.sizes_mm();
     let longer = usize::from(second > first);

@@ -4,13 +4,12 @@
 
 mod common;
 
-use common::{Bench, scan};
+use common::{Bench, recognised};
 use features::edit::{Edit, edit};
 use features::feature::{Bottom, Feature};
 use features::network::Classifier;
 use features::rebuild::rebuilt;
-use features::recognise::{Recognition, Settings, Teller, recognise};
-use range_image::Unmonitored;
+use features::recognise::Recognition;
 
 const TABLE_MM: f64 = -12.0;
 
@@ -28,13 +27,7 @@ fn found_amid(noise_mm: f64, height_mm: &dyn Fn(f64, f64) -> f64) -> Recognition
         x_mm: (-50.0, 50.0),
         ..Bench::default()
     };
-    let settings = Settings {
-        teller: Teller::Network(Classifier::shipped()),
-        seed: 1,
-        least_pitches: Settings::USUAL_PITCHES,
-    };
-    let columns = scan(&bench, height_mm);
-    recognise(&columns, Some(bench.camera_mm), &settings, &Unmonitored).unwrap()
+    recognised(&bench, height_mm)
 }
 
 fn turned(x: f64, y: f64) -> (f64, f64) {
@@ -114,13 +107,7 @@ fn of_a_drilled_hole_seen_from_the_side_a_part_of_the_tip_tells_the_shoulder() {
         x_mm: (-50.0, 50.0),
         ..Bench::default()
     };
-    let settings = Settings {
-        teller: Teller::Network(Classifier::shipped()),
-        seed: 1,
-        least_pitches: Settings::USUAL_PITCHES,
-    };
-    let columns = scan(&bench, &part);
-    let found = recognise(&columns, Some(bench.camera_mm), &settings, &Unmonitored).unwrap();
+    let found = recognised(&bench, &part);
     let holes = of(&found, "hole");
     assert_eq!(holes.len(), 1, "{:?}", found.features);
     let depth = holes[0].dimension("depth").unwrap();

@@ -6,17 +6,17 @@ mod common;
 
 use std::sync::OnceLock;
 
-use common::{Bench, scan};
+use common::{Bench, recognised};
 use features::edit::{Edit, EditError, edit};
 use features::feature::Feature;
 use features::network::Classifier;
 use features::rebuild::rebuilt;
-use features::recognise::{Recognition, Settings, Teller, recognise};
-use range_image::Unmonitored;
+use features::recognise::Recognition;
 
 const TABLE_MM: f64 = -12.0;
 
-/// A block with a pocket and a hole in that, a countersunk hole, and a boss with a chamfer.
+/// A block with a pocket and two holes in that, one of them through, a countersunk hole, a boss with a
+/// chamfer, and a slot that is wider than it is long.
 fn part(x: f64, y: f64) -> f64 {
     let (sin, cos) = libm::sincos(7f64.to_radians());
     let (u, v) = (cos * x + sin * y, cos * y - sin * x);
@@ -26,6 +26,12 @@ fn part(x: f64, y: f64) -> f64 {
     }
     if off(-15.0, 0.0) < 4.0 {
         return -7.0;
+    }
+    if off(-21.0, 6.0) < 2.5 {
+        return TABLE_MM;
+    }
+    if u.abs() < 8.0 && v > 17.0 {
+        return -2.0;
     }
     if (u + 15.0).abs() < 15.0 && v.abs() < 10.0 {
         return -3.0;
@@ -57,28 +63,19 @@ fn found() -> Recognition {
             x_mm: (-50.0, 50.0),
             ..Bench::default()
         };
-        let settings = Settings {
-            teller: Teller::Network(Classifier::shipped()),
-            seed: 1,
-            least_pitches: Settings::USUAL_PITCHES,
-        };
-        let columns = scan(&bench, &part);
-        recognise(&columns, Some(bench.camera_mm), &settings, &Unmonitored).unwrap()
+        recognised(&bench, &part)
     });
     found.clone()
 }
 
-/// The only feature of a class; with a parent of a class, where that is asked for.
+/// The only feature of a class that does not go through; with a parent of a class, where that is asked for.
 fn id(found: &Recognition, class: &str, on: &str) -> u32 {
     let is_on = |feature: &&Feature| {
         let parent = found.features.iter().find(|f| Some(f.id) == feature.parent);
         on.is_empty() || parent.is_some_and(|p| p.class == on)
     };
-    let mut own = found
-        .features
-        .iter()
-        .filter(|f| f.class == class)
-        .filter(is_on);
+    let blind = found.features.iter().filter(|f| !f.through);
+    let mut own = blind.filter(|f| f.class == class).filter(is_on);
     let id = own.next().unwrap().id;
     assert_eq!(own.count(), 0, "{class} on {on}");
     id
@@ -187,6 +184,39 @@ fn what_goes_into_a_floor_moves_with_it() {
 }
 
 #[test]
+fn holes_that_go_through_end_with_the_block() {
+    let mut own = found();
+    let pocket = id(&own, "pocket", "");
+    let hole = own.features.iter().find(|f| f.through).unwrap().id;
+    let (before, depth) = (volume_mm3(&own), size(&own, hole, "depth"));
+    let way = 5.0 - size(&own, pocket, "depth");
+    edited(&mut own, &[sizes(pocket, [("depth", 5.0)])]).unwrap();
+    assert!(of(&own, hole).through);
+    assert!((size(&own, hole, "depth") - (depth - way)).abs() < 0.02);
+    assert!(volume_mm3(&own) < before);
+    // With the block, and not below it.
+    edited(&mut own, &[sizes(0, [("height", 14.0)])]).unwrap();
+    assert!((size(&own, hole, "depth") - 9.0).abs() < 0.01);
+    let told = refused(&[sizes(0, [("height", 6.0)])]);
+    assert!(told.contains("the block ends"), "{told}");
+}
+
+#[test]
+fn what_runs_out_keeps_its_length_along_its_walls() {
+    let mut own = found();
+    let slot = id(&own, "slot", "");
+    let (length, width) = (size(&own, slot, "length"), size(&own, slot, "width"));
+    assert!(length < width, "{length} {width}");
+    let along = of(&own, slot).direction;
+    edited(&mut own, &[sizes(slot, [("depth", 3.0)])]).unwrap();
+    assert_eq!(
+        (size(&own, slot, "length"), size(&own, slot, "width")),
+        (length, width)
+    );
+    assert_eq!(of(&own, slot).direction, along);
+}
+
+#[test]
 fn edges_follow_and_file_and_solid_agree() {
     let mut own = found();
     let (cone, hole) = (
@@ -243,6 +273,13 @@ fn a_chamfer_may_be_a_round() {
     let width = size(&own, edge, "width");
     assert!(refused(&[named(edge, "fillet")]).contains("one of chamfer, round"));
     assert!(refused(&[directed(edge, [1.0, 0.0, 0.0])]).contains("runs along an edge of"));
+    let mut wider = own.clone();
+    edited(&mut wider, &[sizes(edge, [("width", 1.5 * width)])]).unwrap();
+    let rise = |found: &Recognition| {
+        let (level, end) = of(found, edge).heights_mm;
+        level - end.unwrap()
+    };
+    assert!((rise(&wider) - 1.5 * rise(&own)).abs() < 1e-9);
     edited(&mut own, &[named(edge, "round")]).unwrap();
     assert_eq!(size(&own, edge, "radius"), width);
     assert!(of(&own, edge).dimension("width").is_none());
@@ -263,6 +300,12 @@ fn directions_and_the_longer_side() {
     let along = of(&own, pocket).direction.unwrap();
     assert!(along.y > 0.999_999, "{along}");
     assert!((volume_mm3(&own) - before).abs() < 1e-3 * before);
+    // Shorter, but still the longer side.
+    let width = size(&own, pocket, "width");
+    edited(&mut own, &[sizes(pocket, [("length", width + 1.0)])]).unwrap();
+    assert!((before - volume_mm3(&own) + 9.0 * width * 3.0).abs() < 0.1 * 9.0 * width * 3.0);
+    own = found();
+    edited(&mut own, &[directed(pocket, [0.0, 3.0, 0.0])]).unwrap();
     // Made wider than it is long, its length is what was its width.
     let length = size(&own, pocket, "length");
     edited(&mut own, &[sizes(pocket, [("width", 36.0)])]).unwrap();

@@ -32,7 +32,8 @@ pub(crate) fn check_files(written: &[&Path], read: &[(&str, &Path)]) -> Result<(
         check_file(file)?;
         if let Some((what, _)) = read.iter().find(|(_, own)| same_file(own, file)) {
             return Err(Failure::Usage(format!(
-                "{} is the {what} itself; name another file",
+                "{} is the {what} itself: it is read, and cannot be written as well; choose another \
+                 name",
                 file.display()
             )));
         }

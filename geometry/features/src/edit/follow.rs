@@ -1,5 +1,6 @@
 //! What follows from a change of a feature: what goes into it or stands on it, and its treated edges.
 
+use crate::candidate::Lie;
 use crate::feature::Feature;
 use crate::frame::Frame;
 use crate::treatment::Kind;
@@ -46,6 +47,31 @@ pub(super) fn follow(features: &mut [Feature], before: &Feature, frame: &Frame) 
             follow(features, &was, frame);
         }
     }
+}
+
+/// Holes that go through end where the block does, however far that now is from where they begin.
+pub(super) fn through(before: &[Feature], features: &mut [Feature]) {
+    let Some(bottom_mm) = bottom_mm(features) else {
+        return;
+    };
+    let is_other_block = self::bottom_mm(before) != Some(bottom_mm);
+    for (was, own) in before.iter().zip(features) {
+        let is_moved = is_other_block || was.heights_mm != own.heights_mm;
+        if !(own.through && own.lie == Some(Lie::Hollow) && is_moved) {
+            continue;
+        }
+        own.heights_mm.1 = Some(bottom_mm);
+        let depth_mm = own.heights_mm.0 - bottom_mm;
+        if let Some(depth) = own.dimensions.iter_mut().find(|d| d.name == "depth") {
+            depth.value_mm = depth_mm;
+        }
+    }
+}
+
+/// Height at which the block ends, above the plan, where that is known.
+pub(super) fn bottom_mm(features: &[Feature]) -> Option<f64> {
+    let block = features.iter().find(|f| f.lie == Some(Lie::Body));
+    block.and_then(|block| block.heights_mm.1)
 }
 
 /// Whether a treated edge rises from a floor to a wall.

@@ -36,8 +36,8 @@ impl Edit {
 /// patterns follow. `classes` are those that a feature may be, as the network knows them.
 ///
 /// Sizes are taken about the middle, depths and heights from the face that the feature goes into or
-/// stands on; what is given has no uncertainty. What goes into a floor that moves keeps its own depth,
-/// and a countersink its diameter. Nothing is changed where one change cannot be made.
+/// stands on; what is given has no uncertainty. What goes into a floor that moves keeps its own depth
+/// unless it goes through, a countersink its diameter, and a chamfer that is made wider its slant. Nothing is changed where one change cannot be made.
 ///
 /// # Errors
 /// [`EditError`].
@@ -72,6 +72,7 @@ pub fn edit(
         changed[index].is_edited = true;
         follow::follow(&mut changed, &before, &recognition.frame);
     }
+    follow::through(&recognition.features, &mut changed);
     size::check(&recognition.features, &changed, edits)?;
     recognition.features = changed;
     recognition.patterns = patterns(&recognition.features);

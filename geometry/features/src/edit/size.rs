@@ -1,10 +1,12 @@
 //! Sizes that a feature may be given.
 
-use super::follow::rises;
+use super::follow::{bottom_mm, rises};
 use super::{Edit, EditError};
 use crate::candidate::Lie;
+use crate::class::Class;
 use crate::feature::{Bottom, Dimension, Feature};
 use crate::frame::Frame;
+use crate::measure::length_axis;
 use crate::outline::Shape;
 
 /// Dimensions that features have.
@@ -24,10 +26,12 @@ pub(super) fn size(feature: &mut Feature, name: &str, value_mm: f64) -> Result<(
         let must = "it must be above 0 and finite".to_owned();
         return Err(length(feature, name, value_mm, must));
     }
-    set(feature, name, value_mm)?;
+    // Of the outline as it was.
     let along = length_is_first(feature);
+    let before_mm = feature.dimension(name).map(|own| own.value_mm);
+    set(feature, name, value_mm)?;
     if feature.lie.is_none() {
-        edge(feature, name, value_mm);
+        edge(feature, name, value_mm, before_mm.unwrap_or(value_mm));
         return Ok(());
     }
     match (&mut feature.outline, name) {
@@ -101,38 +105,40 @@ fn set(feature: &mut Feature, name: &str, value_mm: f64) -> Result<(), EditError
 }
 
 /// Of a treated edge, how far it reaches off its face. A chamfer that is made wider slants as before.
-fn edge(feature: &mut Feature, name: &str, value_mm: f64) {
-    let (level_mm, end_mm) = feature.heights_mm;
-    let rise_mm = end_mm.map(|end_mm| (level_mm - end_mm).abs());
-    let rise_mm = match (name, rise_mm) {
-        ("radius" | "depth", _) => value_mm,
+fn edge(feature: &mut Feature, name: &str, value_mm: f64, before_mm: f64) {
+    let (level_mm, Some(end_mm)) = feature.heights_mm else {
+        return;
+    };
+    let rise_mm = match name {
+        "radius" | "depth" => value_mm,
+        "width" => (level_mm - end_mm).abs() * value_mm / before_mm,
         _ => return,
     };
     let way = if rises(feature) { rise_mm } else { -rise_mm };
     feature.heights_mm.1 = Some(level_mm + way);
 }
 
-/// Lets the length be the longer side.
+/// Lets the length be that along the walls of what runs out, else the longer side, as it is measured.
 pub(super) fn order(feature: &mut Feature, frame: &Frame) {
-    let value = |name| feature.dimension(name).map(|d| d.value_mm);
-    let (Some(length), Some(width)) = (value("length"), value("width")) else {
+    let Shape::Rectangle(own) = feature.outline else {
         return;
     };
-    if length >= width {
-        return;
+    let long = length_axis(&own, Class::named(&feature.class));
+    if length_is_first(feature) != (long == 0) {
+        for own in &mut feature.dimensions {
+            own.name = match own.name {
+                "length" => "width",
+                "width" => "length",
+                other => other,
+            };
+        }
+        feature.dimensions.sort_by_key(|own| own.name);
     }
-    for own in &mut feature.dimensions {
-        own.name = match own.name {
-            "length" => "width",
-            "width" => "length",
-            other => other,
-        };
-    }
-    feature.dimensions.sort_by_key(|own| own.name);
-    feature.direction = feature.direction.map(|along| frame.axes[2].cross(&along));
+    let angle_rad = own.angle_rad + long as f64 * core::f64::consts::FRAC_PI_2;
+    feature.direction = feature.direction.map(|_| frame.direction(angle_rad));
 }
 
-/// Whether the length runs along a rectangle's first axis.
+/// Whether the told length is that along a rectangle's first axis.
 pub(super) fn length_is_first(feature: &Feature) -> bool {
     let Shape::Rectangle(own) = feature.outline else {
         return true;
@@ -154,7 +160,6 @@ pub(super) fn check(
         let [a, b] = [high[0] - low[0], high[1] - low[1]];
         (a * a + b * b).sqrt()
     });
-    let bottom_mm = block.and_then(|block| block.heights_mm.1);
     for own in edits {
         let Some(feature) = features.iter().find(|f| f.id == own.id) else {
             continue;
@@ -168,15 +173,19 @@ pub(super) fn check(
         }
         countersink(features, feature)?;
     }
-    let moved = before.iter().zip(features).filter(|(was, is)| was != is);
-    for (_, feature) in moved.filter(|(_, is)| is.lie == Some(Lie::Hollow)) {
-        let ends = bottom_mm.zip(feature.heights_mm.1);
-        if let Some((bottom_mm, floor_mm)) = ends
-            && floor_mm < bottom_mm
-            && !feature.through
+    let end_mm = bottom_mm(features);
+    let is_other_block = bottom_mm(before) != end_mm;
+    let hollows = before.iter().zip(features).filter(|(was, is)| {
+        is.lie == Some(Lie::Hollow)
+            && !is.through
+            && (is_other_block || was.heights_mm != is.heights_mm)
+    });
+    for (_, feature) in hollows {
+        if let Some((end_mm, floor_mm)) = end_mm.zip(feature.heights_mm.1)
+            && floor_mm < end_mm
         {
             let (base_mm, depth_mm) = (feature.heights_mm.0, feature.heights_mm.0 - floor_mm);
-            let left_mm = base_mm - bottom_mm;
+            let left_mm = base_mm - end_mm;
             let must = format!("the block ends {left_mm:.3} mm below the face that it goes into");
             return Err(length(feature, "depth", depth_mm, must));
         }

@@ -1,10 +1,16 @@
 //! Parts by formula, and scans of them: rays from a camera that turns at even steps.
 
-#![allow(dead_code, reason = "each test uses a part of this")]
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    reason = "each test uses a part of this, and one that cannot go on ends"
+)]
 
+use features::network::Classifier;
+use features::recognise::{Recognition, Settings, Teller, recognise};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use range_image::{Column, Sample};
+use range_image::{Column, Sample, Unmonitored};
 
 /// How a part is scanned.
 #[derive(Debug, Clone, Copy)]
@@ -85,4 +91,15 @@ fn first_met(height_mm: &dyn Fn(f64, f64) -> f64, x: f64, cy: f64, cz: f64, tang
         }
     }
     z
+}
+
+/// What the shipped network recognises in a scan of the heights.
+pub(crate) fn recognised(bench: &Bench, height_mm: &dyn Fn(f64, f64) -> f64) -> Recognition {
+    let settings = Settings {
+        teller: Teller::Network(Classifier::shipped()),
+        seed: 1,
+        least_pitches: Settings::USUAL_PITCHES,
+    };
+    let columns = scan(bench, height_mm);
+    recognise(&columns, Some(bench.camera_mm), &settings, &Unmonitored).unwrap()
 }

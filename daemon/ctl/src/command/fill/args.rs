@@ -1,12 +1,13 @@
 //! What the user may say, and what follows from it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use fill::{Kernel, Method, Precision, Settings};
 use jiff::Timestamp;
 use mesh_files::TriangleFormat;
 
+use crate::command::places;
 use crate::command::units::UnitName;
 use crate::failure::Failure;
 
@@ -186,16 +187,13 @@ impl Args {
                 )));
             }
         }
-        for written in self.output.iter().chain(&self.patches) {
-            crate::command::places::check_file(written)?;
-            if crate::command::convert::same_file(&self.mesh, written) {
-                return Err(Failure::Usage(format!(
-                    "{} is read, and cannot be written as well; choose another name",
-                    self.mesh.display()
-                )));
-            }
-        }
-        Ok(())
+        let written: Vec<&Path> = self
+            .output
+            .iter()
+            .chain(&self.patches)
+            .map(PathBuf::as_path)
+            .collect();
+        places::check_files(&written, &[("mesh", &self.mesh)])
     }
 
     /// The time that is written into the IGES file.

@@ -13,8 +13,8 @@ use serde::Serialize;
 
 use super::args::kernel_name;
 use super::{Args, read, summary};
+use crate::command::places;
 use crate::command::shown::{self, Shown};
-use crate::command::{convert, places};
 use crate::failure::Failure;
 use crate::output;
 
@@ -163,13 +163,10 @@ fn work(args: &Args, shown: &Shown) -> Result<Told, Failure> {
                 .collect(),
         });
     }
-    places::check_file(&output)?;
-    if convert::same_file(&args.mesh, &output) {
-        return Err(Failure::Usage(format!(
-            "{} is read, and cannot be written as well; choose another name with -o",
-            output.display()
-        )));
-    }
+    let written: Vec<&Path> = std::iter::once(output.as_path())
+        .chain(args.patches.as_deref())
+        .collect();
+    places::check_files(&written, &[("mesh", &args.mesh)])?;
     shown.begin("fill");
     let filled = fill::fill(mesh, &settings, shown).map_err(refused)?;
     let generator = concat!("relief ", env!("CARGO_PKG_VERSION"));

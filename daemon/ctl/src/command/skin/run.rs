@@ -1,6 +1,6 @@
 //! The skinning itself.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use cad_exchange::iges::NamedSurface;
 use deliverables::{Entities, SkinFigures, skin_pictures, write_atomically};
@@ -8,8 +8,8 @@ use serde::Serialize;
 use skin::{Skin, SkinError};
 
 use super::{Args, read, summary};
+use crate::command::places;
 use crate::command::shown::{self, Shown};
-use crate::command::{convert, places};
 use crate::failure::Failure;
 use crate::output;
 
@@ -54,16 +54,10 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
 fn skin_file(args: &Args, shown: &Shown) -> Result<Skinned, Failure> {
     let settings = args.settings()?;
     let output = args.output()?;
-    places::check_file(&output)?;
-    for written in std::iter::once(&output).chain(&args.report) {
-        if convert::same_file(written, &args.input) {
-            return Err(Failure::Usage(format!(
-                "{} is read, and cannot be written as well; choose another name with -o",
-                written.display()
-            )));
-        }
-    }
-    args.report.as_deref().map_or(Ok(()), places::check_file)?;
+    let written: Vec<&Path> = std::iter::once(output.as_path())
+        .chain(args.report.as_deref())
+        .collect();
+    places::check_files(&written, &[("file of sections", &args.input)])?;
     args.pictures
         .as_deref()
         .map_or(Ok(()), places::check_directory)?;

@@ -7,8 +7,8 @@ use serde::Serialize;
 use toolpath::{Surface, ToolpathError};
 
 use super::{Args, model, summary};
+use crate::command::places;
 use crate::command::shown::{self, Shown};
-use crate::command::{convert, places};
 use crate::failure::Failure;
 use crate::output;
 
@@ -42,18 +42,14 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
 fn mill(args: &Args, shown: &Shown) -> Result<Planned, Failure> {
     let settings = args.settings()?;
     let output = args.output();
-    places::check_file(&output)?;
-    for input in [&args.model, &args.machine] {
-        for written in std::iter::once(&output).chain(&args.picture) {
-            if convert::same_file(input, written) {
-                return Err(Failure::Usage(format!(
-                    "{} is read, and cannot be written as well; choose another name",
-                    input.display()
-                )));
-            }
-        }
-    }
-    args.picture.as_deref().map_or(Ok(()), places::check_file)?;
+    let written: Vec<&Path> = std::iter::once(output.as_path())
+        .chain(args.picture.as_deref())
+        .collect();
+    let read = [
+        ("model", args.model.as_path()),
+        ("machine's file", &args.machine),
+    ];
+    places::check_files(&written, &read)?;
     let timestamp = args.timestamp()?;
     let cannot_use = |why: String| Failure::Failed(why);
     let machine =
