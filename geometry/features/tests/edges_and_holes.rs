@@ -94,16 +94,16 @@ fn of_a_drilled_hole_seen_from_the_side_a_part_of_the_tip_tells_the_shoulder() {
             return -20.0;
         }
         let from_drilled = off(u + 10.0, v + 10.0);
-        if from_drilled < 4.6 {
-            return -12.0 - 0.6 * (4.6 - from_drilled);
+        if from_drilled < 3.0 {
+            return -12.0 - 0.6 * (3.0 - from_drilled);
         }
         0.0
     };
     let bench = Bench {
         pitch_mm: 0.35,
         noise_mm: 0.08,
-        // The near wall hides more than half of the tip.
-        camera_mm: [40.0, 120.0],
+        // The near wall hides more than half of the tip; what is left passes for a plane.
+        camera_mm: [40.0, 150.0],
         x_mm: (-50.0, 50.0),
         ..Bench::default()
     };
@@ -121,8 +121,8 @@ fn of_a_drilled_hole_seen_from_the_side_a_part_of_the_tip_tells_the_shoulder() {
 
 #[test]
 fn a_narrow_step_with_a_wavy_floor_is_rebuilt() {
-    let part = |x: f64, y: f64| {
-        let (u, v) = turned(x, y);
+    // Along the plan's axes, in which floors are told.
+    let part = |u: f64, v: f64| {
         if u.abs() > 40.0 || v.abs() > 25.0 {
             return TABLE_MM;
         }
