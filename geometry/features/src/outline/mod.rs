@@ -1,5 +1,6 @@
 //! Outlines in the plan, told by the samples on both sides of them.
 
+mod hearing;
 mod posterior;
 mod shape;
 mod start;

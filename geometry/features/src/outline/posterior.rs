@@ -6,6 +6,7 @@
 //! of them: the mean over the posterior, drawn by random walks (Metropolis et al. 1953), and its
 //! spread is the uncertainty.
 
+use super::hearing::{self, Hearing};
 use super::shape::Shape;
 use crate::chance::Chance;
 
@@ -99,7 +100,7 @@ pub fn outline(start: Shape, witnesses: &[Witness], pitch_mm: f64, seed: u64) ->
     Outline {
         shape,
         covariance,
-        log_likelihood: walk.log_likelihood(&shape),
+        log_likelihood: walk.hearing.log_likelihood(&shape),
         contradicted: far as f64 / all.max(1) as f64,
         witnesses: all,
     }
@@ -108,109 +109,52 @@ pub fn outline(start: Shape, witnesses: &[Witness], pitch_mm: f64, seed: u64) ->
 /// Logarithm of the likelihood of a shape, edges as sharp as they are in the end.
 #[must_use]
 pub fn log_likelihood(shape: &Shape, witnesses: &[Witness], pitch_mm: f64) -> f64 {
-    let mut sum = 0.0;
-    let mut all = witnesses.iter();
-    shape.distances(witnesses.iter().map(|w| w.place), |distance| {
-        if let Some(witness) = all.next() {
-            sum += Heard::of(witness).log_likelihood(distance, 1.0 / (SHARPNESS * pitch_mm));
-        }
-    });
-    sum
+    hearing::log_likelihood(shape, witnesses, 1.0 / (SHARPNESS * pitch_mm))
 }
 
-/// A witness, and what is asked of it some ten thousand times.
-#[derive(Debug, Clone, Copy)]
-struct Heard<'a> {
-    witness: &'a Witness,
-    /// Logarithms of how likely it is right, and wrong.
-    log_right: f64,
-    log_wrong: f64,
-}
-
-impl<'a> Heard<'a> {
-    fn of(witness: &'a Witness) -> Self {
-        Self {
-            witness,
-            log_right: libm::log(1.0 - witness.doubt),
-            log_wrong: libm::log(witness.doubt),
-        }
-    }
-
-    /// A logistic edge; beyond some ten widths it is what it is.
-    fn log_likelihood(&self, distance_mm: f64, scale: f64) -> f64 {
-        let witness = self.witness;
-        let side = if witness.inside {
-            -distance_mm
-        } else {
-            distance_mm
-        };
-        let inwards = (side + witness.slack_mm) * scale;
-        let doubt = witness.doubt;
-        if inwards > 12.0 {
-            self.log_right
-        } else if inwards < -12.0 {
-            self.log_wrong
-        } else {
-            let right = 1.0 / (1.0 + libm::exp(-1.7 * inwards));
-            libm::log(doubt + (1.0 - 2.0 * doubt) * right)
-        }
-    }
-}
-
-struct Walk<'a> {
+struct Walk {
     shape: Shape,
-    witnesses: Vec<Heard<'a>>,
-    sharpness_mm: f64,
+    hearing: Hearing,
     pitch_mm: f64,
     steps: [f64; 6],
     current: f64,
     dice: Chance,
 }
 
-impl<'a> Walk<'a> {
-    fn new(start: Shape, witnesses: &'a [Witness], pitch_mm: f64, seed: u64) -> Self {
+impl Walk {
+    fn new(start: Shape, witnesses: &[Witness], pitch_mm: f64, seed: u64) -> Self {
         let near = |w: &&Witness| start.distance_mm(w.place).abs() <= NEAR * pitch_mm;
         let mut steps = [pitch_mm; 6];
         if let Shape::Rectangle(rectangle) = start {
             let [a, b] = rectangle.sizes_mm();
             steps[0] = pitch_mm / a.max(b);
         }
+        let all = witnesses.iter().filter(near).copied().collect();
         let mut walk = Self {
             shape: start,
-            witnesses: witnesses.iter().filter(near).map(Heard::of).collect(),
-            sharpness_mm: pitch_mm,
+            hearing: Hearing::new(thinned(all), start, pitch_mm, pitch_mm),
             pitch_mm,
             steps,
             current: 0.0,
             dice: Chance::new(seed, WALK),
         };
-        walk.thin();
-        walk.soften(pitch_mm);
+        walk.current = walk.hearing.log_likelihood(&start);
         walk
-    }
-
-    /// Leaves every so many witnesses where there are more than are needed.
-    fn thin(&mut self) {
-        let stride = self.witnesses.len().div_ceil(MOST_WITNESSES).max(1);
-        let mut index = 0;
-        self.witnesses.retain(|_| {
-            index += 1;
-            (index - 1) % stride == 0
-        });
     }
 
     /// Leaves out the witnesses that always say the same from here on.
     fn narrow(&mut self) {
-        let shape = self.shape;
+        let distance_mm = self.shape.distances();
         let within = NARROW * self.pitch_mm;
-        self.witnesses
-            .retain(|w| shape.distance_mm(w.witness.place).abs() <= within);
-        self.thin();
+        let mut all = core::mem::take(&mut self.hearing.all);
+        all.retain(|witness| distance_mm(witness.place).abs() <= within);
+        self.hearing.all = thinned(all);
     }
 
     fn soften(&mut self, sharpness_mm: f64) {
-        self.sharpness_mm = sharpness_mm;
-        self.current = self.log_likelihood(&self.shape);
+        let all = core::mem::take(&mut self.hearing.all);
+        self.hearing = Hearing::new(all, self.shape, sharpness_mm, self.pitch_mm);
+        self.current = self.hearing.log_likelihood(&self.shape);
     }
 
     fn sweep(&mut self, adapt: bool) {
@@ -225,11 +169,12 @@ impl<'a> Walk<'a> {
             }
             let chance = self.dice.unit();
             let taken = self.shape.with(&numbers).is_some_and(|shape| {
-                let likelihood = self.log_likelihood(&shape);
+                let likelihood = self.hearing.log_likelihood(&shape);
                 let taken = libm::log(chance.max(1e-300)) < likelihood - self.current;
                 if taken {
                     self.shape = shape;
                     self.current = likelihood;
+                    self.hearing.follow(&shape);
                 }
                 taken
             });
@@ -257,21 +202,9 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn log_likelihood(&self, shape: &Shape) -> f64 {
-        let scale = 1.0 / self.sharpness_mm;
-        let mut sum = 0.0;
-        let mut next = 0;
-        let places = self.witnesses.iter().map(|w| w.witness.place);
-        shape.distances(places, |distance| {
-            sum += self.witnesses[next].log_likelihood(distance, scale);
-            next += 1;
-        });
-        sum
-    }
-
     fn contradicted(&self, shape: &Shape) -> (usize, usize) {
         let (mut far, mut all) = (0, 0);
-        for Heard { witness, .. } in &self.witnesses {
+        for witness in &self.hearing.all {
             let distance = shape.distance_mm(witness.place);
             if distance.abs() > NARROW * self.pitch_mm || witness.doubt > 0.1 {
                 continue;
@@ -284,4 +217,10 @@ impl<'a> Walk<'a> {
         }
         (far, all)
     }
+}
+
+/// Every so many witnesses where there are more than are needed.
+fn thinned(all: Vec<Witness>) -> Vec<Witness> {
+    let stride = all.len().div_ceil(MOST_WITNESSES).max(1);
+    all.into_iter().step_by(stride).collect()
 }

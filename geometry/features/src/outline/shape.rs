@@ -1,5 +1,7 @@
 //! Shapes that outlines are taken for: circles and rectangles with rounded corners.
 
+use core::f64::consts::SQRT_2;
+
 /// An outline in the plan, millimetres and radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Shape {
@@ -75,6 +77,15 @@ impl Rectangle {
         self.distance_by(place, sin, cos)
     }
 
+    /// Its corners in the plan, as if they were sharp.
+    fn corners(&self) -> [[f64; 2]; 4] {
+        let (sin, cos) = libm::sincos(self.angle_rad);
+        [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(first, second)| {
+            let [a, b] = [self.first_mm[first], self.second_mm[second]];
+            [a * cos - b * sin, a * sin + b * cos]
+        })
+    }
+
     fn distance_by(&self, [u, v]: [f64; 2], sin: f64, cos: f64) -> f64 {
         let [a, b] = [u * cos + v * sin, v * cos - u * sin];
         let half = self.sizes_mm().map(|size| 0.5 * size);
@@ -89,30 +100,53 @@ impl Rectangle {
 }
 
 impl Shape {
-    /// Signed distances of places, negative inside; told one after the other.
-    pub fn distances(&self, places: impl Iterator<Item = [f64; 2]>, mut told: impl FnMut(f64)) {
-        match self {
+    /// Tells signed distances of places, negative inside; for many places of one shape.
+    pub fn distances(&self) -> impl Fn([f64; 2]) -> f64 + '_ {
+        let (sin, cos) = match self {
+            Self::Circle(_) => (0.0, 1.0),
+            Self::Rectangle(rectangle) => libm::sincos(rectangle.angle_rad),
+        };
+        move |place| match self {
             Self::Circle(circle) => {
-                for [u, v] in places {
-                    let [du, dv] = [u - circle.centre_mm[0], v - circle.centre_mm[1]];
-                    told((du * du + dv * dv).sqrt() - circle.radius_mm);
-                }
+                let [u, v] = place;
+                let [du, dv] = [u - circle.centre_mm[0], v - circle.centre_mm[1]];
+                (du * du + dv * dv).sqrt() - circle.radius_mm
             }
-            Self::Rectangle(rectangle) => {
-                let (sin, cos) = libm::sincos(rectangle.angle_rad);
-                for place in places {
-                    told(rectangle.distance_by(place, sin, cos));
-                }
-            }
+            Self::Rectangle(rectangle) => rectangle.distance_by(place, sin, cos),
         }
     }
 
     /// Signed distance of one place, negative inside.
     #[must_use]
     pub fn distance_mm(&self, place: [f64; 2]) -> f64 {
-        let mut found = 0.0;
-        self.distances([place].into_iter(), |distance| found = distance);
-        found
+        self.distances()(place)
+    }
+
+    /// By how much no signed distance differs between two shapes of one kind, millimetres.
+    #[must_use]
+    pub fn shift_mm(&self, other: &Self) -> f64 {
+        let apart = |one: [f64; 2], other: [f64; 2]| {
+            let [du, dv] = [one[0] - other[0], one[1] - other[1]];
+            (du * du + dv * dv).sqrt()
+        };
+        match (self, other) {
+            (Self::Circle(one), Self::Circle(other)) => {
+                apart(one.centre_mm, other.centre_mm) + (one.radius_mm - other.radius_mm).abs()
+            }
+            (Self::Rectangle(one), Self::Rectangle(other)) => {
+                // Borders of sharp rectangles are nowhere further apart than their corners. The
+                // middle of a round lies a diagonal away from its corner and turns with it.
+                let furthest = (one.corners().into_iter().zip(other.corners()))
+                    .map(|(one, other)| apart(one, other))
+                    .fold(0.0, f64::max);
+                let corner_mm = one.corner_mm.max(other.corner_mm);
+                let turn_rad = (one.angle_rad - other.angle_rad).abs();
+                furthest
+                    + SQRT_2 * corner_mm * turn_rad
+                    + (SQRT_2 - 1.0) * (one.corner_mm - other.corner_mm).abs()
+            }
+            _ => f64::INFINITY,
+        }
     }
 
     /// The box around it along u and v: least and greatest, millimetres.

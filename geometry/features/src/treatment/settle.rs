@@ -246,19 +246,15 @@ impl Edge {
         };
         let section = Self::section(form, numbers);
         let sign = if self.is_inside { -1.0 } else { 1.0 };
-        let mut heights = self.places.iter().map(|own| own.height_mm);
-        let mut sum = 0.0;
         let rise_mm = section.rise_mm();
-        shape.distances(
-            self.places.iter().map(|own| own.beside(rise_mm)),
-            |distance| {
-                if let Some(height) = heights.next() {
-                    sum += self.strays.log_likelihood(section, sign * distance, height);
-                }
-            },
-        );
+        let distance_mm = shape.distances();
+        let of_places = self.places.iter().map(|own| {
+            let distance_mm = sign * distance_mm(own.beside(rise_mm));
+            self.strays
+                .log_likelihood(section, distance_mm, own.height_mm)
+        });
         let ways = numbers[TURN..].iter();
-        sum + ways.map(|way| self.known.log_likelihood(*way)).sum::<f64>()
+        of_places.sum::<f64>() + ways.map(|way| self.known.log_likelihood(*way)).sum::<f64>()
     }
 
     /// Moves all walls out of the material that the section is of.
