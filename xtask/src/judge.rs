@@ -1,6 +1,8 @@
 //! Lets independent programs judge the CAD files of simulated scans.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -79,6 +81,9 @@ const SHAPES: [&str; 17] = [
     "ring-revolution",
 ];
 
+/// The program that writes them.
+const SAMPLES: &str = "write_sample";
+
 /// The IGES entities that know their neighbours without sewing.
 const SHELLS: &str = "186";
 
@@ -91,6 +96,14 @@ struct Case {
     creases: u32,
     /// They must be so in the IGES file, too.
     is_shell: bool,
+}
+
+/// Installs and builds what judges.
+pub(crate) fn prepare() -> Result<()> {
+    let place = shell::root().join("target/judges");
+    python(&place, &[])?;
+    cadmpeg(&place)?;
+    shell::run("cargo", &["build", "--release", "--example", SAMPLES])
 }
 
 /// Scans every object through the pseudo-terminal and the service, and has the IGES and the
@@ -115,12 +128,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
             failed.push(format!("{name}: {error}"));
         }
     }
-    for name in SHAPES {
-        println!("\n{name}");
-        if let Err(error) = judges.shape(name, &scenes) {
-            failed.push(format!("{name}: {error}"));
-        }
-    }
+    failed.extend(judges.shapes(&scenes)?);
     for case in cases(options.seeds, options.no_recorded) {
         let folder = scenes.join(&case.name);
         if folder.exists() {
@@ -252,10 +260,34 @@ impl Judges {
         Ok(())
     }
 
-    /// A rectangle of a shape by its numbers, in IGES and in STEP.
-    fn shape(&self, name: &str, scenes: &Path) -> Result<()> {
+    /// A rectangle of each shape, as many at a time as there are processors; gives what failed.
+    fn shapes(&self, scenes: &Path) -> Result<Vec<String>> {
         std::fs::create_dir_all(scenes)
             .with_context(|| format!("cannot make {}", scenes.display()))?;
+        shell::run("cargo", &["build", "--release", "--example", SAMPLES])?;
+        let next = AtomicUsize::new(0);
+        let failed = Mutex::new(Vec::new());
+        let work = || {
+            while let Some(name) = SHAPES.get(next.fetch_add(1, Ordering::Relaxed)) {
+                let judged = self.shape(name, scenes);
+                println!(
+                    "{name}: {}",
+                    if judged.is_ok() { "sound" } else { "FAILED" }
+                );
+                let mut failed = failed.lock().unwrap_or_else(PoisonError::into_inner);
+                failed.extend(judged.err().map(|error| format!("{name}: {error}")));
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+                scope.spawn(work);
+            }
+        });
+        Ok(failed.into_inner().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// A rectangle of a shape by its numbers, in IGES and in STEP.
+    fn shape(&self, name: &str, scenes: &Path) -> Result<()> {
         let file = |ending: &str| {
             scenes
                 .join(format!("{name}.{ending}"))
@@ -271,16 +303,10 @@ impl Judges {
             (shells, SHELLS),
             (file("step"), "ap242"),
         ];
+        let program = shell::target().join("release/examples").join(SAMPLES);
+        let program = program.display().to_string();
         for (file, kind) in &files {
-            let example = [
-                "run",
-                "--quiet",
-                "--release",
-                "--example",
-                "write_sample",
-                "--",
-            ];
-            shell::quiet("cargo", &[&example[..], &[file, kind, name]].concat())?;
+            shell::quiet(&program, &[file, kind, name])?;
         }
         let [(iges, _), (shells, _), (step, _)] = &files;
         let check = "tests/judges/occ_check.py";

@@ -113,7 +113,7 @@ fn main() -> anyhow::Result<()> {
         Chore::Units => units::check(),
         Chore::Programs => {
             study::build()?;
-            judge::python(&shell::root().join("target/judges"), &[]).map(drop)
+            judge::prepare()
         }
         Chore::Deb(options) => deb::run(&options),
         Chore::Vm(vm) => vm::run(&vm),

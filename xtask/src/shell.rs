@@ -17,6 +17,27 @@ pub(crate) fn target() -> PathBuf {
     root().join(chosen.map_or_else(|| "target".into(), PathBuf::from))
 }
 
+/// What `cargo run` tells the program that it runs of its package, by the beginning of the name.
+const TOLD_BY_CARGO: [&str; 4] = [
+    "CARGO_PKG_",
+    "CARGO_MANIFEST_",
+    "CARGO_BIN_",
+    "CARGO_CRATE_",
+];
+
+/// A program that finds the environment of this one as it was before `cargo run`: build scripts of
+/// libraries ask for those variables, and would build anew whatever was built without.
+fn command(program: &str) -> Command {
+    let mut command = Command::new(program);
+    for (name, _) in std::env::vars_os() {
+        let is_told = |prefix: &str| name.to_string_lossy().starts_with(prefix);
+        if TOLD_BY_CARGO.iter().any(|prefix| is_told(prefix)) {
+            command.env_remove(&name);
+        }
+    }
+    command
+}
+
 /// Runs a program in the workspace's root; its output goes where ours does.
 pub(crate) fn run(program: &str, arguments: &[&str]) -> Result<()> {
     run_with(program, arguments, &[])
@@ -29,7 +50,7 @@ pub(crate) fn run_with(
     environment: &[(&str, String)],
 ) -> Result<()> {
     eprintln!("$ {program} {}", arguments.join(" "));
-    let status = Command::new(program)
+    let status = command(program)
         .args(arguments)
         .envs(environment.iter().map(|(name, value)| (name, value)))
         .current_dir(root())
@@ -56,7 +77,7 @@ pub(crate) fn output(program: &str, arguments: &[&str]) -> Result<String> {
 /// Runs a program in the workspace's root; `told` is the part of its output that tells why
 /// it failed.
 fn captured(program: &str, arguments: &[&str], told: fn(&Output) -> &[u8]) -> Result<Output> {
-    let output = Command::new(program)
+    let output = command(program)
         .args(arguments)
         .current_dir(root())
         .output()

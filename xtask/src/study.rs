@@ -206,8 +206,7 @@ pub(crate) fn service() -> Result<()> {
     shell::run("cargo", &["build", "--release", "--bin", "reliefd"])
 }
 
-/// Builds all studies, and the service. From here, since libraries with build scripts are built anew
-/// where the environment differs, and that of a chore does.
+/// Builds all studies, and the service.
 pub(crate) fn build() -> Result<()> {
     let programs = ["study-*", "scan-scene", "soak", "reliefd"];
     let named = programs.iter().flat_map(|name| ["--bin", name]);

@@ -19,7 +19,7 @@ const PREFACE: &str = "tests/studies/study-features/preface.md";
 const MILLION_PITCH: &str = "0.0893";
 const MILLION: &str = "million";
 /// Runs of which the fastest counts: what else the machine does only makes them slower.
-const RUNS: usize = 3;
+const RUNS: usize = 5;
 /// Most seconds for a million samples on two processors.
 const MILLION_MOST_S: f64 = 3.0;
 /// Of a short study.
