@@ -47,7 +47,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("terraces", &["nurbs"]),
     ("fill", &["nurbs", "range-image"]),
     ("gaps", &["fill", "range-image"]),
-    ("features", &["nurbs", "range-image", "segment", "terraces"]),
+    (
+        "features",
+        &["nurbs", "range-image", "segment", "shapes", "terraces"],
+    ),
     (
         "pipeline",
         &[

@@ -7,6 +7,7 @@ use nurbs::BSplineSurface;
 
 use crate::candidate::Lie;
 use crate::class::Class;
+use crate::floor::Curve;
 use crate::outline::Shape;
 use crate::thread::nominal_thread;
 
@@ -67,6 +68,8 @@ pub struct Feature {
     pub lie: Option<Lie>,
     /// What it ends in.
     pub bottom: Bottom,
+    /// The sphere or cylinder that a free form is part of, if it is of one.
+    pub curve: Option<Curve>,
     /// Whether it goes through the part.
     pub through: bool,
     /// What the user should know.

@@ -14,7 +14,7 @@ pub mod edges;
 pub mod edit;
 pub mod feature;
 pub mod field;
-mod floor;
+pub mod floor;
 pub mod frame;
 pub mod levels;
 pub mod measure;

@@ -10,7 +10,7 @@ use crate::class::Class;
 use crate::code::{Attributes, Form, Sense, code, written};
 use crate::feature::{Bottom, Dimension, Feature};
 use crate::field::{FieldError, field};
-use crate::floor::free_form;
+use crate::floor::{curve, free_form};
 use crate::frame::Frame;
 use crate::levels::{AROUND, Levels, levels};
 use crate::measure::measured;
@@ -231,6 +231,21 @@ fn feature(
     let host = sight.levels.levels[usize::from(candidate.host)].plane;
     let own = measured(sight, candidate, known, host.as_ref(), step_mm);
     warnings.extend(own.warnings);
+    for vague in own
+        .dimensions
+        .iter()
+        .filter(|d| d.sigma_mm > sight.field.pitch_mm())
+    {
+        warnings.push(format!(
+            "its {} is known to {:.1} mm only: too little of its border was seen",
+            vague.name, vague.sigma_mm
+        ));
+    }
+    let bottom = bottom(sight, candidate, own.heights_mm.1);
+    let curve = match bottom {
+        Bottom::FreeForm(_) => curve(sight, candidate),
+        Bottom::Level | Bottom::Unseen | Bottom::Tip(_) => None,
+    };
     Feature {
         id,
         parent,
@@ -245,7 +260,8 @@ fn feature(
         outline: candidate.outline.shape,
         heights_mm: own.heights_mm,
         lie: Some(candidate.lie),
-        bottom: bottom(sight, candidate, own.heights_mm.1),
+        bottom,
+        curve,
         through: own.through,
         warnings,
         is_edited: false,
@@ -352,6 +368,7 @@ fn edge(sight: &Sight<'_>, treatment: &Treatment, of: &Feature, id: u32) -> Feat
         heights_mm: (treatment.level_mm, Some(end)),
         lie: None,
         bottom: Bottom::Level,
+        curve: None,
         through: false,
         warnings: Vec::new(),
         is_edited: false,

@@ -333,6 +333,8 @@ def failures(name, parts):
     slack = 3.0 * math.sqrt(0.05 * 0.95 / stated) if stated and stated < 2000 else 0.0
     if not stated or not COVERED[0] - slack <= inside / stated <= min(1.0, COVERED[1] + slack):
         out.append(f"95 % intervals cover {share(inside, stated)}")
+    out += [f"{part}: {kind}'s {number} off by {error:.2f} mm without a warning"
+            for part, kind, number, error, _ in misleading(parts)]
     if name.startswith("published"):
         out += [f"{p['name']}: not all found and rightly nested" for p in parts if not whole(p)]
     if name == "published":

@@ -9,6 +9,7 @@ use std::io::Write;
 
 use features::arrangement::{Along, Pattern};
 use features::feature::Feature;
+use features::floor::{Curve, CurveKind};
 use features::recognise::Recognition;
 use serde::Serialize;
 
@@ -79,6 +80,9 @@ pub struct FeatureEntry {
     pub dimensions_mm: BTreeMap<&'static str, f64>,
     /// Their standard uncertainties, and those of the centre along the axes of `frame`.
     pub sigma_mm: SigmaEntry,
+    /// The sphere or cylinder that its floor or top is part of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub floor: Option<FloorEntry>,
     /// Whether it goes through the part.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub through: bool,
@@ -90,6 +94,37 @@ pub struct FeatureEntry {
     /// Whether the user changed something of it; what is theirs has an uncertainty of 0.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub edited: bool,
+}
+
+/// A floor or top that is part of a sphere or a cylinder.
+#[derive(Debug, Clone, Serialize)]
+pub struct FloorEntry {
+    /// `sphere` or `cylinder`.
+    pub kind: &'static str,
+    /// Its radius.
+    pub radius_mm: f64,
+    /// Standard uncertainty of that.
+    pub sigma_mm: f64,
+    /// Whether it is seen from within, as a groove is.
+    pub hollow: bool,
+    /// Unit vector along a cylinder.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis: Option<[f64; 3]>,
+}
+
+impl FloorEntry {
+    fn of(curve: &Curve) -> Self {
+        Self {
+            kind: curve.kind.as_str(),
+            radius_mm: round(curve.radius.value_mm, LEAST_MM),
+            sigma_mm: round(curve.radius.sigma_mm, LEAST_MM),
+            hollow: curve.is_hollow,
+            axis: match curve.kind {
+                CurveKind::Sphere => None,
+                CurveKind::Cylinder(axis) => Some(rounded(axis.into(), 1e-9)),
+            },
+        }
+    }
 }
 
 /// Standard uncertainties, millimetres.
@@ -170,6 +205,7 @@ impl FeatureEntry {
                     .collect(),
                 center: rounded(feature.centre_sigma_mm, LEAST_MM),
             },
+            floor: feature.curve.as_ref().map(FloorEntry::of),
             through: feature.through,
             thread_guess: feature.thread(),
             warnings: feature.warnings.clone(),

@@ -19,6 +19,10 @@ pub struct Tip {
 const SLOPES: core::ops::Range<f64> = 0.2..1.2;
 /// Samples stray from the cone by at most this share of its height, and their noise.
 const STRAYS: f64 = 0.12;
+/// Squares of distances count up to this, in variances of the noise.
+const MOST: f64 = 16.0;
+/// A difference of their sums that is hardly ever by chance.
+const CLEARLY: f64 = 16.0;
 /// Fewest samples.
 const FEWEST: usize = 12;
 
@@ -46,12 +50,30 @@ pub(super) fn tip(sight: &Sight<'_>, level: u16, shape: &Shape) -> Option<Tip> {
     let height = side.slope * circle.radius_mm;
     let is_cone = SLOPES.contains(&side.slope)
         && side.count >= FEWEST
-        && side.rms_mm <= STRAYS * height + 1.5 * sight.field.noise_mm;
+        && side.rms_mm <= STRAYS * height + 1.5 * sight.field.noise_mm
+        && !is_round(&places, &side, sight.field.noise_mm);
     is_cone.then(|| Tip {
         shoulder_mm: side.at_zero + height,
         sigma_mm: side.sigma_mm(circle.radius_mm),
         slope: side.slope,
     })
+}
+
+/// Whether the places speak for a ball, whose heights grow by the square of the distance, and clearly
+/// against the line.
+fn is_round(places: &[(f64, f64)], side: &Line, noise_mm: f64) -> bool {
+    let squared: Vec<(f64, f64)> = places.iter().map(|(far, z)| (far * far, *z)).collect();
+    let Some(ball) = line(&squared, noise_mm) else {
+        return false;
+    };
+    let left_over = |line: &Line, places: &[(f64, f64)]| -> f64 {
+        let off = |(far, z): &(f64, f64)| (z - line.at_zero - line.slope * far) / noise_mm;
+        places
+            .iter()
+            .map(|place| off(place).powi(2).min(MOST))
+            .sum()
+    };
+    left_over(side, places) > left_over(&ball, &squared) + CLEARLY
 }
 
 /// A line of heights over a distance.

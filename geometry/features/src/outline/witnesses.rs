@@ -16,6 +16,8 @@ use crate::sight::Sight;
 
 /// Nodes to either side of the border whose samples are asked.
 const REACH: usize = 3;
+/// And in the shadow of a wall.
+const FURTHEST: usize = 60;
 /// Columns beyond the last ones of the scan.
 const BEYOND: u32 = 4;
 /// Samples within so many deviations of a surface lie on it.
@@ -78,11 +80,12 @@ impl Zone {
         let mut nearest = vec![(NOBODY, u32::MAX); columns * rows];
         let (mut low, mut high) = (usize::MAX, 0);
         for (index, pair) in (0_u32..).zip(pairs) {
+            let [back, forth] = beyond_shadow(sight, pair);
             for node in [pair.inner, pair.outer] {
                 let (column, row) = (node / rows, node % rows);
                 for c in column.saturating_sub(REACH)..=(column + REACH).min(columns - 1) {
                     (low, high) = (low.min(c), high.max(c));
-                    for r in row.saturating_sub(REACH)..=(row + REACH).min(rows - 1) {
+                    for r in row.saturating_sub(back)..=(row + forth).min(rows - 1) {
                         let far = c.abs_diff(column).pow(2) + r.abs_diff(row).pow(2);
                         let far = u32::try_from(far).unwrap_or(u32::MAX);
                         let entry = &mut nearest[c * rows + r];
@@ -102,6 +105,35 @@ impl Zone {
     fn pair(&self, node: usize) -> Option<usize> {
         let (index, _) = *self.node.get(node)?;
         (index != NOBODY).then_some(index as usize)
+    }
+}
+
+/// How many nodes before and behind a pair samples are asked: where a high wall hides the lower surface
+/// further than that, up to where it is seen again.
+fn beyond_shadow(sight: &Sight<'_>, pair: &Pair) -> [usize; 2] {
+    let (upper, lower) = match pair.sense {
+        Sense::Falls => (pair.inner, pair.outer),
+        Sense::Rises => (pair.outer, pair.inner),
+        Sense::Level => return [REACH; 2],
+    };
+    let image = &sight.field.image;
+    let rows = sight.regions.rows;
+    let (x_mm, y_mm) = (image.x_mm(upper / rows), image.y_mm(upper % rows));
+    let z_mm = |node: usize| height(sight, node, x_mm, y_mm).map(|(z_mm, _)| z_mm);
+    let (Some(upper_mm), Some(lower_mm)) = (z_mm(upper), z_mm(lower)) else {
+        return [REACH; 2];
+    };
+    let own = ray(sight.camera_mm, y_mm, upper_mm);
+    let hidden_mm = passes(sight.camera_mm, own, lower_mm) - y_mm;
+    let hidden = (hidden_mm.abs() / image.pitch_mm()).ceil() as usize;
+    if hidden <= REACH + 1 {
+        return [REACH; 2];
+    }
+    let far = (hidden + REACH).min(FURTHEST);
+    if hidden_mm < 0.0 {
+        [far, REACH]
+    } else {
+        [REACH, far]
     }
 }
 

@@ -65,6 +65,14 @@ fn line(feature: &FeatureEntry) -> Vec<String> {
             }
         })
         .collect();
+    if let Some(floor) = &feature.floor {
+        let of = match feature.parent.is_some() && feature.dimensions_mm.contains_key("height") {
+            true => "top",
+            false => "floor",
+        };
+        let (kind, radius, sigma) = (floor.kind, floor.radius_mm, floor.sigma_mm);
+        sizes.push(format!("{of} a {kind} of radius {radius:.3} ({sigma:.3})"));
+    }
     if feature.through {
         sizes.push("through".to_owned());
     }

@@ -1,9 +1,10 @@
-//! Floors that are no planes, as B-splines over the plan.
+//! A floor as a B-spline over the plan.
 
 use std::sync::Arc;
 
 use nurbs::{BSplineSurface, KnotVector, Observation, TensorSpline};
 
+use super::samples;
 use crate::candidate::Candidate;
 use crate::rebuild::BEYOND_MM;
 use crate::sight::Sight;
@@ -23,14 +24,7 @@ pub(crate) fn free_form(
     sight: &Sight<'_>,
     candidate: &Candidate,
 ) -> Option<Arc<BSplineSurface<1>>> {
-    let floors: Vec<u16> = candidate
-        .levels
-        .iter()
-        .filter_map(|level| sight.levels.levels[usize::from(*level)].regions.first())
-        .copied()
-        .collect();
-    let observations: Vec<Observation> = sight
-        .samples(&|region| floors.contains(&region))
+    let observations: Vec<Observation> = samples(sight, candidate)
         .into_iter()
         .map(|[u, v, value]| Observation {
             u,
