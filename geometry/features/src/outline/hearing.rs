@@ -176,7 +176,7 @@ mod tests {
                 let distance_mm = shape.distances();
                 let plain: f64 = all
                     .iter()
-                    .map(|w| w.likelihood(distance_mm(w.place), hearing.scale).ln())
+                    .map(|w| libm::log(w.likelihood(distance_mm(w.place), hearing.scale)))
                     .sum();
                 assert!((hearing.log_likelihood(&shape) - plain).abs() < 1e-9 * plain.abs());
                 // No place is nearer to one and further from the other than they are apart.
