@@ -30,7 +30,16 @@ const MOST_MISSING: f64 = 400.0;
 /// Rays beyond the first and the last of the scan.
 const BEYOND: f64 = 4.0;
 
+/// Scans by formula have no noise, and distances are told in it: it is taken for so much at least,
+/// millimetres.
+const LEAST_NOISE_MM: f64 = 1e-3;
+
 impl Sight<'_> {
+    /// Standard deviation of samples along their rays, millimetres; never zero.
+    pub(crate) fn sigma_mm(&self) -> f64 {
+        self.field.noise_mm.max(LEAST_NOISE_MM)
+    }
+
     /// The rays of a column that came back with something, and z of what they met, in order.
     pub(crate) fn rays_of(&self, column: &Column) -> Vec<(f64, f64)> {
         let samples = column.samples().iter();

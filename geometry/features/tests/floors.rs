@@ -10,9 +10,10 @@ use features::floor::CurveKind;
 use features::recognise::Recognition;
 
 const TABLE_MM: f64 = -25.0;
+const NOISE_MM: f64 = 0.05;
 
 /// Scans a block turned by 5 degrees, with what is cut into it.
-fn block(table_mm: f64, floor_mm: &dyn Fn(f64, f64) -> Option<f64>) -> Recognition {
+fn block(noise_mm: f64, table_mm: f64, floor_mm: &dyn Fn(f64, f64) -> Option<f64>) -> Recognition {
     let (sin, cos) = libm::sincos(5f64.to_radians());
     let part = |x: f64, y: f64| {
         let (u, v) = (cos * x + sin * y, cos * y - sin * x);
@@ -23,6 +24,7 @@ fn block(table_mm: f64, floor_mm: &dyn Fn(f64, f64) -> Option<f64>) -> Recogniti
     };
     let bench = Bench {
         y_mm: (-60.0, 60.0),
+        noise_mm,
         ..Bench::default()
     };
     recognised(&bench, &part)
@@ -30,7 +32,16 @@ fn block(table_mm: f64, floor_mm: &dyn Fn(f64, f64) -> Option<f64>) -> Recogniti
 
 #[test]
 fn the_radii_of_a_ball_and_of_a_groove_are_told() {
-    let found = block(TABLE_MM, &|u, v| {
+    radii_are_told(NOISE_MM);
+}
+
+#[test]
+fn they_are_told_of_a_scan_without_noise() {
+    radii_are_told(0.0);
+}
+
+fn radii_are_told(noise_mm: f64) {
+    let found = block(noise_mm, TABLE_MM, &|u, v| {
         let [du, dv] = [u + 20.0, v];
         let from_ball = du * du + dv * dv;
         if from_ball < 144.0 {
@@ -66,7 +77,7 @@ fn the_radii_of_a_ball_and_of_a_groove_are_told() {
 
 #[test]
 fn a_wavy_floor_is_part_of_neither() {
-    let found = block(TABLE_MM, &|u, v| {
+    let found = block(NOISE_MM, TABLE_MM, &|u, v| {
         let is_pocket = u.abs() < 25.0 && v.abs() < 15.0;
         is_pocket.then(|| -8.0 + libm::sin(0.2 * u) * libm::cos(0.15 * v))
     });
@@ -80,7 +91,7 @@ fn a_wavy_floor_is_part_of_neither() {
 #[test]
 fn a_wall_that_hides_what_is_below_for_ten_samples_is_where_it_is() {
     // Beside a camera this low the table is seen again 4 mm, or ten samples, from the edge.
-    let found = block(-45.0, &|_, _| None);
+    let found = block(NOISE_MM, -45.0, &|_, _| None);
     let width = found.features[0].dimension("width").unwrap();
     assert!((width.value_mm - 56.0).abs() < 0.1, "{width:?}");
     assert!(width.sigma_mm < 0.1, "{width:?}");

@@ -51,7 +51,7 @@ pub(super) fn tip(sight: &Sight<'_>, level: u16, shape: &Shape) -> Option<Tip> {
     let is_cone = SLOPES.contains(&side.slope)
         && side.count >= FEWEST
         && side.rms_mm <= STRAYS * height + 1.5 * sight.field.noise_mm
-        && !is_round(&places, &side, sight.field.noise_mm);
+        && !is_round(&places, &side, sight.sigma_mm());
     is_cone.then(|| Tip {
         shoulder_mm: side.at_zero + height,
         sigma_mm: side.sigma_mm(circle.radius_mm),

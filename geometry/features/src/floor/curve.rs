@@ -90,6 +90,6 @@ fn sample(sight: &Sight<'_>, local: [f64; 3]) -> Sample {
     Sample {
         point_mm,
         ray: Vector3::new(0.0, aside_mm, 1.0).normalize(),
-        sigma_mm: sight.field.noise_mm,
+        sigma_mm: sight.sigma_mm(),
     }
 }
