@@ -20,7 +20,6 @@ impl Draws {
 
     /// Three distinct indices below `number`, which must be from 3 to 2^21.
     pub(crate) fn triple(&mut self, number: usize) -> [usize; 3] {
-        const BITS: u32 = 21;
         let random = self.generator.next_u64();
         let below = |shift: u32, limit: usize| {
             let part = (random >> shift) & ((1 << BITS) - 1);
@@ -41,7 +40,39 @@ impl Draws {
         }
         [first, second, third]
     }
+
+    /// The next `number` triples below `limit`, which must be from 3 to 2^11: the indices of a
+    /// triple in one lane of the three arrays, in lanes without a triple any below the limit.
+    #[inline(always)]
+    pub(crate) fn triples<const LANES: usize>(
+        &mut self,
+        number: usize,
+        limit: u32,
+    ) -> [[u32; LANES]; 3] {
+        let mut randoms = [0; LANES];
+        for random in randoms.iter_mut().take(number) {
+            *random = self.generator.next_u64();
+        }
+        let mut triples = [[0; LANES]; 3];
+        for (lane, random) in randoms.into_iter().enumerate() {
+            let below = |shift: u32, limit: u32| {
+                let part = (random >> shift) as u32 & ((1 << BITS) - 1);
+                (part * limit) >> BITS
+            };
+            let first = below(0, limit);
+            let mut second = below(BITS, limit - 1);
+            second += u32::from(second >= first);
+            let mut third = below(2 * BITS, limit - 2);
+            third += u32::from(third >= first.min(second));
+            third += u32::from(third >= first.max(second));
+            [triples[0][lane], triples[1][lane], triples[2][lane]] = [first, second, third];
+        }
+        triples
+    }
 }
+
+/// Random bits for one index.
+const BITS: u32 = 21;
 
 /// The finaliser of SplitMix64: neighbouring keys to unrelated ones.
 fn mix(key: u64) -> u64 {
@@ -75,6 +106,20 @@ mod tests {
         assert_eq!(drawn.len(), 60);
         // 1000 expected of each; 5 sigma is 158.
         assert!(drawn.iter().all(|c| (840..1160).contains(c)), "{drawn:?}");
+    }
+
+    #[test]
+    fn triples_in_lanes_are_those_one_by_one() {
+        for limit in [3, 4, 32, 49, 1024, 2048] {
+            let (mut one, mut many) = (Draws::new(3, 1, 2), Draws::new(3, 1, 2));
+            for number in [8, 8, 5, 8] {
+                let [p, q, r] = many.triples::<8>(number, limit);
+                for k in 0..number {
+                    let triple = [p[k], q[k], r[k]].map(|index| index as usize);
+                    assert_eq!(triple, one.triple(limit as usize));
+                }
+            }
+        }
     }
 
     #[test]

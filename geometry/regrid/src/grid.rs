@@ -9,8 +9,9 @@ use range_image::{GridColumn, Lattice, NodeQuality};
 use crate::consensus::{Consensus, Noise, Silhouette, noise};
 use crate::draws::Draws;
 use crate::exhaustive;
+use crate::least_median::LeastMedian;
 use crate::neighbours::{Neighbour, Search};
-use crate::plane::{Plane, PlaneFinder};
+use crate::plane::{Fit, Plane};
 use crate::settings::{Estimator, LEAST_WINDOW, RegridSettings};
 use crate::strip::{Strip, typical};
 use crate::support::{Place, Surroundings};
@@ -20,7 +21,7 @@ use crate::window::{Spacing, Window};
 #[derive(Debug, Default)]
 pub(crate) struct GridWorker {
     search: Search,
-    finder: PlaneFinder,
+    median: LeastMedian,
     surroundings: Surroundings,
     consensus: Consensus,
     silhouette: Silhouette,
@@ -152,7 +153,7 @@ impl GridWorker {
             return None;
         }
         if settings.estimator == Estimator::LeastSquares {
-            let fit = self.finder.least_squares(nearest)?;
+            let fit = Fit::least_squares(nearest)?;
             let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm, dense);
             let supported = self
                 .surroundings
@@ -178,8 +179,7 @@ impl GridWorker {
             let fit = if settings.estimator == Estimator::ExhaustiveLeastMedian {
                 exhaustive::least_median(&self.samples, &mut self.lengths)?
             } else {
-                self.finder
-                    .least_median(&self.samples, settings.draws, &mut draws)?
+                self.median.fit(&self.samples, settings.draws, &mut draws)?
             };
             if fit.tolerance > support.inlier_ceiling * spacing.mean_mm {
                 // No surface has a majority; the nearer half may show one.

@@ -28,6 +28,7 @@ mod draws;
 mod error;
 mod exhaustive;
 mod grid;
+mod least_median;
 mod neighbours;
 mod plane;
 mod regridder;
@@ -41,5 +42,6 @@ mod window;
 
 pub use batch::{regrid, with_threads};
 pub use error::RegridError;
+pub use least_median::{GREATEST_WINDOW, LeastMedian};
 pub use regridder::Regridder;
 pub use settings::{Estimator, RegridSettings, Roi, SettingsError, SupportSettings};

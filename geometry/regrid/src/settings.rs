@@ -3,6 +3,8 @@
 use core::cmp::Ordering;
 use core::fmt;
 
+use crate::least_median::GREATEST_WINDOW;
+
 /// How z at a node is estimated from its window of samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Estimator {
@@ -254,7 +256,7 @@ impl RegridSettings {
             }
         };
         number("pitch_mm", self.pitch_mm, 1e-3, 1e3)?;
-        count("neighbours", self.neighbours, LEAST_WINDOW, 1024)?;
+        count("neighbours", self.neighbours, LEAST_WINDOW, GREATEST_WINDOW)?;
         count("draws", self.draws, 1, 100_000)?;
         count("reach_columns", self.reach_columns, 1, 1000)?;
         count("threads", self.threads, 0, 1024)?;
