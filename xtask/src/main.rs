@@ -4,6 +4,7 @@ mod apt;
 mod deb;
 mod fillings;
 mod fuzz;
+mod instructions;
 mod judge;
 mod peers;
 mod reproduce;
@@ -69,6 +70,18 @@ enum Chore {
     /// Measure one part of the product at length.
     #[command(subcommand)]
     Study(study::Study),
+    /// Print how fast each stage is, beside peers measured in the same run.
+    #[command(disable_help_flag = true)]
+    Bench {
+        /// Options of the bench; `--help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
+    /// Count the instructions that each stage takes for a node; fails if they have grown by more
+    /// than a tenth.
+    ///
+    /// Needs valgrind; installs it on Debian as root.
+    Instructions(instructions::Options),
     /// Keep the service at work, and watch its memory, descriptors and threads.
     #[command(disable_help_flag = true)]
     Soak {
@@ -106,6 +119,8 @@ fn main() -> anyhow::Result<()> {
         Chore::Reproduce(options) => reproduce::run(&options),
         Chore::Fuzz(options) => fuzz::run(&options),
         Chore::Study(study) => study::run(&study),
+        Chore::Bench { options } => study::program("bench", &options),
+        Chore::Instructions(options) => instructions::run(&options),
         Chore::Soak { options } => {
             study::service()?;
             study::program("soak", &options)
@@ -113,6 +128,7 @@ fn main() -> anyhow::Result<()> {
         Chore::Units => units::check(),
         Chore::Programs => {
             study::build()?;
+            instructions::build()?;
             judge::prepare()
         }
         Chore::Deb(options) => deb::run(&options),

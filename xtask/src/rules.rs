@@ -100,6 +100,17 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("relief-tests", &EVERYTHING),
     ("relief-studies", &STUDIES),
+    ("relief-test-libraries", &[]),
+    (
+        "relief-benches",
+        &[
+            "cad-exchange",
+            "pipeline",
+            "range-image",
+            "regrid",
+            "segment",
+        ],
+    ),
     (
         "relief-surfaces",
         &[

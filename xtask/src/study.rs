@@ -206,9 +206,9 @@ pub(crate) fn service() -> Result<()> {
     shell::run("cargo", &["build", "--release", "--bin", "reliefd"])
 }
 
-/// Builds all studies, and the service.
+/// Builds all studies, and the product.
 pub(crate) fn build() -> Result<()> {
-    let programs = ["study-*", "scan-scene", "soak", "reliefd"];
+    let programs = ["study-*", "scan-scene", "soak", "relief", "reliefd"];
     let named = programs.iter().flat_map(|name| ["--bin", name]);
     let words: Vec<&str> = ["build", "--release"].into_iter().chain(named).collect();
     shell::run("cargo", &words)

@@ -1,0 +1,79 @@
+//! How fast each stage is, beside peers measured in the same run.
+//!
+//! ```sh
+//! cargo xtask bench
+//! ```
+
+mod mlms;
+mod row;
+mod scan;
+mod stages;
+mod timing;
+mod work;
+
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::Parser;
+
+/// Measure how fast each stage is
+#[derive(Debug, Parser)]
+#[command(name = "bench", version)]
+struct Options {
+    /// Small sizes only
+    #[arg(long)]
+    short: bool,
+    /// Only stages whose name contains this
+    #[arg(long, value_name = "NAME", default_value = "")]
+    stage: String,
+    /// Do one piece of work and measure nothing, for instructions to be counted: prints how many
+    /// units it has each time
+    #[arg(long, value_name = "NAME", value_parser = work::WORK.map(|(name, _)| name))]
+    work: Option<String>,
+    /// How many times the work is done
+    #[arg(long, value_name = "TIMES", default_value_t = 1, requires = "work")]
+    #[arg(value_parser = clap::value_parser!(u64).range(1..))]
+    times: u64,
+    /// Rows as JSON, one in a line, instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+fn main() -> ExitCode {
+    match run(&Options::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("bench: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+type Bench = fn(bool) -> Result<Vec<row::Row>>;
+
+const BENCHES: [(&str, Bench); 2] = [
+    ("MLMS kernel", mlms::rows),
+    ("stages of a scan", stages::rows),
+];
+
+fn run(options: &Options) -> Result<()> {
+    if let Some(name) = &options.work {
+        println!("{}", work::work(name, options.times)?);
+        return Ok(());
+    }
+    if !options.json {
+        println!("{}", row::HEAD);
+    }
+    let wanted = options.stage.to_lowercase();
+    let matches = |name: &str| name.to_lowercase().contains(&wanted);
+    for (_, rows) in BENCHES.iter().filter(|(name, _)| matches(name)) {
+        for row in rows(options.short)? {
+            if options.json {
+                println!("{}", serde_json::to_string(&row)?);
+            } else {
+                println!("{row}");
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,77 @@
+//! Work that is done again and again, for instructions to be counted: whatever more turns take
+//! more is the work's own.
+
+use std::hint::black_box;
+
+use anyhow::{Context, Result};
+use pipeline::Outcome;
+use range_image::{RangeImage, Unmonitored};
+use regrid::{Estimator, LeastMedian};
+use segment::{SegmentSettings, segment};
+
+use crate::mlms::windows;
+use crate::scan::house;
+use crate::stages::{iges_file, processed, regridded};
+
+/// Columns of the scan, and samples of each.
+const SCAN: (u32, u32) = (72, 72);
+
+/// What is done, and for each of what instructions are told.
+pub(crate) const WORK: [(&str, &str); 6] = [
+    ("mlms-32", "node"),
+    ("mlms-128", "node"),
+    ("regrid-mlms", "node"),
+    ("regrid-consensus", "node"),
+    ("segment", "node"),
+    ("iges", "node"),
+];
+
+/// Does the work so many times, and says how many units it has each time.
+pub(crate) fn work(name: &str, times: u64) -> Result<usize> {
+    match name {
+        "mlms-32" => Ok(mlms(32, times)),
+        "mlms-128" => Ok(mlms(128, times)),
+        "regrid-mlms" => regrid(Estimator::LeastMedian, times),
+        "regrid-consensus" => regrid(Estimator::Consensus, times),
+        "segment" => {
+            let (image, _) = scan()?;
+            for _ in 0..times {
+                black_box(segment(&image, &SegmentSettings::default(), &Unmonitored)?);
+            }
+            Ok(image.valid_nodes())
+        }
+        "iges" => {
+            let (image, outcome) = scan()?;
+            for _ in 0..times {
+                black_box(iges_file(&outcome)?);
+            }
+            Ok(image.valid_nodes())
+        }
+        _ => None.with_context(|| format!("there is no work called {name}")),
+    }
+}
+
+fn mlms(planes: usize, times: u64) -> usize {
+    let windows = windows(32, 500);
+    let mut finder = LeastMedian::default();
+    for _ in 0..times {
+        for (seed, window) in windows.iter().enumerate() {
+            black_box(finder.plane(window, planes, seed as u64));
+        }
+    }
+    windows.len()
+}
+
+fn regrid(estimator: Estimator, times: u64) -> Result<usize> {
+    let (columns, pitch_mm) = house(SCAN.0, SCAN.1);
+    let mut nodes = 0;
+    for _ in 0..times {
+        nodes = black_box(regridded(&columns, pitch_mm, estimator)?).valid_nodes();
+    }
+    Ok(nodes)
+}
+
+fn scan() -> Result<(RangeImage, Outcome)> {
+    let (columns, pitch_mm) = house(SCAN.0, SCAN.1);
+    processed(&columns, pitch_mm, &Unmonitored)
+}

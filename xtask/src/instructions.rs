@@ -1,0 +1,145 @@
+//! Instructions that each stage takes, which no other program on the machine changes.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail, ensure};
+use clap::Args;
+
+use crate::{apt, shell};
+
+#[derive(Debug, Args)]
+pub(crate) struct Options {
+    /// Write the counts down, for later ones to be held against.
+    #[arg(long)]
+    record: bool,
+}
+
+/// Counts on record, from the workspace's root.
+const RECORD: &str = "benches/instructions.json";
+/// Counts may grow to this many times those on record.
+const MOST: f64 = 1.1;
+/// What is done so many times is held against what is done once.
+const TIMES: u64 = 3;
+
+/// What is counted, as the bench calls it.
+const WORK: [&str; 6] = [
+    "mlms-32",
+    "mlms-128",
+    "regrid-mlms",
+    "regrid-consensus",
+    "segment",
+    "iges",
+];
+
+/// Counts instructions a node, and fails if they have grown.
+pub(crate) fn run(options: &Options) -> Result<()> {
+    apt::need(&[("valgrind", "valgrind")])?;
+    build()?;
+    let mut counts = BTreeMap::new();
+    for work in WORK {
+        let (once, units) = count(work, 1)?;
+        let (often, _) = count(work, 1 + TIMES)?;
+        ensure!(units > 0, "{work} has no nodes");
+        let each = often.saturating_sub(once) as f64 / (TIMES * units) as f64;
+        counts.insert(work.to_owned(), each.round());
+    }
+    let place = shell::root().join(RECORD);
+    if options.record {
+        fs::write(
+            &place,
+            format!("{}\n", serde_json::to_string_pretty(&counts)?),
+        )?;
+    }
+    let recorded: BTreeMap<String, f64> = serde_json::from_str(&fs::read_to_string(&place)?)
+        .with_context(|| format!("{RECORD} cannot be read"))?;
+    compare(&counts, &recorded)
+}
+
+/// Where the bench is built as it is delivered, whatever checks the tests' build has switched on.
+fn home() -> PathBuf {
+    shell::target().join("instructions")
+}
+
+/// Builds what is counted.
+pub(crate) fn build() -> Result<()> {
+    let off = || "false".to_owned();
+    let words = ["build", "--release", "--package", "relief-benches"];
+    shell::run_with(
+        "cargo",
+        &words,
+        &[
+            ("CARGO_TARGET_DIR", home().display().to_string()),
+            ("CARGO_PROFILE_RELEASE_DEBUG_ASSERTIONS", off()),
+            ("CARGO_PROFILE_RELEASE_OVERFLOW_CHECKS", off()),
+        ],
+    )
+}
+
+fn compare(counts: &BTreeMap<String, f64>, recorded: &BTreeMap<String, f64>) -> Result<()> {
+    let mut grown = Vec::new();
+    println!("| work | instructions a node | on record |\n|---|---:|---:|");
+    for (work, count) in counts {
+        let before = recorded
+            .get(work)
+            .with_context(|| format!("{work} is not in {RECORD}; `--record` writes it"))?;
+        println!("| {work} | {count} | {before} |");
+        if *count > MOST * before {
+            grown.push(format!("{work}: {count}, {before} on record"));
+        }
+    }
+    if grown.is_empty() {
+        return Ok(());
+    }
+    bail!(
+        "instructions a node have grown by more than {:.0} %; where that has to be, \
+         `cargo xtask instructions --record` writes the new ones down:\n  {}",
+        100.0 * (MOST - 1.0),
+        grown.join("\n  ")
+    )
+}
+
+/// Instructions of the whole program, and the units of the work.
+fn count(work: &str, times: u64) -> Result<(u64, u64)> {
+    let program = home().join("release/bench");
+    let counts = home().join("counts.out");
+    let told = format!("--cachegrind-out-file={}", counts.display());
+    let (program, times) = (program.display().to_string(), times.to_string());
+    let words = [
+        "--quiet",
+        "--tool=cachegrind",
+        "--cache-sim=no",
+        &told,
+        &program,
+        "--work",
+        work,
+        "--times",
+        &times,
+    ];
+    let said = shell::output("valgrind", &words)?;
+    let units = said
+        .trim()
+        .parse()
+        .with_context(|| format!("{work}: {said}"))?;
+    let counts = fs::read_to_string(&counts)?;
+    let summary = counts
+        .lines()
+        .find_map(|line| line.strip_prefix("summary:"))
+        .context("valgrind told no summary")?;
+    Ok((summary.trim().parse()?, units))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn growth_by_more_than_a_tenth_is_told() {
+        let counts = |count: f64| BTreeMap::from([("regrid".to_owned(), count)]);
+        assert!(compare(&counts(109.0), &counts(100.0)).is_ok());
+        let error = compare(&counts(111.0), &counts(100.0)).unwrap_err();
+        assert!(error.to_string().contains("regrid: 111, 100 on record"));
+        assert!(compare(&counts(1.0), &BTreeMap::new()).is_err());
+    }
+}
