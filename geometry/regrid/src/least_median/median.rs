@@ -1,6 +1,8 @@
 //! Medians of squared residuals in double precision.
 
-use super::window::{BLOCK, Window};
+use pulp::Simd;
+
+use super::window::Window;
 use crate::plane::Plane;
 
 /// Up to as many squares above the median are passed one by one.
@@ -8,83 +10,96 @@ const STEPS: usize = 10;
 
 /// The median of squared residuals, if it is below `least`.
 #[inline(always)]
-pub(super) fn median_below(window: &mut Window, plane: &Plane, least: f64) -> Option<f64> {
-    let middle = window.middle();
+pub(super) fn median_below<S: Simd>(
+    simd: S,
+    window: &mut Window,
+    plane: &Plane,
+    least: f64,
+) -> Option<f64> {
+    let (len, middle) = (window.len(), window.middle());
     let (samples, squares) = window.squares();
-    let mut below = Below::default();
-    for (squares, block) in squares.iter_mut().zip(samples) {
-        for (k, square) in squares.iter_mut().enumerate() {
-            let residual = block.z[k] - plane.at(block.x[k], block.y[k]);
-            *square = residual * residual;
-            below.add(k, *square, least);
-        }
-    }
-    let mut number = below.number();
+    let (mut number, mut greatest) = square_residuals(simd, samples, plane, squares, least);
     if number <= middle {
         return None;
     }
     if number > middle + STEPS {
-        let all = squares.as_flattened_mut();
-        return Some(*all.select_nth_unstable_by(middle, f64::total_cmp).1);
+        let squares = &mut squares[..len];
+        return Some(*squares.select_nth_unstable_by(middle, f64::total_cmp).1);
     }
     // The greatest square below the limit, then the greatest below that, and so on, until no
     // more are left than lie below a median.
-    loop {
-        let greatest = below.greatest();
-        if number == middle + 1 {
-            return Some(greatest);
+    while number > middle + 1 {
+        let (fewer, next) = below(simd, squares, greatest);
+        if fewer <= middle {
+            break;
         }
-        below = Below::default();
-        for squares in squares.iter() {
-            for (k, square) in squares.iter().enumerate() {
-                below.add(k, *square, greatest);
-            }
-        }
-        number = below.number();
-        if number <= middle {
-            return Some(greatest);
-        }
+        (number, greatest) = (fewer, next);
     }
+    Some(greatest)
 }
 
-/// How many squares are below a limit, and the greatest of those, in lanes.
-struct Below {
-    number: [u64; BLOCK],
-    greatest: [f64; BLOCK],
-}
-
-impl Default for Below {
-    fn default() -> Self {
-        Self {
-            number: [0; BLOCK],
-            greatest: [-1.0; BLOCK],
-        }
-    }
-}
-
-impl Below {
-    #[inline(always)]
-    fn add(&mut self, lane: usize, square: f64, limit: f64) {
-        let is_below = square < limit;
-        self.number[lane] += u64::from(is_below);
-        let square = if is_below { square } else { -1.0 };
-        self.greatest[lane] = greater(square, self.greatest[lane]);
-    }
-
-    #[inline(always)]
-    fn number(&self) -> usize {
-        self.number.iter().sum::<u64>() as usize
-    }
-
-    #[inline(always)]
-    fn greatest(&self) -> f64 {
-        let g = &self.greatest;
-        let pairs = [0, 1, 2, 3].map(|k| greater(g[k], g[k + 4]));
-        greater(greater(pairs[0], pairs[2]), greater(pairs[1], pairs[3]))
-    }
-}
-
+/// Squares the residuals, as [`Plane::residual`] has them, operation for operation; and as
+/// [`below`].
 #[inline(always)]
-fn greater(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
+fn square_residuals<S: Simd>(
+    simd: S,
+    samples: [&[f64]; 3],
+    plane: &Plane,
+    squares: &mut [f64],
+    limit: f64,
+) -> (usize, f64) {
+    let [x, y, z] = samples.map(|numbers| S::as_simd_f64s(numbers).0);
+    let [a, b, c] = [plane.a, plane.b, plane.c].map(|number| simd.splat_f64s(number));
+    let mut below = Below::new(simd, limit);
+    let squares = S::as_mut_simd_f64s(squares).0;
+    for (((square, x), y), z) in squares.iter_mut().zip(x).zip(y).zip(z) {
+        let slope = simd.add_f64s(simd.mul_f64s(a, *x), simd.mul_f64s(b, *y));
+        let residual = simd.sub_f64s(*z, simd.add_f64s(slope, c));
+        *square = simd.mul_f64s(residual, residual);
+        below.add(simd, *square);
+    }
+    below.told(simd)
+}
+
+/// How many squares are below a limit, and the greatest of those.
+#[inline(always)]
+fn below<S: Simd>(simd: S, squares: &[f64], limit: f64) -> (usize, f64) {
+    let mut below = Below::new(simd, limit);
+    for square in S::as_simd_f64s(squares).0 {
+        below.add(simd, *square);
+    }
+    below.told(simd)
+}
+
+/// What [`below`] tells, in lanes.
+struct Below<S: Simd> {
+    limit: S::f64s,
+    number: S::f64s,
+    greatest: S::f64s,
+}
+
+impl<S: Simd> Below<S> {
+    #[inline(always)]
+    fn new(simd: S, limit: f64) -> Self {
+        Self {
+            limit: simd.splat_f64s(limit),
+            number: simd.splat_f64s(0.0),
+            greatest: simd.splat_f64s(0.0),
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, simd: S, square: S::f64s) {
+        let (zero, one) = (simd.splat_f64s(0.0), simd.splat_f64s(1.0));
+        let is_below = simd.less_than_f64s(square, self.limit);
+        self.number = simd.add_f64s(self.number, simd.select_f64s(is_below, one, zero));
+        let square = simd.select_f64s(is_below, square, zero);
+        self.greatest = simd.max_f64s(self.greatest, square);
+    }
+
+    #[inline(always)]
+    fn told(self, simd: S) -> (usize, f64) {
+        let number = simd.reduce_sum_f64s(self.number) as usize;
+        (number, simd.reduce_max_f64s(self.greatest))
+    }
 }

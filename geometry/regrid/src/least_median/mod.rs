@@ -16,7 +16,7 @@ mod rough;
 mod sift;
 mod window;
 
-use multiversion::{multiversion, target::match_target};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::draws::Draws;
 use crate::neighbours::Neighbour;
@@ -89,60 +89,66 @@ impl LeastMedian {
     }
 }
 
-#[multiversion(targets(
-    "x86_64+avx2+bmi1+bmi2+fma+lzcnt+popcnt",
-    "x86_64+sse4.2+popcnt",
-    "aarch64+neon"
-))]
-fn find(finder: &mut LeastMedian, planes: usize, draws: &mut Draws) -> Option<(Plane, f64)> {
-    const FUSED: bool = match_target! {
-        "x86_64+fma" => true,
-        "aarch64+neon" => true,
-        _ => false,
-    };
-    find_in::<FUSED>(finder, planes, draws)
+/// With the widest lanes of this processor.
+fn find(finder: &mut LeastMedian, wanted: usize, draws: &mut Draws) -> Option<(Plane, f64)> {
+    Arch::new().dispatch(Find {
+        finder,
+        wanted,
+        draws,
+    })
 }
 
-/// `FUSED` if the processor multiplies and adds at once, which only the first pass may do: its
-/// slack covers either.
-#[inline(always)]
-fn find_in<const FUSED: bool>(
-    finder: &mut LeastMedian,
+/// The search for one window.
+struct Find<'a> {
+    finder: &'a mut LeastMedian,
+    /// Planes to try.
     wanted: usize,
-    draws: &mut Draws,
-) -> Option<(Plane, f64)> {
-    let LeastMedian {
-        window,
-        planes,
-        hint,
-    } = finder;
-    let rough = window.roughen();
-    let (mut tried, mut left) = (0, wanted.saturating_mul(DRAWS_PER_PLANE));
-    let mut best: Option<Plane> = None;
-    let mut least = hint.unwrap_or(f64::INFINITY);
-    while tried < wanted && left > 0 {
-        planes.clear();
-        while !planes.is_full() && tried < wanted && left > 0 {
-            let drawn = planes.room().min(wanted - tried).min(left);
-            tried += planes.draw(window, drawn, draws);
-            left -= drawn;
-        }
-        if planes.is_empty() {
-            continue;
-        }
-        let mut found = sift::best::<FUSED>(window, &rough, planes, &mut least);
-        if found.is_none() && best.is_none() {
-            least *= RAISE;
-            found = sift::best::<FUSED>(window, &rough, planes, &mut least);
-            if found.is_none() {
-                least = f64::INFINITY;
-                found = sift::best::<FUSED>(window, &rough, planes, &mut least);
+    draws: &'a mut Draws,
+}
+
+impl WithSimd for Find<'_> {
+    type Output = Option<(Plane, f64)>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let Self {
+            finder,
+            wanted,
+            draws,
+        } = self;
+        let LeastMedian {
+            window,
+            planes,
+            hint,
+        } = finder;
+        let extent = window.lay_out(simd);
+        let (mut tried, mut left) = (0, wanted.saturating_mul(DRAWS_PER_PLANE));
+        let mut best: Option<Plane> = None;
+        let mut least = hint.unwrap_or(f64::INFINITY);
+        while tried < wanted && left > 0 {
+            planes.clear();
+            while !planes.is_full() && tried < wanted && left > 0 {
+                let drawn = planes.room().min(wanted - tried).min(left);
+                tried += planes.draw(simd, window, drawn, draws);
+                left -= drawn;
             }
+            if planes.is_empty() {
+                continue;
+            }
+            planes.roughen(&extent);
+            let mut found = sift::best(simd, window, planes, &mut least);
+            // Should the guess have thrown out everything, it is raised, and then given up.
+            for raised in [RAISE * least, f64::INFINITY] {
+                if found.is_none() && best.is_none() {
+                    least = raised;
+                    found = sift::best(simd, window, planes, &mut least);
+                }
+            }
+            best = found.or(best);
         }
-        best = found.or(best);
+        *hint = best.map(|_| HINT * least);
+        Some((best?, least))
     }
-    *hint = best.map(|_| HINT * least);
-    Some((best?, least))
 }
 
 #[cfg(test)]

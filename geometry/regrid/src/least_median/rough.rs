@@ -1,20 +1,33 @@
 //! Planes in single precision, and what rounding may do to residuals from them.
 
-use super::planes::{MOST, Planes};
-use super::window::{BLOCK, Block, Extent, UNIT, UP};
+use pulp::Simd;
 
-/// Planes counted side by side.
-pub(super) const LANES: usize = 16;
-const _: () = assert!(MOST.is_multiple_of(LANES));
+use super::planes::MOST;
+use super::window::{Extent, UNIT, UP};
 
-/// Planes with heights above the window's reference. All slots are filled, also those that hold
-/// no plane: their numbers mean nothing, and nobody asks.
+/// Vectors of planes counted side by side, for as many samples to be had by one read.
+const SIDE_BY_SIDE: usize = 2;
+
+/// Planes with heights above the window's reference. Slots that hold no plane have numbers, too,
+/// which mean nothing, and nobody asks.
+#[derive(Debug)]
 pub(super) struct RoughPlanes {
     a: [f32; MOST],
     b: [f32; MOST],
     c: [f32; MOST],
     /// How much a residual in single precision may differ from the one in double precision.
     slack: [f32; MOST],
+}
+
+impl Default for RoughPlanes {
+    fn default() -> Self {
+        Self {
+            a: [0.0; MOST],
+            b: [0.0; MOST],
+            c: [0.0; MOST],
+            slack: [0.0; MOST],
+        }
+    }
 }
 
 impl RoughPlanes {
@@ -26,87 +39,93 @@ impl RoughPlanes {
     /// itself is, in proportion to the reference, too. 10 units cover what is left out here:
     /// rounding of rounded numbers, and of the bound itself.
     #[inline(always)]
-    pub(super) fn new(planes: &Planes, extent: &Extent) -> Self {
-        let mut rough = Self {
-            a: [0.0; MOST],
-            b: [0.0; MOST],
-            c: [0.0; MOST],
-            slack: [0.0; MOST],
-        };
+    pub(super) fn fill(&mut self, [a, b, c]: [&[f64; MOST]; 3], len: usize, extent: &Extent) {
         let fine = UP * (16.0 * f64::EPSILON * extent.reference.abs()) as f32;
-        for start in (0..planes.len()).step_by(LANES) {
-            for k in start..start + LANES {
-                let (a, b) = (planes.a[k] as f32, planes.b[k] as f32);
-                let c = (planes.c[k] - extent.reference) as f32;
-                let size = a.abs() * extent.x + b.abs() * extent.y + c.abs() + extent.z;
-                (rough.a[k], rough.b[k], rough.c[k]) = (a, b, c);
-                // Numbers too small to be rounded in proportion: a few of the least.
-                rough.slack[k] = 10.0 * UNIT * size + fine + f32::MIN_POSITIVE;
-            }
+        for (rough, exact) in self.a[..len].iter_mut().zip(a) {
+            *rough = *exact as f32;
         }
-        rough
+        for (rough, exact) in self.b[..len].iter_mut().zip(b) {
+            *rough = *exact as f32;
+        }
+        for (rough, exact) in self.c[..len].iter_mut().zip(c) {
+            *rough = (exact - extent.reference) as f32;
+        }
+        let slopes = self.a.iter().zip(&self.b).zip(&self.c);
+        for (slack, ((a, b), c)) in self.slack[..len].iter_mut().zip(slopes) {
+            let size = a.abs() * extent.x + b.abs() * extent.y + c.abs() + extent.z;
+            // Numbers too small to be rounded in proportion: a few of the least.
+            *slack = 10.0 * UNIT * size + fine + f32::MIN_POSITIVE;
+        }
     }
 
-    /// For the planes from `start` on, how many of the samples are surely farther from them than
-    /// the limit.
+    /// For each of the first `len` planes, how many of the samples (x, y, z) are surely farther from
+    /// it than the limit; numbers of others mean nothing.
     #[inline(always)]
-    pub(super) fn beyond<const FUSED: bool>(
+    pub(super) fn beyond<S: Simd>(
         &self,
-        start: usize,
-        samples: &[Block<f32>],
+        simd: S,
+        len: usize,
+        [x, y, z]: [&[f32]; 3],
         limit: f32,
-    ) -> [u32; LANES] {
-        let lanes = |values: &[f32; MOST]| {
-            let mut lanes = [0.0; LANES];
-            lanes.copy_from_slice(&values[start..start + LANES]);
-            lanes
-        };
+        beyond: &mut [u32; MOST],
+    ) {
+        let lanes = |numbers| S::as_simd_f32s(numbers).0;
         let (a, b, c) = (lanes(&self.a), lanes(&self.b), lanes(&self.c));
-        let limits = lanes(&self.slack).map(|slack| UP * (limit + slack));
-        let mut beyond = [0; LANES];
-        for block in samples {
-            for ((x, y), z) in block.x.iter().zip(&block.y).zip(&block.z) {
-                for l in 0..LANES {
-                    let residual = residual::<FUSED>([a[l], b[l], c[l]], *x, *y, *z);
-                    beyond[l] += u32::from(residual.abs() > limits[l]);
+        let slack = lanes(&self.slack);
+        let beyond = S::as_mut_simd_u32s(beyond).0;
+        let (limit, up) = (simd.splat_f32s(limit), simd.splat_f32s(UP));
+        let (none, one) = (simd.splat_u32s(0), simd.splat_u32s(1));
+        let vectors = len.div_ceil(S::F32_LANES).next_multiple_of(SIDE_BY_SIDE);
+        for start in (0..vectors.min(beyond.len())).step_by(SIDE_BY_SIDE) {
+            let vectors = [start, start + 1];
+            let [a, b, c] = [a, b, c].map(|numbers| vectors.map(|k| numbers[k]));
+            let limits = vectors.map(|k| simd.mul_f32s(up, simd.add_f32s(limit, slack[k])));
+            let mut counts = [none; SIDE_BY_SIDE];
+            for ((x, y), z) in x.iter().zip(y).zip(z) {
+                let [x, y, z] = [*x, *y, *z].map(|number| simd.splat_f32s(number));
+                for k in 0..SIDE_BY_SIDE {
+                    let residual = residual(simd, [a[k], b[k], c[k]], [x, y, z]);
+                    let mask = simd.greater_than_f32s(simd.abs_f32s(residual), limits[k]);
+                    counts[k] = simd.add_u32s(counts[k], simd.select_u32s(mask, one, none));
                 }
             }
+            beyond[start..start + SIDE_BY_SIDE].copy_from_slice(&counts);
         }
-        beyond
     }
 
-    /// The same for one plane.
+    /// The same for one plane, samples side by side; those that fill no vector are left out.
     #[inline(always)]
-    pub(super) fn beyond_one<const FUSED: bool>(
+    pub(super) fn beyond_one<S: Simd>(
         &self,
+        simd: S,
         index: usize,
-        samples: &[Block<f32>],
+        [x, y, z]: [&[f32]; 3],
         limit: f32,
     ) -> u32 {
-        let plane = [self.a[index], self.b[index], self.c[index]];
-        let limit = UP * (limit + self.slack[index]);
-        let mut beyond = [0; BLOCK];
-        for block in samples {
-            for (k, beyond) in beyond.iter_mut().enumerate() {
-                let residual = residual::<FUSED>(plane, block.x[k], block.y[k], block.z[k]);
-                *beyond += u32::from(residual.abs() > limit);
-            }
+        let lanes = |numbers| S::as_simd_f32s(numbers).0;
+        let [a, b, c] = [&self.a, &self.b, &self.c].map(|numbers| simd.splat_f32s(numbers[index]));
+        let limit = simd.splat_f32s(UP * (limit + self.slack[index]));
+        let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
+        let mut beyond = zero;
+        for ((x, y), z) in lanes(x).iter().zip(lanes(y)).zip(lanes(z)) {
+            let residual = residual(simd, [a, b, c], [*x, *y, *z]);
+            let is_beyond = simd.greater_than_f32s(simd.abs_f32s(residual), limit);
+            beyond = simd.add_f32s(beyond, simd.select_f32s(is_beyond, one, zero));
         }
-        beyond.iter().sum()
+        simd.reduce_sum_f32s(beyond) as u32
     }
 
+    /// A residual in single precision, and its slack.
     #[cfg(test)]
     pub(super) fn residual(&self, index: usize, [x, y, z]: [f32; 3]) -> (f32, f32) {
-        let plane = [self.a[index], self.b[index], self.c[index]];
-        (residual::<false>(plane, x, y, z), self.slack[index])
+        let (a, b, c) = (self.a[index], self.b[index], self.c[index]);
+        (z - c - a * x - b * y, self.slack[index])
     }
 }
 
+/// Fused where that is fast, which the slack covers either way.
 #[inline(always)]
-fn residual<const FUSED: bool>([a, b, c]: [f32; 3], x: f32, y: f32, z: f32) -> f32 {
-    if FUSED {
-        (-b).mul_add(y, (-a).mul_add(x, z - c))
-    } else {
-        z - c - a * x - b * y
-    }
+fn residual<S: Simd>(simd: S, [a, b, c]: [S::f32s; 3], [x, y, z]: [S::f32s; 3]) -> S::f32s {
+    let above = simd.negate_mul_add_e_f32s(a, x, simd.sub_f32s(z, c));
+    simd.negate_mul_add_e_f32s(b, y, above)
 }

@@ -1,7 +1,8 @@
 //! Against trying each plane as the definition has it.
 
+use pulp::Scalar;
+
 use super::planes::Planes;
-use super::rough::RoughPlanes;
 use super::*;
 use crate::plane::LEAST_SINE;
 
@@ -69,10 +70,16 @@ fn by_sorting(samples: &[[f64; 3]], planes: usize, draws: &mut Draws) -> Option<
 
 type Path = fn(&mut LeastMedian, usize, &mut Draws) -> Option<(Plane, f64)>;
 
-/// As dispatched, and both plain ones.
-const PATHS: [Path; 3] = [find, find_in::<false>, find_in::<true>];
+/// As dispatched, and without lanes.
+const PATHS: [Path; 2] = [find, |finder, wanted, draws| {
+    Arch::Scalar.dispatch(Find {
+        finder,
+        wanted,
+        draws,
+    })
+}];
 
-fn assert_same(finders: &mut [LeastMedian; 3], samples: &[[f64; 3]], planes: usize, node: i64) {
+fn assert_same(finders: &mut [LeastMedian; 2], samples: &[[f64; 3]], planes: usize, node: i64) {
     let truth = by_sorting(samples, planes, &mut Draws::new(9, node, 0));
     for (path, finder) in PATHS.iter().zip(finders) {
         finder.window.fill(samples.iter().copied()).unwrap();
@@ -144,17 +151,21 @@ fn residuals_in_single_precision_are_within_their_slack() {
         let scale = [2.0, 0.003, 1000.0, 1e-6][trial % 4];
         let samples = samples(&mut random, 24, height, scale, 0.05);
         window.fill(samples.iter().copied()).unwrap();
-        let extent = window.roughen();
+        let extent = window.lay_out(Scalar::new());
         planes.clear();
-        let drawn = planes.draw(&window, planes.room(), &mut Draws::new(2, trial as i64, 0));
-        let rough = RoughPlanes::new(&planes, &extent);
+        let drawn = planes.draw(
+            Scalar::new(),
+            &window,
+            planes.room(),
+            &mut Draws::new(2, trial as i64, 0),
+        );
+        planes.roughen(&extent);
         for k in 0..drawn {
             for (index, [x, y, z]) in samples.iter().enumerate() {
                 let exact = z - planes.plane(k).at(*x, *y);
-                let block = &window.rough()[index / window::BLOCK];
-                let lane = index % window::BLOCK;
-                let (residual, slack) =
-                    rough.residual(k, [block.x[lane], block.y[lane], block.z[lane]]);
+                let (residual, slack) = planes
+                    .rough
+                    .residual(k, window.rough().map(|numbers| numbers[index]));
                 let share = (f64::from(residual) - exact).abs() / f64::from(slack);
                 greatest_share = greatest_share.max(share);
             }

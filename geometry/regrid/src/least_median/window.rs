@@ -1,20 +1,11 @@
 //! A window's samples, ready for lanes.
 
-/// Samples in a block.
-pub(super) const BLOCK: usize = 8;
-const BLOCKS: usize = GREATEST_WINDOW / BLOCK;
+use pulp::Simd;
 
 /// Most samples of a window.
 pub const GREATEST_WINDOW: usize = 1024;
-
-/// Samples next to one another in memory, by coordinate. Where they do not fill the last block,
-/// it ends in samples at an infinite height, which no plane comes near.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Block<T> {
-    pub(super) x: [T; BLOCK],
-    pub(super) y: [T; BLOCK],
-    pub(super) z: [T; BLOCK],
-}
+/// Numbers are there up to a multiple of so many samples, which every width of lanes divides.
+const PADDING: usize = 16;
 
 /// What the largest numbers of a window are, rounded up, for what rounding may do.
 #[derive(Debug, Clone, Copy)]
@@ -27,36 +18,34 @@ pub(super) struct Extent {
     pub(super) reference: f64,
 }
 
+type Numbers<T> = Box<[T; GREATEST_WINDOW]>;
+
 #[derive(Debug)]
 pub(super) struct Window {
-    exact: Box<[Block<f64>; BLOCKS]>,
-    rough: Box<[Block<f32>; BLOCKS]>,
-    squares: Box<[[f64; BLOCK]; BLOCKS]>,
+    /// (x, y, z) and nothing, for samples to be picked one by one.
+    samples: Numbers<[f64; 4]>,
+    /// The same by coordinate; beyond the last sample z is no number, neither below nor beyond
+    /// anything.
+    exact: [Numbers<f64>; 3],
+    /// The same in single precision, z above the reference; 0 beyond the last sample.
+    rough: [Numbers<f32>; 3],
+    squares: Numbers<f64>,
     len: usize,
 }
 
 impl Default for Window {
     fn default() -> Self {
+        let zeros = || Box::new([0.0; GREATEST_WINDOW]);
+        let rough_zeros = || Box::new([0.0; GREATEST_WINDOW]);
         Self {
-            exact: Box::new([FAR; BLOCKS]),
-            rough: Box::new(
-                [Block {
-                    x: [0.0; BLOCK],
-                    y: [0.0; BLOCK],
-                    z: [0.0; BLOCK],
-                }; BLOCKS],
-            ),
-            squares: Box::new([[0.0; BLOCK]; BLOCKS]),
+            samples: Box::new([[0.0; 4]; GREATEST_WINDOW]),
+            exact: [zeros(), zeros(), zeros()],
+            rough: [rough_zeros(), rough_zeros(), rough_zeros()],
+            squares: zeros(),
             len: 0,
         }
     }
 }
-
-const FAR: Block<f64> = Block {
-    x: [0.0; BLOCK],
-    y: [0.0; BLOCK],
-    z: [f64::INFINITY; BLOCK],
-};
 
 /// More than rounding to single precision a few times takes away.
 pub(super) const UP: f32 = 1.0 + 4.0 * UNIT;
@@ -71,12 +60,8 @@ impl Window {
         if !(3..=GREATEST_WINDOW).contains(&self.len) {
             return None;
         }
-        if !self.len.is_multiple_of(BLOCK) {
-            self.exact[self.len / BLOCK] = FAR;
-        }
-        for (k, [x, y, z]) in samples.enumerate() {
-            let block = &mut self.exact[k / BLOCK % BLOCKS];
-            (block.x[k % BLOCK], block.y[k % BLOCK], block.z[k % BLOCK]) = (x, y, z);
+        for (slot, [x, y, z]) in self.samples.iter_mut().zip(samples) {
+            *slot = [x, y, z, 0.0];
         }
         Some(())
     }
@@ -85,67 +70,60 @@ impl Window {
         self.len
     }
 
-    /// Samples with those that fill the last block.
-    pub(super) fn padded_len(&self) -> usize {
-        self.len.next_multiple_of(BLOCK)
-    }
-
     /// Squares below the median.
     pub(super) fn middle(&self) -> usize {
         (self.len - 1) / 2
     }
 
-    /// A sample; in single precision comparisons its height is that above the reference.
+    /// (x, y, z) and nothing of a sample.
     #[inline(always)]
-    pub(super) fn sample(&self, index: u32) -> [f64; 3] {
-        let index = index as usize;
-        let block = &self.exact[index / BLOCK % BLOCKS];
-        let k = index % BLOCK;
-        [block.x[k], block.y[k], block.z[k]]
+    pub(super) fn sample(&self, index: u32) -> [f64; 4] {
+        self.samples[index as usize % GREATEST_WINDOW]
     }
 
+    /// x, y and z of the samples in single precision.
     #[inline(always)]
-    pub(super) fn rough(&self) -> &[Block<f32>] {
-        &self.rough[..self.len.div_ceil(BLOCK)]
+    pub(super) fn rough(&self) -> [&[f32]; 3] {
+        let [x, y, z] = &self.rough;
+        [&x[..self.len], &y[..self.len], &z[..self.len]]
     }
 
-    /// Samples, and room for the square of each one's residual.
+    /// x, y and z of the samples, and room for the square of each one's residual; with what is
+    /// there beyond the last sample.
     #[inline(always)]
-    pub(super) fn squares(&mut self) -> (&[Block<f64>], &mut [[f64; BLOCK]]) {
-        let blocks = self.len.div_ceil(BLOCK);
-        (&self.exact[..blocks], &mut self.squares[..blocks])
+    pub(super) fn squares(&mut self) -> ([&[f64]; 3], &mut [f64]) {
+        let padded = self.len.next_multiple_of(PADDING);
+        let [x, y, z] = &self.exact;
+        let exact = [&x[..padded], &y[..padded], &z[..padded]];
+        (exact, &mut self.squares[..padded])
     }
 
-    /// Makes the samples in single precision. Their heights are taken from the nearest one's, so
-    /// that little is lost to rounding.
+    /// Lays the samples out for lanes, in both precisions. Heights in single precision are taken
+    /// from the nearest sample's, so that little is lost to rounding.
     #[inline(always)]
-    pub(super) fn roughen(&mut self) -> Extent {
-        let blocks = self.len.div_ceil(BLOCK);
-        let reference = self.exact[0].z[0];
-        let (mut x, mut y, mut z) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
-        for (rough, exact) in self.rough.iter_mut().zip(self.exact.iter()).take(blocks) {
-            for k in 0..BLOCK {
-                rough.x[k] = exact.x[k] as f32;
-                rough.y[k] = exact.y[k] as f32;
-                rough.z[k] = (exact.z[k] - reference) as f32;
-                x[k] = greater(rough.x[k].abs(), x[k]);
-                y[k] = greater(rough.y[k].abs(), y[k]);
-                let height = rough.z[k].abs();
-                z[k] = greater(if height < f32::INFINITY { height } else { 0.0 }, z[k]);
+    pub(super) fn lay_out<S: Simd>(&mut self, simd: S) -> Extent {
+        let (len, padded) = (self.len, self.len.next_multiple_of(PADDING));
+        let reference = self.samples[0][2];
+        let origins = [0.0, 0.0, reference];
+        let mut greatest = [0.0; 3];
+        for k in 0..3 {
+            let (exact, rough) = (&mut self.exact[k], &mut self.rough[k]);
+            for (number, sample) in exact[..len].iter_mut().zip(&self.samples[..len]) {
+                *number = sample[k];
             }
+            exact[len..padded].fill(f64::NAN);
+            let origin = origins[k];
+            for (number, exact) in rough[..len].iter_mut().zip(&exact[..len]) {
+                *number = (exact - origin) as f32;
+            }
+            rough[len..padded].fill(0.0);
+            let mut lanes = simd.splat_f32s(0.0);
+            for numbers in S::as_simd_f32s(&rough[..padded]).0 {
+                lanes = simd.max_f32s(lanes, simd.abs_f32s(*numbers));
+            }
+            greatest[k] = UP * simd.reduce_max_f32s(lanes);
         }
-        let greatest = |lanes: [f32; BLOCK]| UP * lanes.into_iter().fold(0.0, greater);
-        Extent {
-            x: greatest(x),
-            y: greatest(y),
-            z: greatest(z),
-            reference,
-        }
+        let [x, y, z] = greatest;
+        Extent { x, y, z, reference }
     }
-}
-
-/// One comparison; `f32::max` takes care of what is not a number, too, with several.
-#[inline(always)]
-fn greater(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }
