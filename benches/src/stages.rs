@@ -17,7 +17,7 @@ use crate::timing::seconds;
 const TURNS: usize = 3;
 
 /// Columns and samples of each.
-const SIZES: [(u32, u32); 2] = [(240, 256), (1000, 1000)];
+const SIZES: [(u32, u32); 2] = [(240, 256), (480, 512)];
 
 pub(crate) fn rows(short: bool) -> Result<Vec<Row>> {
     let sizes = if short { &SIZES[..1] } else { &SIZES[..] };
