@@ -34,6 +34,9 @@ struct Options {
     #[arg(long, value_name = "TIMES", default_value_t = 1, requires = "work")]
     #[arg(value_parser = clap::value_parser!(u64).range(1..))]
     times: u64,
+    /// Print what the textbook of MLMS answers for so many windows, for others to be held against
+    #[arg(long, value_name = "WINDOWS", conflicts_with = "work")]
+    answers: Option<usize>,
     /// Rows as JSON, one in a line, instead of a table
     #[arg(long)]
     json: bool,
@@ -60,6 +63,9 @@ fn run(options: &Options) -> Result<()> {
     if let Some(name) = &options.work {
         println!("{}", work::work(name, options.times)?);
         return Ok(());
+    }
+    if let Some(number) = options.answers {
+        return mlms::print_answers(number);
     }
     if !options.json {
         println!("{}", row::HEAD);

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 
-use crate::{apt, shell};
+use crate::{apt, judge, shell};
 
 #[derive(Debug, Args)]
 pub(crate) struct Options {
@@ -22,6 +22,9 @@ const RECORD: &str = "benches/instructions.json";
 const MOST: f64 = 1.1;
 /// What is done so many times is held against what is done once.
 const TIMES: u64 = 3;
+
+/// Windows of each size that NumPy is asked for.
+const WINDOWS: &str = "25";
 
 /// What is counted, as the bench calls it.
 const WORK: [&str; 6] = [
@@ -55,6 +58,19 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     let recorded: BTreeMap<String, f64> = serde_json::from_str(&fs::read_to_string(&place)?)
         .with_context(|| format!("{RECORD} cannot be read"))?;
     compare(&counts, &recorded)
+}
+
+/// Holds the textbook that the bench measures our kernel against to what NumPy answers.
+pub(crate) fn judge_textbook() -> Result<()> {
+    build()?;
+    let python = judge::python(&shell::root().join("target/judges"), &[])?;
+    let program = home().join("release/bench").display().to_string();
+    let answers = shell::output(&program, &["--answers", WINDOWS])?;
+    let place = home().join("answers.jsonl");
+    fs::write(&place, answers)?;
+    let told = place.display().to_string();
+    let script = "tests/judges/regrid/least_median.py";
+    shell::run(&python, &["-B", script, &told])
 }
 
 /// Where the bench is built as it is delivered, whatever checks the tests' build has switched on.

@@ -54,6 +54,10 @@ enum Chore {
     ///
     /// Needs Python 3; installs the judge's packages into `target/judges`.
     JudgeFill(fillings::Options),
+    /// Let NumPy judge the textbook of MLMS that `bench` measures ours against.
+    ///
+    /// Needs Python 3; installs the judge's packages into `target/judges`.
+    JudgeTextbook,
     /// Let OpenCASCADE judge solids of random parts, rebuilt from their features.
     ///
     /// Needs Python 3; installs the judge's packages into `target/judges`.
@@ -120,6 +124,7 @@ fn main() -> anyhow::Result<()> {
         Chore::Fuzz(options) => fuzz::run(&options),
         Chore::Study(study) => study::run(&study),
         Chore::Bench { options } => study::program("bench", &options),
+        Chore::JudgeTextbook => instructions::judge_textbook(),
         Chore::Instructions(options) => instructions::run(&options),
         Chore::Soak { options } => {
             study::service()?;

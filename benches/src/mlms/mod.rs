@@ -2,7 +2,7 @@
 
 mod textbook;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use regrid::LeastMedian;
 
 use crate::row::Row;
@@ -51,6 +51,25 @@ fn row((samples, planes): (usize, usize), short: bool) -> Result<Row> {
         ns: each_ns(ours_s),
         peer: Some(("textbook", theirs_s / ours_s)),
     })
+}
+
+/// Prints windows with the textbook's answers, a line of JSON each.
+pub(crate) fn print_answers(number: usize) -> Result<()> {
+    for (samples, planes) in SIZES {
+        for (seed, window) in windows(samples, number).iter().enumerate() {
+            let answer = textbook::least_median(window, planes, seed as u64);
+            let (plane, median) = answer.context("all triples are collinear")?;
+            let line = serde_json::json!({
+                "samples": window,
+                "planes": planes,
+                "seed": seed,
+                "plane": plane,
+                "median": median,
+            });
+            println!("{line}");
+        }
+    }
+    Ok(())
 }
 
 /// The best plane is the same one, solved in two ways.
