@@ -11,9 +11,11 @@ mod stages;
 mod timing;
 mod work;
 
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Parser;
 
 /// Measure how fast each stage is
@@ -37,6 +39,9 @@ struct Options {
     /// Print what the textbook of MLMS answers for so many windows, for others to be held against
     #[arg(long, value_name = "WINDOWS", conflicts_with = "work")]
     answers: Option<usize>,
+    /// Write the table into this page, too, between its marks
+    #[arg(long, value_name = "FILE", conflicts_with = "work")]
+    write: Option<PathBuf>,
     /// Rows as JSON, one in a line, instead of a table
     #[arg(long)]
     json: bool,
@@ -72,6 +77,7 @@ fn run(options: &Options) -> Result<()> {
     }
     let wanted = options.stage.to_lowercase();
     let matches = |name: &str| name.to_lowercase().contains(&wanted);
+    let mut table = row::HEAD.to_owned();
     for (_, rows) in BENCHES.iter().filter(|(name, _)| matches(name)) {
         for row in rows(options.short)? {
             if options.json {
@@ -79,7 +85,25 @@ fn run(options: &Options) -> Result<()> {
             } else {
                 println!("{row}");
             }
+            table.push_str(&format!("\n{row}"));
         }
     }
+    if let Some(page) = &options.write {
+        write(page, &table).with_context(|| format!("cannot write {}", page.display()))?;
+    }
+    Ok(())
+}
+
+const MARKS: [&str; 2] = ["<!-- bench -->\n", "<!-- /bench -->"];
+
+/// Puts the table where the page's marks are.
+fn write(page: &Path, table: &str) -> Result<()> {
+    let text = fs::read_to_string(page)?;
+    let parts = text
+        .split_once(MARKS[0])
+        .and_then(|(before, rest)| Some((before, rest.split_once(MARKS[1])?.1)));
+    let (before, after) = parts.context("the page has no marks for the table")?;
+    let [begin, end] = MARKS;
+    fs::write(page, format!("{before}{begin}{table}\n{end}{after}"))?;
     Ok(())
 }

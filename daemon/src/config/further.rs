@@ -229,9 +229,9 @@ fn cutter<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error
 }
 
 /// The section and what is wrong in it.
-type Wrong = (&'static str, String);
+pub(super) type Wrong = (&'static str, String);
 
-const DELIVERABLES: &str = "deliverables";
+pub(super) const DELIVERABLES: &str = "deliverables";
 const SURFACE: &str = "deliverables.surface";
 const SKIN: &str = "deliverables.skin";
 const TOOLPATH: &str = "deliverables.toolpath";
@@ -370,7 +370,8 @@ impl ToolpathConfig {
 
 impl DeliverablesConfig {
     /// What is made beside the trimmed model. A machine whose file has not been read gives no NC
-    /// program; [`DeliverablesConfig::unread_machine`] tells.
+    /// program, a network's no features; [`DeliverablesConfig::unread_machine`] and
+    /// [`DeliverablesConfig::unread_network`] tell.
     ///
     /// # Errors
     /// The section, and what is wrong in it.
@@ -382,7 +383,7 @@ impl DeliverablesConfig {
             surface: surface.transpose()?,
             skin: skin.transpose()?,
             toolpath: toolpath.transpose()?.flatten(),
-            features: self.features,
+            features: self.network().filter(|_| self.features),
             edits: self.edit.clone(),
         };
         if !self.features && !self.edit.is_empty() {

@@ -83,6 +83,7 @@ impl Config {
         let deliverables = &mut config.deliverables;
         deliverables
             .read_machine(path)
+            .and_then(|()| deliverables.read_network(path))
             // Whether it has the cutters.
             .and_then(|()| deliverables.further().map(drop))
             .map_err(|(section, message)| inconsistent(path, section, message))?;

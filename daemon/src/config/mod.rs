@@ -8,6 +8,7 @@ mod formats;
 mod further;
 mod http;
 mod load;
+mod network;
 mod overrides;
 mod processing;
 mod regularities;
@@ -33,6 +34,7 @@ pub use further::{
 };
 pub use http::HttpConfig;
 pub use load::ConfigError;
+pub use network::{NetworkChoice, NetworkContent};
 pub use overrides::OverrideError;
 pub use processing::{
     DeliverablesConfig, Estimator, Method, PageChoice, Processing, ReconstructConfig, RegridConfig,

@@ -61,6 +61,15 @@ impl Processing {
                     .to_owned(),
             });
         }
+        if settings.deliverables.unread_network().is_some() {
+            return Err(OverrideError {
+                key: "deliverables.features_network".to_owned(),
+                message: "a network's file is read with the configuration: of others the service \
+                          needs the content here, as { \"content\": \"...\" }; without a file there \
+                          are \"default\" and \"published\""
+                    .to_owned(),
+            });
+        }
         Ok(settings)
     }
 }

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::fill::FillConfig;
 use super::further::{self, SkinConfig, SurfaceConfig, ToolpathConfig};
+use super::network::NetworkChoice;
 use super::regularities::{Regularize, RegularizeUnits};
 use super::{formats, value};
 
@@ -255,6 +256,9 @@ pub struct DeliverablesConfig {
     /// Whether machining features are recognised, and the part rebuilt from them.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub features: bool,
+    /// The network that tells them; the one that is built in if left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub features_network: Option<NetworkChoice>,
     /// What is changed of the features of one scan; given with a rerun.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub edit: Vec<EditEntry>,

@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
+use deliverables::features::FeatureNetwork;
 use relief_api::SettingOverrides;
 use reliefd::Config;
-use reliefd::config::{MachineChoice, Processing};
+use reliefd::config::{MachineChoice, OverrideError, Processing};
 use serde_json::{Value, json};
 
+const PUBLISHED: &str = include_str!("../../../geometry/features/networks/published.toml");
 const MACHINE: &str = include_str!("../../../config/machine.toml");
 const ALL: &str = "[deliverables.surface]\ntolerance_mm = 0.1\n[deliverables.skin]\n\
      tolerance_mm = 0.2\nmethod = \"jo\"\nevery_mm = 2.0\n[deliverables.toolpath]\n\
@@ -208,6 +210,69 @@ fn a_scan_may_choose_otherwise() {
         Path::new("/etc/passwd").exists(),
         "or the refusal tells nothing"
     );
+}
+
+/// A network of the user's own is read with the configuration and kept with each scan.
+#[test]
+fn features_are_told_by_the_network_that_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("relief.toml");
+    let load = |text: &str| {
+        std::fs::write(&file, text).unwrap();
+        Config::load_with_files(&file).map_err(|error| error.to_string())
+    };
+    let text = "[deliverables]\nfeatures = true\nfeatures_network = \"own.toml\"\n";
+    let refused = load(text).unwrap_err();
+    assert!(
+        refused.contains("features_network: cannot read"),
+        "{refused}"
+    );
+    std::fs::write(folder.path().join("own.toml"), "kind = \"soup\"\n").unwrap();
+    let refused = load(text).unwrap_err();
+    for told in [
+        "section [deliverables]: features_network: ",
+        "own.toml is no network: ",
+    ] {
+        assert!(refused.contains(told), "{refused}");
+    }
+    std::fs::write(folder.path().join("own.toml"), PUBLISHED).unwrap();
+    let config = load(text).unwrap();
+    let told = config.deliverables.further().unwrap().features;
+    assert_eq!(told, Some(FeatureNetwork::read(PUBLISHED).unwrap()));
+    assert_ne!(told, Some(FeatureNetwork::default()));
+
+    // With a scan it stands with its content, and needs no file.
+    let kept = serde_json::to_vec(&config.processing()).unwrap();
+    let kept: Processing = serde_json::from_slice(&kept).unwrap();
+    assert_eq!(kept, config.processing());
+    assert_eq!(kept.deliverables.further().unwrap().features, told);
+
+    // Others over the network: by name those that are built in, and any by its content.
+    let own = |value: Value| -> SettingOverrides {
+        [("deliverables.features_network".to_owned(), value)].into()
+    };
+    let told_by = |value: Value| {
+        let made = config.processing().with_overrides(&own(value))?;
+        Ok(made.deliverables.further().unwrap().features)
+    };
+    let default = told_by(json!("default")).unwrap_or_else(|e: OverrideError| panic!("{e}"));
+    assert_eq!(default, Some(FeatureNetwork::default()));
+    let by_content = told_by(json!({ "content": PUBLISHED })).unwrap();
+    assert_eq!(by_content, told);
+    for (value, why) in [
+        (
+            json!("/etc/passwd"),
+            "a network's file is read with the configuration",
+        ),
+        (json!({ "content": "soup" }), "line 1"),
+        (json!(3), "\"default\", \"published\""),
+    ] {
+        let refused = told_by(value).unwrap_err().to_string();
+        assert!(refused.contains(why), "{refused}");
+    }
+    // Where features are off, no network makes them.
+    let off = load("[deliverables]\nfeatures_network = \"published\"\n").unwrap();
+    assert_eq!(off.deliverables.further().unwrap().features, None);
 }
 
 /// Changes to features are of one scan.

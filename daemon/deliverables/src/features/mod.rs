@@ -1,6 +1,7 @@
 //! Recognised features as a file.
 
 mod edits;
+mod network;
 mod picture;
 mod step;
 
@@ -14,6 +15,7 @@ use features::recognise::Recognition;
 use serde::Serialize;
 
 pub use edits::{EditEntry, EditsError, read_edits};
+pub use network::FeatureNetwork;
 pub use picture::write_features_picture;
 pub use step::{FeaturesStepError, features_solid, write_features_step};
 

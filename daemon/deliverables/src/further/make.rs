@@ -156,10 +156,10 @@ pub(crate) fn write_further(
         }
         watch.progress(1.0);
     }
-    if wanted.features {
+    if let Some(network) = &wanted.features {
         watch.stage(Stage::Features);
         if !extras.lacks_room_for(FEATURES_NAME) {
-            match recognised(inputs, &wanted.edits, watch) {
+            match recognised(inputs, network, &wanted.edits, watch) {
                 Ok(found) => write_recognised(extras, inputs, &found)?,
                 Err(stop) => left_out(extras, FEATURES_NAME, stop)?,
             }

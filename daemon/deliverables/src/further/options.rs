@@ -4,7 +4,7 @@ use toolpath::Machine;
 
 use super::machine::MachineFile;
 use super::report::{SkinSettingsReport, SurfaceSettingsReport, ToolpathSettingsReport};
-use crate::features::EditEntry;
+use crate::features::{EditEntry, FeatureNetwork};
 
 /// What is made of a scan beside the trimmed model. Nothing by default.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -15,8 +15,8 @@ pub struct Further {
     pub skin: Option<SkinOptions>,
     /// An NC program.
     pub toolpath: Option<ToolpathOptions>,
-    /// Machining features, and the part rebuilt from them.
-    pub features: bool,
+    /// Machining features, as this network tells them, and the part rebuilt from them.
+    pub features: Option<FeatureNetwork>,
     /// What is changed of them.
     pub edits: Vec<EditEntry>,
 }

@@ -1,7 +1,6 @@
 //! Machining features of the scan, where they are asked for.
 
 use features::edit::edit;
-use features::network::Classifier;
 use features::recognise::{Recognition, Settings, Teller, recognise};
 use pipeline::Observer;
 use range_image::Column;
@@ -10,7 +9,7 @@ use super::make::{Stop, threaded};
 use crate::export::file_stem;
 use crate::extras::Extras;
 use crate::features::{
-    EditEntry, FEATURES_NAME, FeaturesFile, features_solid, write_features_picture,
+    EditEntry, FEATURES_NAME, FeatureNetwork, FeaturesFile, features_solid, write_features_picture,
     write_features_step,
 };
 use crate::write::{DeliverError, Inputs};
@@ -23,6 +22,7 @@ const MOST_SAMPLES: usize = 1 << 25;
 /// Recognises the features of what was scanned.
 pub(crate) fn recognised(
     inputs: &Inputs<'_>,
+    network: &FeatureNetwork,
     edits: &[EditEntry],
     watch: &dyn Observer,
 ) -> Result<Recognition, Stop> {
@@ -55,7 +55,7 @@ pub(crate) fn recognised(
         )));
     }
     columns.sort_by(Column::compare_x);
-    let network = Classifier::shipped();
+    let network = network.classifier();
     let settings = Settings {
         teller: Teller::Network(network),
         seed: inputs.settings.regrid.seed,

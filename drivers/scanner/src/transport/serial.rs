@@ -39,6 +39,12 @@ impl SerialSettings {
     }
 }
 
+/// A port is busy for a moment after it has been closed, where the program that had it, this one
+/// perhaps, was just starting another: until that has begun, it holds what was open. So a busy port
+/// is tried again a few times before it is told to be.
+const BUSY_ATTEMPTS: u32 = 10;
+const BUSY_PAUSE: Duration = Duration::from_millis(25);
+
 /// Opens one serial port.
 #[derive(Debug)]
 pub struct SerialConnector {
@@ -103,15 +109,8 @@ impl SerialConnector {
         rustix::fs::flock(&port, FlockOperation::NonBlockingUnlock)?;
         Ok(port)
     }
-}
 
-impl Connector for SerialConnector {
-    fn name(&self) -> String {
-        self.path.clone()
-    }
-
-    fn connect(&mut self) -> Result<Box<dyn Transport>, ScannerError> {
-        self.there = Path::new(&self.path).exists();
+    fn open(&self) -> Result<Box<dyn Transport>, ScannerError> {
         let direct = self.prepare().map_err(|errno| self.refused(errno))?;
         let port = serialport::new(&self.path, self.baud_rate)
             .preserve_dtr_on_open()
@@ -128,6 +127,23 @@ impl Connector for SerialConnector {
         // late frames are told apart by their request ids.
         let _ = port.clear(ClearBuffer::All);
         Ok(Box::new(SerialTransport { port, direct }))
+    }
+}
+
+impl Connector for SerialConnector {
+    fn name(&self) -> String {
+        self.path.clone()
+    }
+
+    fn connect(&mut self) -> Result<Box<dyn Transport>, ScannerError> {
+        self.there = Path::new(&self.path).exists();
+        for _ in 1..BUSY_ATTEMPTS {
+            match self.open() {
+                Err(ScannerError::PortBusy { .. }) => std::thread::sleep(BUSY_PAUSE),
+                outcome => return outcome,
+            }
+        }
+        self.open()
     }
 
     fn appeared(&mut self) -> bool {

@@ -152,6 +152,21 @@ fn a_busy_port_names_its_holder() {
     assert!(first.status().is_ok());
 }
 
+/// As by a child of some program that has not begun its own yet.
+#[test]
+fn a_port_that_is_let_go_in_a_moment_is_not_busy() {
+    let _turn = turn();
+    let (_running, path) = serve(Device::new());
+    let holder = std::fs::File::open(&path).unwrap();
+    holder.lock().unwrap();
+    let lets_go = std::thread::spawn(move || {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+        drop(holder);
+    });
+    open(&path).identify().unwrap();
+    lets_go.join().unwrap();
+}
+
 #[test]
 fn a_hang_up_in_a_scan_is_a_lost_connection() {
     let _turn = turn();
