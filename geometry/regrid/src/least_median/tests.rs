@@ -70,8 +70,8 @@ fn by_sorting(samples: &[[f64; 3]], planes: usize, draws: &mut Draws) -> Option<
 
 type Path = fn(&mut LeastMedian, usize, &mut Draws) -> Option<(Plane, f64)>;
 
-/// As dispatched, and without lanes.
-const PATHS: [Path; 2] = [find, |finder, wanted, draws| {
+/// As dispatched, with lanes of 256 bits, and without lanes.
+const PATHS: [Path; 3] = [find, narrower, |finder, wanted, draws| {
     Arch::Scalar.dispatch(Find {
         finder,
         wanted,
@@ -79,7 +79,21 @@ const PATHS: [Path; 2] = [find, |finder, wanted, draws| {
     })
 }];
 
-fn assert_same(finders: &mut [LeastMedian; 2], samples: &[[f64; 3]], planes: usize, node: i64) {
+/// With lanes of 256 bits, where the processor has them.
+fn narrower(finder: &mut LeastMedian, wanted: usize, draws: &mut Draws) -> Option<(Plane, f64)> {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(simd) = pulp::x86::V3::try_new() {
+        let find = Find {
+            finder,
+            wanted,
+            draws,
+        };
+        return Simd::vectorize(simd, find);
+    }
+    find(finder, wanted, draws)
+}
+
+fn assert_same(finders: &mut [LeastMedian; 3], samples: &[[f64; 3]], planes: usize, node: i64) {
     let truth = by_sorting(samples, planes, &mut Draws::new(9, node, 0));
     for (path, finder) in PATHS.iter().zip(finders) {
         finder.window.fill(samples.iter().copied()).unwrap();
