@@ -25,11 +25,11 @@ struct Options {
     /// Small sizes only
     #[arg(long)]
     short: bool,
-    /// Only stages whose name contains this
-    #[arg(long, value_name = "NAME", default_value = "")]
-    stage: String,
+    /// Only the kernel of MLMS, or only the stages of a scan
+    #[arg(long, value_name = "NAME", value_parser = BENCHES.map(|(name, _)| name))]
+    only: Option<String>,
     /// Do one piece of work and measure nothing, for instructions to be counted: prints how many
-    /// units it has each time
+    /// nodes it has each time
     #[arg(long, value_name = "NAME", value_parser = work::WORK.map(|(name, _)| name))]
     work: Option<String>,
     /// How many times the work is done
@@ -39,8 +39,8 @@ struct Options {
     /// Print what the textbook of MLMS answers for so many windows, for others to be held against
     #[arg(long, value_name = "WINDOWS", conflicts_with = "work")]
     answers: Option<usize>,
-    /// Write the table into this page, too, between its marks
-    #[arg(long, value_name = "FILE", conflicts_with = "work")]
+    /// Write the whole table into this page, too, between its marks
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["work", "answers", "only", "short"])]
     write: Option<PathBuf>,
     /// Rows as JSON, one in a line, instead of a table
     #[arg(long)]
@@ -59,10 +59,7 @@ fn main() -> ExitCode {
 
 type Bench = fn(bool) -> Result<Vec<row::Row>>;
 
-const BENCHES: [(&str, Bench); 2] = [
-    ("MLMS kernel", mlms::rows),
-    ("stages of a scan", stages::rows),
-];
+const BENCHES: [(&str, Bench); 2] = [("mlms", mlms::rows), ("scan", stages::rows)];
 
 fn run(options: &Options) -> Result<()> {
     if let Some(name) = &options.work {
@@ -75,8 +72,7 @@ fn run(options: &Options) -> Result<()> {
     if !options.json {
         println!("{}", row::HEAD);
     }
-    let wanted = options.stage.to_lowercase();
-    let matches = |name: &str| name.to_lowercase().contains(&wanted);
+    let matches = |name: &str| options.only.as_ref().is_none_or(|only| only == name);
     let mut table = row::HEAD.to_owned();
     for (_, rows) in BENCHES.iter().filter(|(name, _)| matches(name)) {
         for row in rows(options.short)? {

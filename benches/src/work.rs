@@ -16,39 +16,37 @@ use crate::stages::{iges_file, processed, regridded};
 /// Columns of the scan, and samples of each.
 const SCAN: (u32, u32) = (72, 72);
 
-/// What is done, and for each of what instructions are told.
-pub(crate) const WORK: [(&str, &str); 6] = [
-    ("mlms-32", "node"),
-    ("mlms-128", "node"),
-    ("regrid-mlms", "node"),
-    ("regrid-consensus", "node"),
-    ("segment", "node"),
-    ("iges", "node"),
+/// Does its work so many times, and says how many nodes it has each time.
+type Work = fn(u64) -> Result<usize>;
+
+pub(crate) const WORK: [(&str, Work); 6] = [
+    ("mlms-32", |times| Ok(mlms(32, times))),
+    ("mlms-128", |times| Ok(mlms(128, times))),
+    ("regrid-mlms", |times| regrid(Estimator::LeastMedian, times)),
+    ("regrid-consensus", |times| {
+        regrid(Estimator::Consensus, times)
+    }),
+    ("segment", |times| {
+        let (image, _) = scan()?;
+        for _ in 0..times {
+            black_box(segment(&image, &SegmentSettings::default(), &Unmonitored)?);
+        }
+        Ok(image.valid_nodes())
+    }),
+    ("iges", |times| {
+        let (image, outcome) = scan()?;
+        for _ in 0..times {
+            black_box(iges_file(&outcome)?);
+        }
+        Ok(image.valid_nodes())
+    }),
 ];
 
-/// Does the work so many times, and says how many units it has each time.
+/// Does the work of this name.
 pub(crate) fn work(name: &str, times: u64) -> Result<usize> {
-    match name {
-        "mlms-32" => Ok(mlms(32, times)),
-        "mlms-128" => Ok(mlms(128, times)),
-        "regrid-mlms" => regrid(Estimator::LeastMedian, times),
-        "regrid-consensus" => regrid(Estimator::Consensus, times),
-        "segment" => {
-            let (image, _) = scan()?;
-            for _ in 0..times {
-                black_box(segment(&image, &SegmentSettings::default(), &Unmonitored)?);
-            }
-            Ok(image.valid_nodes())
-        }
-        "iges" => {
-            let (image, outcome) = scan()?;
-            for _ in 0..times {
-                black_box(iges_file(&outcome)?);
-            }
-            Ok(image.valid_nodes())
-        }
-        _ => None.with_context(|| format!("there is no work called {name}")),
-    }
+    let found = WORK.iter().find(|(own, _)| *own == name);
+    let (_, work) = found.with_context(|| format!("there is no work called {name}"))?;
+    work(times)
 }
 
 fn mlms(planes: usize, times: u64) -> usize {
