@@ -146,7 +146,8 @@ impl WithSimd for Find<'_> {
             }
             best = found.or(best);
         }
-        *hint = best.map(|_| HINT * least);
+        // Nothing is below 0, which coarse depths often leave.
+        *hint = best.map(|_| HINT * least).filter(|limit| *limit > 0.0);
         Some((best?, least))
     }
 }

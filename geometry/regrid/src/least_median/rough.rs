@@ -31,7 +31,9 @@ impl Default for RoughPlanes {
 }
 
 impl RoughPlanes {
-    /// The bound: of the residual `z - c - a x - b y` each of a, b, c, x, y and z is rounded once,
+    /// Takes the first `len` planes, and bounds what rounding does to residuals from them.
+    ///
+    /// Of the residual `z - c - a x - b y` each of a, b, c, x, y and z is rounded once,
     /// each product is, and each of three sums and differences, none of which is greater than
     /// `|a x| + |b y| + |c| + |z|` by more than rounding. That makes 6 units of rounding at most
     /// for a product and 5 for c and z; fused operations round less often. Heights above the
