@@ -67,6 +67,14 @@ async fn a_scan_ends_in_features_where_they_are_asked_for() -> Result<()> {
     assert_eq!(step.matches("MANIFOLD_SOLID_BREP").count(), 1);
     assert!(result.file("features.png")?.starts_with(b"\x89PNG"));
 
+    // Another network is as sure in another degree.
+    let other = [("deliverables.features_network", json!("published"))];
+    let retold = rig.rerun_to_result(&ended.scan.id, &other).await?;
+    let by_other = rig.result(&retold.result).await?.json("features.json")?;
+    let score = |told: &serde_json::Value| told["features"][0]["score"].as_f64();
+    assert!(score(&told).is_some() && score(&by_other).is_some());
+    assert_ne!(score(&told), score(&by_other));
+
     let edit = [("deliverables.edit", json!([{ "id": 0, "length": 61.5 }]))];
     let edited = rig.rerun_to_result(&ended.scan.id, &edit).await?;
     let result = rig.result(&edited.result).await?;
