@@ -100,7 +100,7 @@ fn sense(
 }
 
 /// Nodes that can be reached from the frame of what is within without entering it.
-fn reached(regions: &Regions, within: &[bool]) -> Vec<bool> {
+pub(crate) fn reached(regions: &Regions, within: &[bool]) -> Vec<bool> {
     let rows = regions.rows;
     let mut reached = vec![false; within.len()];
     let mut low = [usize::MAX; 2];

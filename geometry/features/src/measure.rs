@@ -65,9 +65,10 @@ pub fn measured(
         (w, plane.sigma_mm(at.x, at.y))
     };
     let mut warnings = Vec::new();
-    let own = match candidate.tip {
-        Some(tip) => Some((tip.shoulder_mm, tip.sigma_mm)),
-        None => floor.as_ref().map(on),
+    let own = match (candidate.tip, candidate.bowed) {
+        (Some(tip), _) => Some((tip.shoulder_mm, tip.sigma_mm)),
+        (None, Some(bowed)) => Some((bowed.end_mm, bowed.sigma_mm)),
+        (None, None) => floor.as_ref().map(on),
     };
     let base = match candidate.lie {
         Lie::Body => own.unwrap_or((0.0, 0.0)),
@@ -118,6 +119,17 @@ pub fn measured(
         warnings.push(format!(
             "its bottom is a cone of about {angle:.0} degrees; the depth is that of its edge"
         ));
+    } else if candidate.bowed.is_some() {
+        warnings.push(match candidate.lie {
+            Lie::Hollow => {
+                "it goes down to its floor without a wall: its sides are where the floor \
+                            meets the face, its depth is the greatest"
+                    .to_owned()
+            }
+            Lie::Body | Lie::Raised => "it goes up to its top without a wall: its sides are where \
+                                        that meets the face, its height is the greatest"
+                .to_owned(),
+        });
     } else if is_free && candidate.lie != Lie::Hollow {
         warnings.push("its top is no plane: heights are those of the plane through it".to_owned());
     } else if is_free {

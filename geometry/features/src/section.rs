@@ -118,6 +118,7 @@ fn cut(sight: &Sight<'_>, candidate: &Candidate, across: &Across, beside_mm: f64
         let is_own = candidate.levels.contains(&level);
         own += usize::from(is_own);
         let height = match node {
+            _ if is_inside && candidate.bowed.is_some() => bowed(sight, candidate, place),
             _ if is_inside && (!is_own || candidate.tip.is_some()) => {
                 floor(sight, candidate, point.x, point.y)
             }
@@ -173,6 +174,13 @@ fn face(sight: &Sight<'_>, node: usize, x_mm: f64, y_mm: f64) -> Option<f64> {
     let strip = strips.find(|strip| strip.region == region)?;
     let plane = sight.levels.levels[usize::from(strip.level)].plane?;
     Some(plane.z_mm(x_mm, y_mm))
+}
+
+/// Of what has no walls the section is that of the box around it: how its sides curve is not what
+/// tells a groove from a pocket, and it may be too shallow for its sides to slant.
+fn bowed(sight: &Sight<'_>, candidate: &Candidate, [u, v]: [f64; 2]) -> Option<f64> {
+    let own = candidate.bowed?;
+    Some(sight.frame.world([u, v, own.end_mm]).z)
 }
 
 /// The candidate's own floor at a place.

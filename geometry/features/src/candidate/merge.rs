@@ -130,6 +130,14 @@ fn run_on(sight: &Sight<'_>, one: &[u16], other: &[u16], step_mm: f64) -> bool {
             return false;
         }
     }
+    // A groove runs on in the plane that it is cut into, and is not part of it.
+    let bows = |set: &[u16]| {
+        let mut levels = set.iter();
+        levels.any(|level| sight.levels.levels[usize::from(*level)].bow.is_some())
+    };
+    if bows(one) != bows(other) && (is_plane(one) || is_plane(other)) {
+        return false;
+    }
     let own = border(
         &sight.field.image,
         sight.regions,

@@ -1,6 +1,7 @@
 //! What may be features: levels with their outlines, before anything says what they are.
 
 mod border_sides;
+mod bowed;
 mod merge;
 mod outlined;
 mod tip;
@@ -18,6 +19,7 @@ use crate::outline::{Outline, Shape};
 use crate::sight::Sight;
 
 pub(crate) use border_sides::side_of;
+pub use bowed::Bowed;
 pub use tip::Tip;
 pub use top::{Top, top};
 
@@ -47,6 +49,8 @@ pub struct Candidate {
     pub is_cut: bool,
     /// The cone that its floor is, of a drilled hole.
     pub tip: Option<Tip>,
+    /// How deep or high it is, of what meets its face without a wall.
+    pub bowed: Option<Bowed>,
 }
 
 /// No candidate is narrower than so many sample distances, nor of fewer nodes.
@@ -89,6 +93,7 @@ pub fn candidates(
             host: AROUND,
             is_cut: body.at_frame as f64 > CUT * (body.pairs.len() + body.at_frame) as f64,
             tip: None,
+            bowed: None,
         })
     };
     let least_mm = least_pitches.max(LEAST_PITCHES) * sight.field.pitch_mm();
@@ -169,13 +174,17 @@ fn candidate(
     seed: u64,
     least_mm: f64,
 ) -> Option<Candidate> {
-    let own = border(
+    let mut own = border(
         &sight.field.image,
         sight.regions,
         sight.levels,
         step_mm,
         &|level| set.contains(&level),
     );
+    let bow = sight.levels.levels[usize::from(*set.first()?)].bow;
+    if let Some(bow) = bow {
+        bowed::as_walls(sight, bow, &mut own);
+    }
     // Half of a square of the least width.
     let across = least_mm / sight.field.image.pitch_mm();
     if own.nodes < ((0.5 * across * across) as usize).max(FEWEST) {
@@ -193,15 +202,20 @@ fn candidate(
     };
     let host = host(sight.levels, &own, lie)?;
     let seed = seed ^ (u64::from(*set.first()?) << 32);
-    let outline = outlined::outlined(sight, &own, lie, seed)?;
+    let mut outline = outlined::outlined(sight, &own, lie, seed)?;
+    let face = sight.levels.levels[usize::from(host)].plane;
+    let bowed = bow
+        .zip(face)
+        .and_then(|(bow, face)| bowed::settled(sight, &set, bow, (&face, &own), &mut outline));
     if is_scrap(sight, &outline, own.nodes, least_mm) {
         return None;
     }
-    let tip = (lie == Lie::Hollow)
+    let tip = (lie == Lie::Hollow && bowed.is_none())
         .then(|| tip::tip(sight, *set.first()?, &outline.shape))
         .flatten();
     Some(Candidate {
         tip,
+        bowed,
         levels: set,
         lie,
         outline,

@@ -1,5 +1,6 @@
 //! Levels: floors, tops and unseen hollows, each with the slanting strips along its edges.
 
+mod bow;
 mod contact;
 mod strips;
 
@@ -8,6 +9,7 @@ use range_image::RangeImage;
 use crate::plane::Plane;
 use crate::regions::{OUTSIDE, Region, Regions};
 
+pub use bow::Bow;
 pub use contact::Sense;
 pub(crate) use contact::sense;
 
@@ -25,6 +27,8 @@ pub struct Level {
     pub is_plane: bool,
     /// Nodes of all.
     pub nodes: usize,
+    /// Of a floor that a plane beside it runs on in without a wall, which way it goes from there.
+    pub bow: Option<Bow>,
 }
 
 impl Level {
@@ -65,7 +69,9 @@ pub struct Strip {
 #[must_use]
 pub fn levels(image: &RangeImage, regions: &Regions, step_mm: f64) -> Levels {
     let contacts = contact::contacts(image, regions, step_mm);
-    let host = strips::hosts(image, regions, &contacts);
+    let slants = |region| strips::leans(regions, region, bow::LEAST_SLOPE_RAD);
+    let bows = bow::bows(image, regions, &contacts, step_mm, &slants);
+    let host = strips::hosts(image, regions, &contacts, &bows);
     let mut of_region = vec![u16::MAX; regions.regions.len()];
     let mut levels = Vec::new();
     for (index, region) in regions.regions.iter().enumerate() {
@@ -83,6 +89,7 @@ pub fn levels(image: &RangeImage, regions: &Regions, step_mm: f64) -> Levels {
             plane,
             is_plane,
             nodes: 0,
+            bow: bows[index].map(|part| part.bow),
         });
     }
     let mut strips = Vec::new();

@@ -51,15 +51,20 @@ const FLAT_SHARE: f64 = 0.25;
 const SLANT: f64 = 0.27;
 /// And the share itself by less: 8 degrees.
 const LEVEL: f64 = 0.14;
+/// Half of it lies within this share of the heights that it was chosen by, about its median: of a face
+/// with rounded edges within a tenth; of the middle of a groove, which is as level, within 0.22.
+const FLAT: f64 = 0.16;
 
 /// Unlabels what slants in regions that are a flat face and its chamfer in one.
 fn flats(image: &RangeImage, labels: &mut [u16], surfaces: &[Surface], noise_mm: f64) -> bool {
     let rows = image.rows();
-    let largest = surfaces
-        .iter()
-        .filter(|s| s.is_plane)
-        .max_by_key(|s| s.nodes);
-    let Some(reference) = largest.map(|s| s.plane) else {
+    let largest = |is_one: &dyn Fn(&&Surface) -> bool| {
+        let own = surfaces.iter().filter(is_one);
+        own.max_by_key(|s| s.nodes).map(|s| s.plane)
+    };
+    // The only face of a part may be the one that has something in it.
+    let reference = largest(&|s| s.is_plane).or_else(|| largest(&|s| s.plane.share >= PLANE_SHARE));
+    let Some(reference) = reference else {
         return false;
     };
     let window = (2.0 * DEVIATIONS * noise_mm).max(2.0 * PITCHES * image.pitch_mm());
@@ -106,7 +111,8 @@ fn flats(image: &RangeImage, labels: &mut [u16], surfaces: &[Surface], noise_mm:
         let mut level: Vec<f64> = flat
             .filter_map(|(_, node)| slope(image, labels, *node))
             .collect();
-        let is_level = crate::field::median(&mut level).is_some_and(|slope| slope < LEVEL);
+        let is_level = crate::field::median(&mut level).is_some_and(|slope| slope < LEVEL)
+            && half_within(&own[best.0..best.1]).is_some_and(|half| half < FLAT * window);
         if is_level && crate::field::median(&mut slopes).is_some_and(|slope| slope > SLANT) {
             let gone: Vec<usize> = rest().map(|(_, node)| *node).collect();
             for node in gone {
@@ -116,6 +122,14 @@ fn flats(image: &RangeImage, labels: &mut [u16], surfaces: &[Surface], noise_mm:
         }
     }
     any
+}
+
+/// How far half of the heights stray from their median at most.
+fn half_within(own: &[(f64, usize)]) -> Option<f64> {
+    let mut heights: Vec<f64> = own.iter().map(|(off, _)| *off).collect();
+    let middle = crate::field::median(&mut heights)?;
+    let mut offs: Vec<f64> = heights.iter().map(|off| (off - middle).abs()).collect();
+    crate::field::median(&mut offs)
 }
 
 /// Slope at a node, over two nodes of its region to each side.

@@ -129,6 +129,10 @@ impl Found {
         falls: bool,
         strips: &[Strip],
     ) -> Option<Self> {
+        // What has no wall has neither an edge nor a foot of one.
+        if found[of].bowed.is_some() {
+            return None;
+        }
         let of_strips = Rim::of_strips(sight, found, of, strips);
         // The cone that a drill leaves slants like a countersink; of one around such a hole there is a
         // strip.

@@ -21,7 +21,9 @@ const FACE_PITCHES: f64 = 4.0;
 /// ... and out of the outline as measured this much of its width, and so many pitches.
 const OUT: f64 = 1.0;
 const OUT_PITCHES: f64 = 3.0;
-/// A strip runs along an outline where it is seen in this share of as many sectors about its middle.
+/// A strip runs along an outline where it is seen so near to it, pitches, in this share of as many
+/// sectors about its middle.
+const NEAR_PITCHES: f64 = 4.0;
 const ALONG: f64 = 0.4;
 const SECTORS: usize = 32;
 /// Share of samples of a strip that may reach further than the strip.
@@ -68,7 +70,8 @@ impl Rim {
         let shape = found[of].outline.shape;
         let is_strip = |region: u16| strips.iter().any(|strip| strip.region == region);
         let seen = sight.samples(&is_strip);
-        if seen.len() < FEWEST || !runs_along(&seen, &shape) {
+        let near_mm = NEAR_PITCHES * sight.field.pitch_mm();
+        if seen.len() < FEWEST || !runs_along(&seen, &shape, near_mm) {
             return None;
         }
         let offs = seen
@@ -233,10 +236,11 @@ fn length_mm(shape: &Shape) -> f64 {
 }
 
 /// Whether samples lie all along an outline.
-fn runs_along(seen: &[[f64; 3]], shape: &Shape) -> bool {
+fn runs_along(seen: &[[f64; 3]], shape: &Shape, near_mm: f64) -> bool {
     let middle = shape.middle_mm();
     let mut has = [false; SECTORS];
-    for [u, v, _] in seen {
+    let is_near = |[u, v, _]: &&[f64; 3]| shape.distance_mm([*u, *v]).abs() < near_mm;
+    for [u, v, _] in seen.iter().filter(is_near) {
         let angle = libm::atan2(v - middle[1], u - middle[0]) / core::f64::consts::TAU + 0.5;
         has[((angle * SECTORS as f64) as usize).min(SECTORS - 1)] = true;
     }
