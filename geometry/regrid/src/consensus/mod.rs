@@ -9,6 +9,7 @@
 //! places of both surfaces' samples tell on whose side of the edge the node lies.
 
 mod arc;
+mod at_issue;
 mod bend;
 mod logistic;
 mod missing;
@@ -18,6 +19,7 @@ mod posterior;
 mod side;
 mod silhouette;
 mod surfaces;
+mod votes;
 mod wedge;
 
 pub(crate) use missing::Around;

@@ -3,6 +3,7 @@
 
 use core::ops::Range;
 
+use super::at_issue::AtIssue;
 use super::side::Labelled;
 
 /// How far from the line that is known others are looked at: offset, slope and bend, in
@@ -27,13 +28,13 @@ pub(crate) type Curve = [f64; 3];
 
 /// A sample that wants to have the edge on one side.
 #[derive(Debug, Clone, Copy)]
-struct Witness {
-    along: f64,
-    across: f64,
+pub(super) struct Witness {
+    pub(super) along: f64,
+    pub(super) across: f64,
     /// 1 above the edge, -1 below.
-    side: f64,
-    /// Logarithm of the odds that it tells the truth.
-    trust: f64,
+    pub(super) side: f64,
+    /// Logarithm of the odds that it tells the truth, 0 or more.
+    pub(super) trust: f64,
 }
 
 /// The samples that tell where an edge is; keeps its buffers.
@@ -121,15 +122,18 @@ impl Posterior {
             }
         }
         let value = |k: usize, number: usize| ranges[k].start + (number as f64 + 0.5) * step[k];
-        self.costs.clear();
-        for i in 0..tried[0] {
-            for j in 0..tried[1] {
-                for k in 0..tried[2] {
-                    let curve = [value(0, i), value(1, j), value(2, k)];
-                    self.costs.push(self.at_issue.cost(&curve));
-                }
-            }
-        }
+        let numbers = |place: usize| {
+            [
+                place / (tried[1] * tried[2]),
+                place / tried[2] % tried[1],
+                place % tried[2],
+            ]
+        };
+        let curves = (0..tried[0] * tried[1] * tried[2]).map(|place| {
+            let [i, j, k] = numbers(place);
+            [value(0, i), value(1, j), value(2, k)]
+        });
+        self.at_issue.costs(curves, UNLIKELY, &mut self.costs);
         let least = self.costs.iter().copied().fold(f64::INFINITY, f64::min);
         let (mut sum, mut all) = ([0.0; 3], 0.0);
         let mut likely = tried.map(|number| (number, 0));
@@ -137,11 +141,7 @@ impl Posterior {
             if *cost > least + UNLIKELY {
                 continue;
             }
-            let numbers = [
-                place / (tried[1] * tried[2]),
-                place / tried[2] % tried[1],
-                place % tried[2],
-            ];
+            let numbers = numbers(place);
             let weight = libm::exp(least - cost);
             all += weight;
             for k in 0..3 {
@@ -159,60 +159,8 @@ impl Posterior {
     }
 }
 
-fn at(curve: &Curve, along: f64) -> f64 {
+pub(super) fn at(curve: &Curve, along: f64) -> f64 {
     curve[0] + along * (curve[1] + along * curve[2])
-}
-
-/// Witnesses as the share of curves around one, in a cell of those tried, that have each on
-/// the wrong side: about `p + q (offset + slope along + bend along^2)`, cut to 0 and 1.
-#[derive(Debug, Default)]
-struct AtIssue {
-    p: Vec<f64>,
-    q: Vec<f64>,
-    along: Vec<f64>,
-    trust: Vec<f64>,
-}
-
-/// Sums kept side by side.
-const LANES: usize = 4;
-
-impl AtIssue {
-    fn clear(&mut self) {
-        for values in [&mut self.p, &mut self.q, &mut self.along, &mut self.trust] {
-            values.clear();
-        }
-    }
-
-    /// `cell` is how far the edge is moved at this place by half a cell.
-    fn push(&mut self, w: &Witness, cell: f64) {
-        let scale = 0.5 * w.side / cell;
-        self.p.push(0.5 - scale * w.across);
-        self.q.push(scale);
-        self.along.push(w.along);
-        self.trust.push(w.trust);
-    }
-
-    /// What the witnesses have against the curves around this one.
-    fn cost(&self, curve: &Curve) -> f64 {
-        let wrong = |p: f64, q: f64, along: f64| {
-            let share: f64 = p + q * at(curve, along);
-            share.clamp(0.0, 1.0)
-        };
-        let mut sums = [0.0; LANES];
-        let (p, p_left) = self.p.as_chunks::<LANES>();
-        let (q, q_left) = self.q.as_chunks::<LANES>();
-        let (along, along_left) = self.along.as_chunks::<LANES>();
-        let (trust, trust_left) = self.trust.as_chunks::<LANES>();
-        for (((p, q), along), trust) in p.iter().zip(q).zip(along).zip(trust) {
-            for k in 0..LANES {
-                sums[k] += trust[k] * wrong(p[k], q[k], along[k]);
-            }
-        }
-        for (((p, q), along), trust) in p_left.iter().zip(q_left).zip(along_left).zip(trust_left) {
-            sums[0] += trust * wrong(*p, *q, *along);
-        }
-        (sums[0] + sums[1]) + (sums[2] + sums[3])
-    }
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::logistic::logistic;
 use super::posterior::Posterior;
+use super::votes::Cells;
 
 /// A sample of one of the two surfaces, as seen from the node, in local spacings.
 #[derive(Debug, Clone, Copy)]
@@ -182,26 +183,17 @@ fn separate_where(
 /// contradict: outliers, of which whole runs along a column may happen to lie on the other
 /// surface. Tells whether there were any.
 fn take_out_strays(samples: &mut Vec<Labelled>, line: &[f64; 3]) -> bool {
+    let is_wrong = |s: &Labelled| s.label * at(line, s) <= 0.0;
+    if !samples.iter().any(is_wrong) {
+        return false;
+    }
+    let cells = Cells::of(samples, VOTERS);
     let stray = |s: &Labelled| {
-        let (mut alike, mut unlike) = (0, 0);
-        for other in samples.iter().filter(|o| o.strip != s.strip) {
-            let (du, dv) = (other.u - s.u, other.v - s.v);
-            if du * du + dv * dv <= VOTERS * VOTERS {
-                if other.label == s.label {
-                    alike += 1;
-                } else {
-                    unlike += 1;
-                }
-            }
-        }
+        let [alike, unlike] = cells.around(s);
         OUTVOTED * alike < unlike
     };
     let mut keep: Vec<bool> = Vec::with_capacity(samples.len());
-    keep.extend(
-        samples
-            .iter()
-            .map(|s| s.label * at(line, s) > 0.0 || !stray(s)),
-    );
+    keep.extend(samples.iter().map(|s| !is_wrong(s) || !stray(s)));
     let before = samples.len();
     let mut keep = keep.into_iter();
     samples.retain(|_| keep.next().unwrap_or(true));
