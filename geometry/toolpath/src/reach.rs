@@ -15,9 +15,9 @@ pub(crate) struct Reach {
     pub(crate) tip_mm: [f64; 2],
 }
 
-/// Searches from the best of some tips on, by steps that begin with `step_mm` and end with `shortest_mm`,
-/// or when what was found and the step are `enough`; the step is endless until the search has come to a
-/// first halt.
+/// Searches from the best of some tips on, of equal ones the first, by steps that begin with `step_mm` and
+/// end with `shortest_mm`, or when what was found and the step are `enough`; the step is endless until the
+/// search has come to a first halt.
 /// What it finds is no lower than what there is; in a groove it may be a little higher. `height` is that of
 /// the tip where it may stand and is below some height.
 pub(crate) fn least(
@@ -39,7 +39,8 @@ pub(crate) fn least(
         if begun.is_some_and(|begun| enough(&begun, f64::INFINITY)) {
             break;
         }
-        let below_mm = begun.map_or(f64::INFINITY, |begun| begun.height_mm);
+        // One that is hardly lower is no better.
+        let below_mm = begun.map_or(f64::INFINITY, |begun| begun.height_mm - shortest_mm);
         if let Some(height_mm) = leaves(*tip, below_mm)
             && height_mm < below_mm
         {

@@ -300,19 +300,39 @@ impl Lines<'_> {
         let starts = [amid, nearer(tips[0]), nearer(tips[1])];
         let steps_mm = [apart(a.tip_mm, b.tip_mm) / 4.0, SHORTEST * self.limit_mm];
         let reached_mm = surface_mm + REACHED * self.limit_mm;
-        // Either there is no less, or what may still be found cannot make a cusp too high.
+        let is_flat = self.field.cutter.corner_mm() == 0.0;
+        // Either there is no less, or what may still be found cannot make a cusp too high. At walls what a
+        // flat end gains for a step has no bound.
+        let gain = if is_flat { f64::INFINITY } else { GAIN };
         let enough = |reach: &reach::Reach, step_mm: f64| {
             let above = (height_mm - reach.height_mm) * nz;
-            reach.height_mm <= reached_mm || above + GAIN * step_mm <= self.limit_mm
+            reach.height_mm <= reached_mm || above + gain * step_mm <= self.limit_mm
         };
-        let reach = reach::least(
-            &|tip, below_mm| self.field.tip_below(tip, below_mm),
-            &self.field.cutter,
-            at,
-            &starts,
-            steps_mm,
-            &enough,
-        )?;
+        let search = |starts: &[[f64; 2]]| {
+            reach::least(
+                &|tip, below_mm| self.field.tip_below(tip, below_mm),
+                &self.field.cutter,
+                at,
+                starts,
+                steps_mm,
+                &enough,
+            )
+        };
+        // A flat end that has the place at its rim finds its way from some tips only.
+        let reach = if is_flat {
+            let mut found = starts.iter().filter_map(|start| search(&[*start]));
+            let mut best = found.next()?;
+            while best.height_mm > reached_mm
+                && let Some(next) = found.next()
+            {
+                if next.height_mm < best.height_mm {
+                    best = next;
+                }
+            }
+            best
+        } else {
+            search(&starts)?
+        };
         let nz = self.flatness(reach.tip_mm, at)?;
         let order = usize::from(a.strand > b.strand);
         Some(Ridge {
