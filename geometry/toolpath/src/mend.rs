@@ -35,7 +35,7 @@ const JUMP: f64 = 0.3;
 /// Places that are looked at in each direction, at most: it takes minutes. There are fewer lines then,
 /// and that is told.
 const MOST_PLACES: f64 = 4e6;
-/// How often a place is mended; at outlines nothing may come of it.
+/// How often a place near the outline is mended: nothing may come of it there.
 const MOST_TRIES: u32 = 2;
 /// Nearer to the outline than this, for the cutter's radius, nothing is told.
 const INNER: f64 = 1.0;
@@ -220,7 +220,8 @@ impl Mend<'_> {
             let is_taken = |ridge: &Ridge| {
                 let place = key(ridge.wanted, 0, 0);
                 taken.contains(&place)
-                    || tries.get(&place).is_some_and(|tries| *tries >= MOST_TRIES)
+                    || !self.is_inner(ridge.at)
+                        && tries.get(&place).is_some_and(|tries| *tries >= MOST_TRIES)
             };
             let fresh: Vec<Vec<Ridge>> = chain
                 .chunk_by(|a, b| is_taken(a) == is_taken(b))
@@ -254,21 +255,17 @@ impl Mend<'_> {
             .iter()
             .fold(first, |a, b| if b.cusp_mm > a.cusp_mm { b } else { a });
         let [a, b] = worst.tips;
-        let between = libm::hypot(b[0] - a[0], b[1] - a[1]);
-        let length = libm::hypot(
-            last.wanted[0] - first.wanted[0],
-            last.wanted[1] - first.wanted[1],
-        );
-        if length < BEYOND * between && !worst.is_reached {
-            // Along the crease.
-            return vec![a, worst.wanted, b];
+        let between = apart(a, b);
+        let around = apart(a, worst.wanted) + apart(worst.wanted, b);
+        if apart(first.wanted, last.wanted) < BEYOND * around && !worst.is_reached {
+            return self.along_crease(chain, worst);
         }
         let mut corners: Vec<[f64; 2]> = chain.iter().map(|ridge| ridge.wanted).collect();
         let least = 0.1 * self.slope_mm;
         let mut kept = vec![first.wanted];
         for corner in corners.drain(..) {
             if let Some(end) = kept.last()
-                && libm::hypot(corner[0] - end[0], corner[1] - end[1]) >= least
+                && apart(corner, *end) >= least
             {
                 kept.push(corner);
             }
@@ -276,14 +273,18 @@ impl Mend<'_> {
         let mut kept = simplified(&kept, SMOOTH * self.slope_mm);
         let beyond = BEYOND * between;
         if let [only] = kept[..] {
+            if between < least {
+                // It moves steadily there, from one tip to another hardly beside it.
+                return vec![a, only, b];
+            }
             // Along the ridge, that is across what leads from one pass to the other.
             let across = [-(b[1] - a[1]), b[0] - a[0]];
-            let share = beyond / between.max(1e-9);
+            let share = beyond / between;
             let ends = [-share, share].map(|k| [0, 1].map(|i| only[i] + k * across[i]));
             return vec![ends[0], only, ends[1]];
         }
         let extended = |from: [f64; 2], to: [f64; 2]| {
-            let length = libm::hypot(to[0] - from[0], to[1] - from[1]).max(1e-9);
+            let length = apart(from, to).max(1e-9);
             [0, 1].map(|i| to[i] + beyond * (to[i] - from[i]) / length)
         };
         if let [first, second, ..] = kept[..] {
@@ -294,6 +295,30 @@ impl Mend<'_> {
         }
         kept
     }
+
+    /// The corners of a short pass along a crease, from one of the passes beside a ridge to the other.
+    fn along_crease(&self, chain: &[Ridge], worst: &Ridge) -> Vec<[f64; 2]> {
+        let [a, b] = worst.tips;
+        if self.field.cutter.corner_mm() > 0.0 {
+            return vec![a, worst.wanted, b];
+        }
+        // The rim of a flat end stands at the crease: a step to either side of a place in it, that place
+        // is reached from another tip.
+        let mut corners = vec![a];
+        corners.extend(chain.iter().map(|ridge| ridge.wanted));
+        corners.push(b);
+        if let [_, first, .., last, _] = corners[..]
+            && apart(a, last) + apart(first, b) < apart(a, first) + apart(last, b)
+        {
+            let inner = 1..corners.len() - 1;
+            corners[inner].reverse();
+        }
+        simplified(&corners, SMOOTH * self.slope_mm)
+    }
+}
+
+fn apart(a: [f64; 2], b: [f64; 2]) -> f64 {
+    libm::hypot(a[0] - b[0], a[1] - b[1])
 }
 
 /// Ridges between the same passes from line to line.
@@ -303,12 +328,8 @@ fn chained(ridges: &[Ridge], apart_mm: f64) -> Vec<Vec<Ridge>> {
         let chains = by_strands.entry((ridge.line.0, ridge.strands)).or_default();
         let goes_on = |chain: &&mut Vec<Ridge>| {
             chain.last().is_some_and(|last| {
-                let way = libm::hypot(
-                    ridge.wanted[0] - last.wanted[0],
-                    ridge.wanted[1] - last.wanted[1],
-                );
                 let lines = ridge.line.1 - last.line.1;
-                (1..=2).contains(&lines) && way <= 6.0 * apart_mm
+                (1..=2).contains(&lines) && apart(ridge.wanted, last.wanted) <= 6.0 * apart_mm
             })
         };
         match chains.iter_mut().rev().find(goes_on) {
@@ -386,6 +407,23 @@ mod tests {
     use crate::surface::Surface;
     use crate::trace::Fineness;
 
+    fn mend<'a>(field: &'a Field<'a>, scallop_mm: f64) -> Mend<'a> {
+        let step_mm = crate::cusp::slope_step_mm(&field.cutter, scallop_mm);
+        Mend {
+            field,
+            drawing: Drawing {
+                fineness: Fineness::of(field.cutter.corner_mm(), 2e-4, 1e-4),
+                tolerance_mm: 0.005,
+                arcs: true,
+            },
+            scallop_mm,
+            level_mm: step_mm,
+            slope_mm: step_mm,
+            decimals: 4,
+            tip: &|_| None,
+        }
+    }
+
     #[test]
     fn lines_that_would_be_too_many_are_fewer_and_that_is_known() {
         let corners = [[0.0; 3], [400.0, 0.0, 0.0], [0.0, 300.0, 0.0]];
@@ -393,20 +431,7 @@ mod tests {
         let cutter = Cutter::ball(6.0).unwrap();
         let field = Field::new(&surface, cutter, 0.0);
         let apart = |scallop_mm: f64| {
-            let step_mm = crate::cusp::slope_step_mm(&cutter, scallop_mm);
-            let mend = Mend {
-                field: &field,
-                drawing: Drawing {
-                    fineness: Fineness::of(3.0, 2e-4, 1e-4),
-                    tolerance_mm: 0.005,
-                    arcs: true,
-                },
-                scallop_mm,
-                level_mm: step_mm,
-                slope_mm: step_mm,
-                decimals: 4,
-                tip: &|_| None,
-            };
+            let mend = mend(&field, scallop_mm);
             let (lines, wanted_mm) = mend.lines();
             let [places, beside] = lines.limits.map(|[low, high]| high - low);
             assert!(places / lines.step_mm * beside / lines.apart_mm <= 1.01 * MOST_PLACES);
@@ -416,5 +441,48 @@ mod tests {
         assert!(coarse > 2.0 * wanted, "{coarse} {wanted}");
         let (fine, wanted) = apart(0.2);
         assert_eq!(fine, wanted);
+    }
+
+    #[test]
+    fn every_short_pass_goes_through_what_is_wanted() {
+        let corners = [[0.0; 3], [40.0, 0.0, 0.0], [0.0, 30.0, 0.0]];
+        let surface = Surface::new(&corners, &[[0, 1, 2]]).unwrap();
+        let ridge =
+            |number: usize, tips: [[f64; 2]; 2], wanted: [f64; 2], is_reached: bool| Ridge {
+                line: (0, number),
+                at: [10.0, 10.0],
+                tips,
+                strands: [0, 1],
+                wanted,
+                is_reached,
+                nz: 1.0,
+                cusp_mm: 0.3,
+            };
+        for cutter in ["flat:4", "bull:8:2.5", "ball:6"] {
+            let field = Field::new(&surface, cutter.parse().unwrap(), 0.0);
+            let mend = mend(&field, 0.25);
+            let wanted = [10.0, 10.0];
+            // Between two tips, and where both are one, as where the tip moves steadily.
+            for tips in [[[10.0, 9.0], [10.2, 11.0]], [[10.3, 10.2]; 2]] {
+                for is_reached in [false, true] {
+                    let corners = mend.pass(&[ridge(0, tips, wanted, is_reached)]);
+                    assert!(corners.contains(&wanted), "{cutter}: {corners:?}");
+                    assert!(corners.iter().any(|corner| apart(*corner, wanted) > 0.1));
+                }
+            }
+        }
+        // In a crease the rim of a flat end needs a way through all of it, from one pass to the other.
+        let field = Field::new(&surface, Cutter::flat(4.0).unwrap(), 0.0);
+        let tips = [[10.0, 9.0], [10.0, 11.0]];
+        let chain = [[9.8, 10.2], [10.0, 10.0], [10.2, 9.9]].map(|w| ridge(0, tips, w, false));
+        let corners = mend(&field, 0.25).pass(&chain);
+        let expected = [
+            [10.0, 9.0],
+            [10.2, 9.9],
+            [10.0, 10.0],
+            [9.8, 10.2],
+            [10.0, 11.0],
+        ];
+        assert_eq!(corners, expected);
     }
 }

@@ -15,15 +15,16 @@ pub(crate) struct Reach {
     pub(crate) tip_mm: [f64; 2],
 }
 
-/// Searches from a tip on, by steps that begin with `step_mm` and end with `shortest_mm`, or when what
-/// was found and the step are `enough`.
+/// Searches from the best of some tips on, of equal ones the first, by steps that begin with `step_mm` and
+/// end with `shortest_mm`, or when what was found and the step are `enough`; the step is endless until the
+/// search has come to a first halt.
 /// What it finds is no lower than what there is; in a groove it may be a little higher. `height` is that of
 /// the tip where it may stand and is below some height.
 pub(crate) fn least(
     height: &dyn Fn([f64; 2], f64) -> Option<f64>,
     cutter: &Cutter,
     at: [f64; 2],
-    from: [f64; 2],
+    starts: &[[f64; 2]],
     [step_mm, shortest_mm]: [f64; 2],
     enough: &dyn Fn(&Reach, f64) -> bool,
 ) -> Option<Reach> {
@@ -32,17 +33,32 @@ pub(crate) fn least(
         let above = cutter.height_mm(rho)?;
         Some(height(tip, below_mm - above)? + above)
     };
-    let mut best = Reach {
-        height_mm: leaves(from, f64::INFINITY)?,
-        tip_mm: from,
-    };
     let mut step = step_mm.max(shortest_mm);
+    let mut begun: Option<Reach> = None;
+    for tip in starts {
+        if begun.is_some_and(|begun| enough(&begun, f64::INFINITY)) {
+            break;
+        }
+        // One that is hardly lower is no better.
+        let below_mm = begun.map_or(f64::INFINITY, |begun| begun.height_mm - shortest_mm);
+        if let Some(height_mm) = leaves(*tip, below_mm)
+            && height_mm < below_mm
+        {
+            begun = Some(Reach {
+                height_mm,
+                tip_mm: *tip,
+            });
+        }
+    }
+    let mut best = begun?;
     let mut turned = 0.0;
     let mut first = 0;
     // Where it came to a halt before: from there to where it is now leads along a valley.
-    let mut halt = from;
+    let mut halt = best.tip_mm;
     let mut valley = None;
-    while step >= shortest_mm && !enough(&best, step) {
+    // Steps of some length may lead on and on: how much is still to be gained is known after a halt.
+    let mut left_mm = f64::INFINITY;
+    while step >= shortest_mm && !enough(&best, left_mm) {
         let mut has_moved = false;
         for k in 0..DIRECTIONS + 2 {
             // Where it went on before it goes on best.
@@ -71,6 +87,7 @@ pub(crate) fn least(
                 (valley, halt) = (Some(libm::atan2(way[1], way[0])), best.tip_mm);
             }
             step *= 0.5;
+            left_mm = step;
             turned += TURN;
         }
     }
@@ -113,8 +130,24 @@ mod tests {
         ] {
             let steps = [0.2, 1e-5];
             let never = |_: &Reach, _| false;
-            let found = least(&height, &cutter, [0.3, y], [0.1, y + 0.4], steps, &never).unwrap();
+            let found =
+                least(&height, &cutter, [0.3, y], &[[0.1, y + 0.4]], steps, &never).unwrap();
             assert!((found.height_mm - least_mm).abs() < 2e-5, "{y}: {found:?}");
         }
+    }
+
+    #[test]
+    fn a_search_that_has_not_halted_yet_is_not_ended() {
+        let cutter = Cutter::flat(4.0).unwrap();
+        // A slope: the least is left by the tip that has the place at its rim.
+        let height = |at: [f64; 2], below: f64| Some(0.8 * (at[1] + 2.0)).filter(|z| *z < below);
+        let enough = |_: &Reach, left_mm: f64| left_mm <= 0.2;
+        let found = |starts: &[[f64; 2]]| {
+            let found = least(&height, &cutter, [0.0; 2], starts, [0.2, 1e-5], &enough);
+            found.unwrap().height_mm
+        };
+        assert!(found(&[[0.0, 0.0]]) < 0.8);
+        // It goes on from the best start, and one that does not reach the place is none.
+        assert!(found(&[[0.0, 1.9], [0.0, -1.95], [0.0, -2.1]]) < 0.0401);
     }
 }

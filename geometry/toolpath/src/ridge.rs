@@ -28,6 +28,10 @@ const NEARLY: f64 = 0.92;
 /// Rounds of the search for a peak by golden section, each to 0.618 of the one before.
 const PEAK_ROUNDS: usize = 6;
 const GOLDEN: f64 = 0.618_033_988_749_895;
+/// How much nearer a tip is taken that has a ridge at its rim, as a share of the distance.
+const HAIR: f64 = 1e-5;
+/// Rounds of halving for the tip halfway up a step of a flat end.
+const HALF_ROUNDS: usize = 12;
 /// Steeper than this, z of the normal, cusps are not counted: 85 degrees.
 const WALL: f64 = 0.087_156;
 
@@ -40,7 +44,7 @@ pub(crate) struct Ridge {
     /// The tips that leave it, and the strands that they are on, the lower one first.
     pub(crate) tips: [[f64; 2]; 2],
     pub(crate) strands: [usize; 2],
-    /// The tip that would leave the least there.
+    /// The tip through which another pass takes most of it away.
     pub(crate) wanted: [f64; 2],
     /// Whether the cutter reaches the surface there.
     pub(crate) is_reached: bool,
@@ -291,21 +295,44 @@ impl Lines<'_> {
         } = crossing;
         let tips = [a.tip_mm, b.tip_mm].map(|[x, y, _]| [x, y]);
         let amid = [0, 1].map(|k| f64::midpoint(tips[0][k], tips[1][k]));
+        // The ridge is at the rim of a tip that leaves it: a hair nearer that reaches it.
+        let nearer = |tip: [f64; 2]| [0, 1].map(|k| tip[k] + HAIR * (at[k] - tip[k]));
+        let starts = [amid, nearer(tips[0]), nearer(tips[1])];
         let steps_mm = [apart(a.tip_mm, b.tip_mm) / 4.0, SHORTEST * self.limit_mm];
         let reached_mm = surface_mm + REACHED * self.limit_mm;
-        // Either there is no less, or what may still be found cannot make a cusp too high.
+        let is_flat = self.field.cutter.corner_mm() == 0.0;
+        // Either there is no less, or what may still be found cannot make a cusp too high. At walls what a
+        // flat end gains for a step has no bound.
+        let gain = if is_flat { f64::INFINITY } else { GAIN };
         let enough = |reach: &reach::Reach, step_mm: f64| {
             let above = (height_mm - reach.height_mm) * nz;
-            reach.height_mm <= reached_mm || above + GAIN * step_mm <= self.limit_mm
+            reach.height_mm <= reached_mm || above + gain * step_mm <= self.limit_mm
         };
-        let reach = reach::least(
-            &|tip, below_mm| self.field.tip_below(tip, below_mm),
-            &self.field.cutter,
-            at,
-            amid,
-            steps_mm,
-            &enough,
-        )?;
+        let search = |starts: &[[f64; 2]]| {
+            reach::least(
+                &|tip, below_mm| self.field.tip_below(tip, below_mm),
+                &self.field.cutter,
+                at,
+                starts,
+                steps_mm,
+                &enough,
+            )
+        };
+        // A flat end that has the place at its rim finds its way from some tips only.
+        let reach = if is_flat {
+            let mut found = starts.iter().filter_map(|start| search(&[*start]));
+            let mut best = found.next()?;
+            while best.height_mm > reached_mm
+                && let Some(next) = found.next()
+            {
+                if next.height_mm < best.height_mm {
+                    best = next;
+                }
+            }
+            best
+        } else {
+            search(&starts)?
+        };
         let nz = self.flatness(reach.tip_mm, at)?;
         let order = usize::from(a.strand > b.strand);
         Some(Ridge {
@@ -313,11 +340,35 @@ impl Lines<'_> {
             at,
             tips: [tips[order], tips[1 - order]],
             strands: [a.strand.min(b.strand), a.strand.max(b.strand)],
-            wanted: reach.tip_mm,
+            wanted: self.wanted(&reach, if a.height_mm > b.height_mm { a } else { b }),
             is_reached: (reach.height_mm - surface_mm) * nz <= 2.0 * REACHED * self.limit_mm,
             nz,
             cusp_mm: (height_mm - reach.height_mm) * nz,
         })
+    }
+
+    /// The tip through which another pass takes most of a ridge away.
+    ///
+    /// For a cutter with a corner that is the one that leaves the least. A flat end that leaves the least
+    /// has the ridge right at its rim, and leaves all that is beyond as it was: the next search would find
+    /// the same ridge a hair farther on. Halfway up to the tip that leaves what is beyond, the ridge becomes
+    /// two of half the height.
+    fn wanted(&self, reach: &reach::Reach, beyond: Left) -> [f64; 2] {
+        let mut low = reach.tip_mm;
+        if self.field.cutter.corner_mm() > 0.0 {
+            return low;
+        }
+        let half_mm = f64::midpoint(reach.height_mm, beyond.height_mm);
+        let mut high = [beyond.tip_mm[0], beyond.tip_mm[1]];
+        for _ in 0..HALF_ROUNDS {
+            let middle = [0, 1].map(|k| f64::midpoint(low[k], high[k]));
+            if self.field.tip_below(middle, half_mm).is_some() {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        low
     }
 
     /// z of the normal that counts at a place: that of the cutter's end, of a flat one the surface's.
@@ -414,6 +465,41 @@ mod tests {
         assert_eq!(found.len(), 2);
         for ridge in found {
             assert!((ridge.cusp_mm / on_line - 1.0).abs() < 1e-3);
+        }
+    }
+
+    #[test]
+    fn steps_of_a_flat_end_are_halved() {
+        // A slope across two passes.
+        let slope = 0.8;
+        let vertices =
+            [[-9.0, -9.0], [9.0, -9.0], [-9.0, 9.0], [9.0, 9.0]].map(|[x, y]| [x, y, slope * y]);
+        let surface = Surface::new(&vertices, &[[0, 1, 2], [1, 3, 2]]).unwrap();
+        let cutter = Cutter::flat(4.0).unwrap();
+        let field = Field::new(&surface, cutter, 0.0);
+        let mut ways = Ways::new(cutter, [-12.0; 2], [12.0; 2]);
+        for (strand, y) in [-0.4, 0.4].into_iter().enumerate() {
+            let [a, b] = [-9.0, 9.0].map(|x| [x, y, slope * (y + 2.0)]);
+            ways.add(&[a, b], strand);
+        }
+        let lines = Lines {
+            field: &field,
+            along: [[0.0, 1.0], [1.0, 0.0]],
+            limits: [[0.0, 3.0], [-0.5, 0.5]],
+            apart_mm: 0.5,
+            step_mm: 0.05,
+            jump_mm: 0.1,
+            limit_mm: 0.25,
+        };
+        let found = lines.ridges(&ways, &|_| true, &Unmonitored).unwrap();
+        let steps: Vec<&Ridge> = found.iter().filter(|r| r.strands == [0, 1]).collect();
+        assert!(steps.len() >= 2);
+        let cusp_mm = slope * 0.8 / (1.0 + slope * slope).sqrt();
+        for ridge in steps {
+            assert!((ridge.cusp_mm / cusp_mm - 1.0).abs() < 0.05, "{ridge:?}");
+            assert!((ridge.at[1] - 1.6).abs() < 0.01, "{ridge:?}");
+            // Amid the two, not where the lower one is.
+            assert!(ridge.wanted[1].abs() < 0.1, "{ridge:?}");
         }
     }
 }

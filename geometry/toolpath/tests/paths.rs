@@ -216,6 +216,19 @@ fn in_a_crease_no_more_is_left_than_on_its_sides() {
 }
 
 #[test]
+fn at_the_foot_of_walls_no_step_of_a_flat_end_is_left_too_high() {
+    // Hills with a wall across the passes: in its crease a place is reached from few tips only.
+    for seed in [323, 339] {
+        let surface = surface(&relief(seed, [20.0, 15.0], 0.2));
+        let machine = machine(&surface, &["flat:4"]);
+        let plan = planned(&surface, &machine, &settings("flat:4", 0.25));
+        assert_eq!(plan.notes, Vec::<String>::new(), "{seed}");
+        let (deepest, _) = depth_and_rise(&surface, &plan);
+        assert!(deepest < 6e-4, "{seed}: {deepest}");
+    }
+}
+
+#[test]
 fn roughing_leaves_the_allowance_and_clears_for_finishing() {
     let surface = surface(&relief(6, [40.0, 30.0], 0.4));
     let machine = machine(&surface, &["ball:6", "flat:8"]);

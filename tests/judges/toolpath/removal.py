@@ -24,6 +24,9 @@ import sweep
 # Arcs are chords within this: so much may be a gouge that is none.
 CHORD_MM = 2e-5
 LONGEST_MM = 1.0
+# As far above all of the surface nothing is milled. A flat end runs level over its highest place, by
+# rounding a little above it.
+ALOFT_MM = 0.5
 # Gouges beyond this fail; the surface is its triangles, so that tessellation adds nothing.
 GOUGE_MM = 1e-3
 # Cusps may be higher by this than what was asked for; for a flat end, whose steps depend on where on
@@ -76,7 +79,7 @@ def ways_of(path, part):
     """Straight ways of the tip that come down to the surface, none of them long."""
     moves = gcode.strokes(path.read_text(), CHORD_MM)
     ends = np.array([[a, b] for _, a, b in moves])
-    ends = ends[ends[:, :, 2].min(axis=1) < part.high[2]]
+    ends = ends[ends[:, :, 2].min(axis=1) < part.high[2] + ALOFT_MM]
     # What comes from aloft goes straight down.
     ends[:, :, 2] = np.minimum(ends[:, :, 2], 1e3)
     lengths = np.hypot(*(ends[:, 1, :2] - ends[:, 0, :2]).T)
