@@ -46,12 +46,54 @@ impl Neighbour {
     }
 }
 
+/// Puts samples in their order. Whole samples are moved once only: keys are sorted, of a distance but for
+/// its last bits, and of where its sample is in their place.
+#[derive(Debug, Default)]
+struct Sorter {
+    keys: Vec<u64>,
+    sorted: Vec<Neighbour>,
+}
+
+/// Last bits of a key, which say where its sample is. Those above them are in the order of the
+/// distances, since none is negative.
+const PLACE: u64 = 0x3ff;
+
+impl Sorter {
+    /// Leaves the so many nearest, in their order.
+    fn nearest(&mut self, found: &mut Vec<Neighbour>, number: usize) {
+        if found.len() > PLACE as usize {
+            found.sort_unstable_by(Neighbour::order);
+        } else {
+            let Self { keys, sorted } = self;
+            keys.clear();
+            let places = (0_u64..).zip(&*found);
+            keys.extend(places.map(|(place, own)| own.distance2.to_bits() & !PLACE | place));
+            keys.sort_unstable();
+            sorted.clear();
+            let place = |key: &u64| (key & PLACE) as usize;
+            sorted.extend(keys.iter().filter_map(|key| found.get(place(key))));
+            core::mem::swap(found, sorted);
+            // Those that differ by less than keys tell, or by their places only, follow one another.
+            for last in 1..found.len() {
+                for k in (1..=last).rev() {
+                    if found[k].order(&found[k - 1]) != Ordering::Less {
+                        break;
+                    }
+                    found.swap(k, k - 1);
+                }
+            }
+        }
+        found.truncate(number);
+    }
+}
+
 /// Finds the nearest samples of one node after the other, upwards along a grid column.
 #[derive(Debug, Default)]
 pub(crate) struct Search {
     /// In each strip of the window the first sample at or above the current node.
     above: Vec<usize>,
     found: Vec<Neighbour>,
+    sorter: Sorter,
     /// Radius to begin with: what sufficed for the node before. Only speed depends on it.
     radius_mm: f64,
 }
@@ -126,16 +168,13 @@ impl Search {
             }
             radius_mm = (1.5 * radius_mm).min(reach_mm);
         }
-        if self.found.len() > number {
-            self.found
-                .select_nth_unstable_by(number - 1, Neighbour::order);
-            self.found.truncate(number);
-            self.found.sort_unstable_by(Neighbour::order);
+        let is_full = self.found.len() > number;
+        self.sorter.nearest(&mut self.found, number);
+        if is_full {
             // A little more than sufficed here usually suffices for the next node.
             let farthest2 = self.found.last().map_or(0.0, |n| n.distance2);
             self.radius_mm = 1.1 * farthest2.sqrt();
         } else {
-            self.found.sort_unstable_by(Neighbour::order);
             self.radius_mm = radius_mm;
         }
         &self.found
@@ -198,6 +237,36 @@ impl Search {
                     strip: strip_index,
                     index,
                 });
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_are_those_of_the_whole_order_with_ties_at_the_end_and_within() {
+        let mut sorter = Sorter::default();
+        for spread in [3_i32, 7, 50] {
+            // Distances on a grid, of which many are alike.
+            let all: Vec<Neighbour> = (0..90)
+                .map(|k| {
+                    let [dx, dy] = [k * 37 % spread, k * 53 % (2 * spread)].map(f64::from);
+                    Neighbour::at(dx - 1.0, dy - 2.0, f64::from(k * 29 % 11))
+                })
+                .collect();
+            for number in [1, 5, 16, 60, 89, 90, 200] {
+                let mut plain = all.clone();
+                plain.sort_by(Neighbour::order);
+                plain.truncate(number);
+                let mut found = all.clone();
+                sorter.nearest(&mut found, number);
+                let told = |all: &[Neighbour]| -> Vec<[f64; 3]> {
+                    all.iter().map(|n| [n.dx, n.dy, n.z]).collect()
+                };
+                assert_eq!(told(&found), told(&plain), "{spread} {number}");
             }
         }
     }
