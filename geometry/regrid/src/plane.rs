@@ -74,6 +74,23 @@ pub(crate) struct PlaneSums {
     yz: f64,
 }
 
+impl From<[f64; 9]> for PlaneSums {
+    /// Of weights, of weighted x, y, x x, x y, y y, z, x z and y z.
+    fn from([one, x, y, xx, xy, yy, z, xz, yz]: [f64; 9]) -> Self {
+        Self {
+            one,
+            x,
+            y,
+            xx,
+            xy,
+            yy,
+            z,
+            xz,
+            yz,
+        }
+    }
+}
+
 impl PlaneSums {
     pub(crate) fn add(&mut self, x: f64, y: f64, z: f64, weight: f64) {
         let (wx, wy) = (weight * x, weight * y);

@@ -8,6 +8,7 @@
 //! samples that the best surface leaves over agree among themselves on another one, the
 //! places of both surfaces' samples tell on whose side of the edge the node lies.
 
+mod agreement;
 mod arc;
 mod at_issue;
 mod bend;

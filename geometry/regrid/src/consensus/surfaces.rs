@@ -1,8 +1,9 @@
 //! The surfaces that the samples of a window lie on.
 
+use super::agreement::Samples;
 use crate::draws::Draws;
 use crate::neighbours::Neighbour;
-use crate::plane::{LEAST_SINE, Plane, PlaneSums};
+use crate::plane::{LEAST_SINE, Plane};
 
 /// Standard deviations from a surface within which a sample speaks for it.
 pub(crate) const WIDTH: f64 = 3.0;
@@ -59,9 +60,6 @@ pub(crate) struct Effort {
     pub(crate) guess: Option<Plane>,
 }
 
-/// Sums of a score kept side by side.
-const LANES: usize = 4;
-
 /// A plane and the samples that agree with it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Surface {
@@ -93,10 +91,8 @@ impl Surface {
 pub(crate) struct Surfaces {
     /// The samples not yet claimed by a surface, nearest first.
     left: Vec<Neighbour>,
-    dx: Vec<f64>,
-    dy: Vec<f64>,
-    z: Vec<f64>,
-    weight: Vec<f64>,
+    /// The same, side by side.
+    loaded: Samples,
     scratch: Vec<f64>,
     /// The columns of the window, and how many samples of each agree with a plane.
     columns: Vec<(usize, usize)>,
@@ -279,22 +275,7 @@ impl Surfaces {
 
     fn load(&mut self, window: &[Neighbour]) {
         let radius2 = window.last().map_or(0.0, |n| n.distance2);
-        self.dx.clear();
-        self.dy.clear();
-        self.z.clear();
-        self.weight.clear();
-        self.dx.extend(self.left.iter().map(|n| n.dx));
-        self.dy.extend(self.left.iter().map(|n| n.dy));
-        self.z.extend(self.left.iter().map(|n| n.z));
-        let fall = 0.8 / radius2.max(f64::MIN_POSITIVE);
-        self.weight
-            .extend(self.left.iter().map(|n| 1.0 - fall * n.distance2));
-        // Filled up to whole lanes with samples that agree with no plane.
-        let whole = self.left.len().next_multiple_of(LANES);
-        self.dx.resize(whole, 0.0);
-        self.dy.resize(whole, 0.0);
-        self.z.resize(whole, f64::INFINITY);
-        self.weight.resize(whole, 0.0);
+        self.loaded.load(&self.left, radius2);
     }
 
     /// The plane that a guess leads to, where nearly all samples expected agree with it.
@@ -302,9 +283,10 @@ impl Surfaces {
         let enough = KNOWN * effort.neighbours as f64;
         let mut plane = guess;
         for _ in 0..2 {
-            plane = self.refined(&plane, width_mm)?;
+            plane = self.loaded.refined(&plane, width_mm)?;
         }
-        let known = self.score(&plane, width_mm).1 >= enough;
+        let score = self.loaded.score(&plane, width_mm, 0.0)?;
+        let known = score.inliers >= enough;
         (known && self.spans(&plane, width_mm)).then_some(plane)
     }
 
@@ -334,31 +316,31 @@ impl Surfaces {
             if plane.a * plane.a + plane.b * plane.b > STEEPEST_SEEN * STEEPEST_SEEN {
                 continue;
             }
-            let mut score = self.score(&plane, width_mm);
-            if score.0 <= best_drawn || score.1 < LEAST_DRAWN {
+            let Some(drawn) = self.loaded.score(&plane, width_mm, best_drawn) else {
+                continue;
+            };
+            if drawn.inliers < LEAST_DRAWN {
                 continue;
             }
-            let drawn = score.0;
-            let mut better = (score.0, plane);
+            let mut better = (drawn, plane);
             // Three samples carry their noise far; the samples that agree with their plane
             // know better.
             for _ in 0..2 {
-                let Some(refined) = self.refined(&better.1, width_mm) else {
+                let refined = self.loaded.refined(&better.1, width_mm);
+                let rated = refined.and_then(|refined| {
+                    let evidence = better.0.evidence;
+                    Some((self.loaded.score(&refined, width_mm, evidence)?, refined))
+                });
+                let Some(rated) = rated else {
                     break;
                 };
-                let rated = self.score(&refined, width_mm);
-                if rated.0 <= better.0 {
-                    break;
-                }
-                better = (rated.0, refined);
-                score = rated;
+                better = rated;
             }
-            if best.is_none_or(|(evidence, _)| better.0 > evidence)
-                && self.spans(&better.1, width_mm)
-            {
-                best_drawn = drawn;
-                best = Some(better);
-                enough = planes_needed(score.1 / number as f64, most_planes);
+            let evidence = better.0.evidence;
+            if best.is_none_or(|(other, _)| evidence > other) && self.spans(&better.1, width_mm) {
+                best_drawn = drawn.evidence;
+                best = Some((evidence, better.1));
+                enough = planes_needed(better.0.inliers / number as f64, most_planes);
             }
         }
         best.map(|(_, plane)| plane)
@@ -368,44 +350,6 @@ impl Surfaces {
     fn apart(&self, [p, q, r]: [usize; 3]) -> bool {
         let [p, q, r] = [p, q, r].map(|k| self.left[k].strip);
         p != q && q != r && r != p
-    }
-
-    /// Evidence for a plane, and the number of samples that give it. Summed up in several
-    /// lanes, always the same ones, which the compiler makes one instruction of.
-    fn score(&self, plane: &Plane, width_mm: f64) -> (f64, f64) {
-        let narrow = 1.0 / (width_mm * width_mm);
-        let (mut evidence, mut inliers) = ([0.0; LANES], [0.0; LANES]);
-        let lanes = self
-            .dx
-            .chunks_exact(LANES)
-            .zip(self.dy.chunks_exact(LANES))
-            .zip(self.z.chunks_exact(LANES))
-            .zip(self.weight.chunks_exact(LANES));
-        for (((dx, dy), z), weight) in lanes {
-            for k in 0..LANES {
-                let residual = z[k] - (plane.a * dx[k] + plane.b * dy[k] + plane.c);
-                let share = (1.0 - narrow * residual * residual).max(0.0);
-                evidence[k] += weight[k] * share;
-                inliers[k] += if share > 0.0 { 1.0 } else { 0.0 };
-            }
-        }
-        (evidence.iter().sum(), inliers.iter().sum())
-    }
-
-    /// The weighted least-squares plane of the samples that agree with a plane.
-    fn refined(&self, plane: &Plane, width_mm: f64) -> Option<Plane> {
-        let mut fit = PlaneSums::default();
-        for (n, weight) in self.left.iter().zip(&self.weight) {
-            let residual = plane.residual(n);
-            if residual.abs() < width_mm {
-                fit.add(n.dx, n.dy, residual, *weight);
-            }
-        }
-        fit.plane().map(|change| Plane {
-            a: plane.a + change.a,
-            b: plane.b + change.b,
-            c: plane.c + change.c,
-        })
     }
 }
 
