@@ -43,8 +43,8 @@ pub(super) fn logistic<const N: usize>(
         });
         for k in 0..N {
             gradient[k] += sums.gradient[k].total();
-            for l in 0..=k {
-                hessian[k][l] += sums.hessian[k][l].total();
+            for (own, sum) in hessian[k].iter_mut().zip(&sums.hessian[k]).take(k + 1) {
+                *own += sum.total();
             }
         }
         let step = solve(hessian, gradient)?;
@@ -148,8 +148,8 @@ impl<const N: usize> WithSimd for Sums<'_, N> {
                 for k in 0..N {
                     gradient[k] = simd.add_f64s(gradient[k], simd.mul_f64s(slope, own[k]));
                     let bent = simd.mul_f64s(bend, own[k]);
-                    for l in 0..=k {
-                        hessian[k][l] = simd.add_f64s(hessian[k][l], simd.mul_f64s(bent, own[l]));
+                    for (sum, other) in hessian[k].iter_mut().zip(own).take(k + 1) {
+                        *sum = simd.add_f64s(*sum, simd.mul_f64s(bent, other));
                     }
                 }
             }
@@ -160,8 +160,8 @@ impl<const N: usize> WithSimd for Sums<'_, N> {
             };
             for k in 0..N {
                 put(&mut found.gradient[k], gradient[k]);
-                for l in 0..=k {
-                    put(&mut found.hessian[k][l], hessian[k][l]);
+                for (all, lanes) in found.hessian[k].iter_mut().zip(hessian[k]).take(k + 1) {
+                    put(all, lanes);
                 }
             }
         }
@@ -244,8 +244,8 @@ mod tests {
                 let wrong = 1.0 / (1.0 + libm::exp(s.label * value));
                 for k in 0..3 {
                     gradient[k] -= s.label * wrong * own[k];
-                    for l in 0..=k {
-                        hessian[k][l] += wrong * (1.0 - wrong) * own[k] * own[l];
+                    for (sum, other) in hessian[k].iter_mut().zip(own).take(k + 1) {
+                        *sum += wrong * (1.0 - wrong) * own[k] * other;
                     }
                 }
             }
@@ -253,9 +253,8 @@ mod tests {
             let is_near = |sum: &Sum, known: f64| (sum.total() - known).abs() < 1e-5;
             for k in 0..3 {
                 assert!(is_near(&wide.gradient[k], gradient[k]));
-                for l in 0..=k {
-                    assert!(is_near(&wide.hessian[k][l], hessian[k][l]));
-                }
+                let rows = wide.hessian[k].iter().zip(&hessian[k]);
+                assert!(rows.take(k + 1).all(|(sum, known)| is_near(sum, *known)));
             }
         }
     }
