@@ -147,6 +147,14 @@ impl Service {
         }
     }
 
+    /// Threads that a job which begins now may use: scans under way keep theirs.
+    pub(crate) fn threads_of_a_job(&self) -> usize {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let scanners = self.scanners().scanners;
+        let scans = scanners.iter().filter(|own| own.scan.is_some()).count();
+        self.config().queue.threads_beside(cores, scans)
+    }
+
     /// The station of this name; of an empty name, the only one.
     pub(crate) fn station(&self, name: &str) -> Result<&Arc<Station>, ServiceError> {
         let found = match (&*self.stations, name) {

@@ -153,9 +153,20 @@ pub struct QueueConfig {
     /// Jobs processed at the same time.
     #[serde(deserialize_with = "value::workers")]
     pub workers: usize,
-    /// Threads each of them may use; 0 for as many as the machine has cores.
+    /// Threads each of them may use; 0 for as many as the machine has cores, but for one for each
+    /// scan that is under way when the job begins.
     #[serde(deserialize_with = "value::threads")]
     pub threads: usize,
+}
+
+impl QueueConfig {
+    /// Threads that a job may use on a machine with so many cores while so many scans are under way.
+    pub(crate) fn threads_beside(&self, cores: usize, scans: usize) -> usize {
+        match self.threads {
+            0 => cores.saturating_sub(scans).max(1),
+            configured => configured,
+        }
+    }
 }
 
 impl Default for QueueConfig {
@@ -269,5 +280,23 @@ fn is_loopback(address: &SocketAddr) -> bool {
     match address.ip() {
         IpAddr::V4(ip) => ip.is_loopback(),
         IpAddr::V6(ip) => ip.is_loopback(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::QueueConfig;
+
+    #[test]
+    fn jobs_leave_a_core_to_each_scan_unless_their_threads_are_configured() {
+        let by_itself = QueueConfig::default();
+        assert_eq!(by_itself.threads_beside(4, 0), 4);
+        assert_eq!(by_itself.threads_beside(4, 1), 3);
+        assert_eq!(by_itself.threads_beside(2, 3), 1);
+        let configured = QueueConfig {
+            threads: 6,
+            ..by_itself
+        };
+        assert_eq!(configured.threads_beside(4, 1), 6);
     }
 }

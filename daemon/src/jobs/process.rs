@@ -113,7 +113,7 @@ fn attempt(
         .map_err(|error| Stop::failed(error, None))?;
     let mut settings =
         processing.pipeline_settings(header.column_pitch_mm, header.sample_spacing_mm);
-    settings.regrid.threads = service.config().queue.threads;
+    settings.regrid.threads = service.threads_of_a_job();
 
     let watch = Stopwatch::new(progress);
     let (image, mut kept) = match streamed(service, job, &settings.regrid) {

@@ -5,8 +5,9 @@
 mod common;
 
 use common::{Bench, recognised};
-use features::feature::Feature;
+use features::feature::{Bottom, Feature};
 use features::recognise::Recognition;
+use nalgebra::Vector3;
 
 const TABLE_MM: f64 = -20.0;
 
@@ -87,6 +88,17 @@ fn one_with_straight_sides_is_as_deep_as_its_edge() {
         assert_eq!(own.class, "slot", "{slope} {own:?}");
         is_near(own, "width", 12.0);
         is_near(own, "depth", 6.0 * slope);
+        // Its floor is of both sides, but for what a smooth surface has to cut off the edge.
+        let Bottom::FreeForm(floor) = &own.bottom else {
+            panic!("{own:?}");
+        };
+        for v in [-3.0_f64, 3.0] {
+            let (sin, cos) = libm::sincos(8f64.to_radians());
+            let z_mm = -(6.0 - v.abs()) * slope;
+            let [along, across, up] = found.frame.local(Vector3::new(-sin * v, cos * v, z_mm));
+            let [found_mm] = floor.evaluate(along, across);
+            assert!((found_mm - up).abs() < 0.2, "{slope} {v} {found_mm} {up}");
+        }
     }
 }
 

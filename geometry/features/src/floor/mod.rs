@@ -15,7 +15,7 @@ fn samples(sight: &Sight<'_>, candidate: &Candidate) -> Vec<[f64; 3]> {
     let floors: Vec<u16> = candidate
         .levels
         .iter()
-        .filter_map(|level| sight.levels.levels[usize::from(*level)].regions.first())
+        .flat_map(|level| sight.levels.levels[usize::from(*level)].floor())
         .copied()
         .collect();
     sight.samples(&|region| floors.contains(&region))

@@ -19,8 +19,10 @@ pub const AROUND: u16 = 0;
 /// A floor or a top with what runs along its edges.
 #[derive(Debug, Clone)]
 pub struct Level {
-    /// Its regions, the floor first.
+    /// Its regions, those of the floor first.
     pub regions: Vec<u16>,
+    /// How many of them are the floor's: more than one where several bow together.
+    pub floors: usize,
     /// Plane of the floor; `None` where none is seen.
     pub plane: Option<Plane>,
     /// Whether the floor is one.
@@ -32,6 +34,12 @@ pub struct Level {
 }
 
 impl Level {
+    /// The regions of its floor.
+    #[must_use]
+    pub fn floor(&self) -> &[u16] {
+        self.regions.get(..self.floors).unwrap_or_default()
+    }
+
     /// Whether its floor was seen.
     #[must_use]
     pub fn is_seen(&self) -> bool {
@@ -86,6 +94,7 @@ pub fn levels(image: &RangeImage, regions: &Regions, step_mm: f64) -> Levels {
         };
         levels.push(Level {
             regions: vec![u16::try_from(index).unwrap_or(u16::MAX)],
+            floors: 1,
             plane,
             is_plane,
             nodes: 0,
@@ -98,7 +107,15 @@ pub fn levels(image: &RangeImage, regions: &Regions, step_mm: f64) -> Levels {
             let level = of_region[usize::from(to)];
             of_region[index] = level;
             let region = u16::try_from(index).unwrap_or(u16::MAX);
-            levels[usize::from(level)].regions.push(region);
+            let own = &mut levels[usize::from(level)];
+            if bows[index].is_some() {
+                own.regions.insert(own.floors, region);
+                own.floors += 1;
+                // However plane its sides are.
+                own.is_plane = false;
+                continue;
+            }
+            own.regions.push(region);
             strips.push(Strip {
                 region,
                 level,
