@@ -42,7 +42,7 @@ impl SerialSettings {
 /// A port is busy for a moment after it has been closed, where the program that had it, this one
 /// perhaps, was just starting another: until that has begun, it holds what was open. So a busy port
 /// is tried again a few times before it is told to be.
-const BUSY_ATTEMPTS: u32 = 10;
+const BUSY_ATTEMPTS: u32 = 40;
 const BUSY_PAUSE: Duration = Duration::from_millis(25);
 
 /// Opens one serial port.
@@ -86,9 +86,10 @@ impl SerialConnector {
         }
     }
 
+    /// Busy, who holds it not being looked for yet: there are attempts to come.
     fn busy(&self) -> ScannerError {
         ScannerError::PortBusy {
-            holder: holder(Path::new(&self.path)),
+            holder: None,
             port: self.path.clone(),
         }
     }
@@ -143,7 +144,13 @@ impl Connector for SerialConnector {
                 outcome => return outcome,
             }
         }
-        self.open()
+        self.open().map_err(|error| match error {
+            ScannerError::PortBusy { port, .. } => ScannerError::PortBusy {
+                holder: holder(Path::new(&port)),
+                port,
+            },
+            other => other,
+        })
     }
 
     fn appeared(&mut self) -> bool {
