@@ -170,3 +170,61 @@ fn chamfers_around_a_pocket_are_no_groove() {
     is_near(&found.features[1], "length", 30.0);
     is_near(&found.features[2], "width", 3.0);
 }
+
+#[test]
+fn a_groove_in_the_floor_of_a_pocket_goes_into_that() {
+    let found = block(0.05, 1, &|u, v| {
+        let is_pocket = u.abs() < 30.0 && v.abs() < 18.0;
+        let deeper_mm = arc(10.0, 45.0, v - 3.0).filter(|_| u.abs() < 20.0);
+        is_pocket.then(|| -5.0 - deeper_mm.unwrap_or(0.0))
+    });
+    let [block, pocket, groove] = &found.features[..] else {
+        panic!("{:#?}", found.features);
+    };
+    assert_eq!(
+        [pocket.parent, groove.parent],
+        [Some(block.id), Some(pocket.id)]
+    );
+    is_near(pocket, "depth", 5.0);
+    for (name, value_mm) in [("length", 40.0), ("width", 10.0), ("depth", 2.071)] {
+        is_near(groove, name, value_mm);
+    }
+}
+
+#[test]
+fn one_from_wall_to_wall_is_as_wide_as_on_the_floor_and_as_deep_as_below_the_top() {
+    let found = block(0.05, 1, &|u, v| {
+        let is_pocket = u.abs() < 30.0 && v.abs() < 18.0;
+        is_pocket.then(|| -5.0 - arc(10.0, 45.0, v - 3.0).unwrap_or(0.0))
+    });
+    let mut bowed = found.features.iter().filter(|f| {
+        let mut warnings = f.warnings.iter();
+        warnings.any(|warning| warning.contains("without a wall"))
+    });
+    let own = bowed.next().unwrap();
+    assert!(bowed.next().is_none());
+    for (name, value_mm) in [("length", 60.0), ("width", 10.0), ("depth", 7.071)] {
+        is_near(own, name, value_mm);
+    }
+}
+
+#[test]
+fn a_wide_cone_around_a_narrow_hole_is_no_dimple() {
+    let found = block(0.05, 1, &|u, v| {
+        let far_mm = (u * u + v * v).sqrt();
+        match far_mm {
+            _ if far_mm < 2.5 => Some(-20.0),
+            _ if far_mm < 10.0 => Some(0.6 * (far_mm - 10.0)),
+            _ => None,
+        }
+    });
+    let classes: Vec<&str> = found.features.iter().map(|f| f.class.as_str()).collect();
+    assert_eq!(
+        classes,
+        ["block", "hole", "countersink"],
+        "{:?}",
+        found.features
+    );
+    is_near(&found.features[1], "diameter", 5.0);
+    is_near(&found.features[2], "diameter", 20.0);
+}

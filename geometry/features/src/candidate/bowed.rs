@@ -51,17 +51,24 @@ const EDGED: usize = 4;
 const ROUNDS_AT_RIM: usize = 2;
 
 /// Takes the rim towards planes, which has no step, for one that goes up from what sags, and down from
-/// what bulges.
-pub(super) fn as_walls(sight: &Sight<'_>, bow: Bow, border: &mut Border) {
+/// what bulges. The plane that most of it is towards is the face that the floor runs out in: where the
+/// feature ends at higher walls, too, it is not the one that it goes into.
+pub(super) fn as_walls(sight: &Sight<'_>, bow: Bow, border: &mut Border) -> Option<Plane> {
+    let levels = &sight.levels.levels;
+    let mut counts = vec![0_usize; levels.len()];
     for pair in &mut border.pairs {
-        let beyond = &sight.levels.levels[usize::from(pair.beyond)];
+        let beyond = &levels[usize::from(pair.beyond)];
         if pair.sense == Sense::Level && beyond.is_plane && beyond.bow.is_none() {
+            counts[usize::from(pair.beyond)] += 1;
             pair.sense = match bow {
                 Bow::Sags => Sense::Rises,
                 Bow::Bulges => Sense::Falls,
             };
         }
     }
+    let all = (0..counts.len()).filter(|level| counts[*level] > 0);
+    let most = all.max_by_key(|level| (counts[*level], std::cmp::Reverse(*level)))?;
+    levels[most].plane
 }
 
 /// Moves an outline to where the floor meets the face, and tells how deep that is; `None` where too

@@ -182,9 +182,7 @@ fn candidate(
         &|level| set.contains(&level),
     );
     let bow = sight.levels.levels[usize::from(*set.first()?)].bow;
-    if let Some(bow) = bow {
-        bowed::as_walls(sight, bow, &mut own);
-    }
+    let face = bow.and_then(|bow| bowed::as_walls(sight, bow, &mut own));
     // Half of a square of the least width.
     let across = least_mm / sight.field.image.pitch_mm();
     if own.nodes < ((0.5 * across * across) as usize).max(FEWEST) {
@@ -203,7 +201,6 @@ fn candidate(
     let host = host(sight.levels, &own, lie)?;
     let seed = seed ^ (u64::from(*set.first()?) << 32);
     let mut outline = outlined::outlined(sight, &own, lie, seed)?;
-    let face = sight.levels.levels[usize::from(host)].plane;
     let bowed = bow
         .zip(face)
         .and_then(|(bow, face)| bowed::settled(sight, &set, bow, (&face, &own), &mut outline));
