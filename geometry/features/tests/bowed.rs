@@ -228,3 +228,14 @@ fn a_wide_cone_around_a_narrow_hole_is_no_dimple() {
     is_near(&found.features[1], "diameter", 5.0);
     is_near(&found.features[2], "diameter", 20.0);
 }
+
+#[test]
+fn a_ramp_amid_the_face_moves_none_of_the_blocks_walls() {
+    let found = block(0.05, 1, &|u, v| {
+        let is_ramp = u.abs() < 15.0 && v.abs() < 10.0;
+        is_ramp.then(|| -0.3 * (u + 15.0))
+    });
+    for (name, value_mm) in [("length", 80.0), ("width", 50.0), ("height", 20.0)] {
+        is_near(&found.features[0], name, value_mm);
+    }
+}
