@@ -20,6 +20,9 @@ const SEEDS: [(usize, f64); 6] = [
     (3, CLEAN),
     (2, CLEAN),
 ];
+/// Half the sides of the windows that what is left is looked through with in the end, for
+/// seeds of faces too bent for any plane: rounds and ridges that are only so many nodes wide.
+const CURVED_SEEDS: [usize; 2] = [6, 3];
 const CLEAN: f64 = 1.3;
 const ROUGH: f64 = 4.0;
 /// A rough window is flat when a quadric leaves no less than this share of what its plane does.
@@ -71,7 +74,17 @@ pub(crate) fn pieces(scene: &Scene<'_>, monitor: &dyn Monitor) -> Result<Pieces,
                 }
             }
         }
-        monitor.progress(0.05 + 0.35 * (k + 1) as f64 / SEEDS.len() as f64);
+        monitor.progress(0.05 + 0.3 * (k + 1) as f64 / SEEDS.len() as f64);
+    }
+    for (k, reach) in CURVED_SEEDS.into_iter().enumerate() {
+        monitor.check()?;
+        for seed in grower.curved_seeds(reach) {
+            if grower.is_open(seed, reach) {
+                monitor.check()?;
+                grower.grow(seed, reach, 1.0);
+            }
+        }
+        monitor.progress(0.35 + 0.05 * (k + 1) as f64 / CURVED_SEEDS.len() as f64);
     }
     Ok(grower.pieces)
 }
@@ -125,6 +138,29 @@ impl Grower<'_> {
                     .is_none_or(|n| self.pieces.labels[n] == NONE)
             })
         })
+    }
+
+    /// The middles of windows that are open for the most part and that a quadric fits, the
+    /// best fitted first.
+    fn curved_seeds(&self, reach: usize) -> Vec<usize> {
+        let side = 2 * reach + 1;
+        let mut seeds: Vec<(f64, usize)> = (0..self.pieces.labels.len())
+            .filter(|&node| {
+                self.pieces.labels[node] == NONE
+                    && self.scene.grid.is_valid(node)
+                    && self.is_open(node, reach)
+            })
+            .filter_map(|node| {
+                let nodes = self.window_nodes(node, reach);
+                if 2 * nodes.len() < side * side {
+                    return None;
+                }
+                let left = Surface::left_by_quadric(self.scene, &nodes)?;
+                (left < CLEAN).then_some((left, node))
+            })
+            .collect();
+        seeds.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        seeds.into_iter().map(|(_, node)| node).collect()
     }
 
     /// Grows a piece from a seed; whether any came of it.

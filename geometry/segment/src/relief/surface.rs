@@ -106,6 +106,19 @@ impl Surface {
         }
     }
 
+    /// What a quadric leaves at these nodes, in its standard deviations of noise; `None` where
+    /// there are too few of them for one.
+    pub(super) fn left_by_quadric(scene: &Scene<'_>, nodes: &[u32]) -> Option<f64> {
+        if nodes.len() < LEAST_QUADRIC_NODES {
+            return None;
+        }
+        let frame = Frame::of(scene, nodes)?;
+        let sums = frame.sums::<QUADRIC>(scene, nodes);
+        let quadric = frame.surface(&sums, QUADRIC, 1.0)?;
+        let freedom = (nodes.len() - QUADRIC) as f64;
+        Some(libm::sqrt(quadric.error_mm2 / freedom) / quadric.noise_mm(scene))
+    }
+
     pub(crate) fn is_plane(&self) -> bool {
         self.count == PLANE
     }
