@@ -25,12 +25,14 @@ const SMALL: usize = 400;
 const STEPS_OF_PLANE: usize = 1;
 const STEPS: usize = 3;
 
-/// Labels of the regions, and the number of pieces before merging.
+/// Labels of the regions, and the number of pieces before merging; `bent_seeds` as in
+/// [`SegmentSettings`](crate::SegmentSettings).
 pub(crate) fn divide(
     scene: &mut Scene<'_>,
+    bent_seeds: bool,
     monitor: &dyn Monitor,
 ) -> Result<(Vec<u32>, usize), Cancelled> {
-    let mut pieces = grow::pieces(scene, monitor)?;
+    let mut pieces = grow::pieces(scene, bent_seeds, monitor)?;
     monitor.progress(0.4);
     compete::spread(scene, &mut pieces, grow::MISS_NOISES);
     revise::dissolve(scene, &mut pieces);

@@ -110,7 +110,7 @@ pub fn segment_with_report(
     monitor.progress(0.05);
     let (labels, components) = match settings.method {
         Method::ShimLee => shim_lee::divide(&scene, settings, monitor)?,
-        Method::Relief => relief::divide(&mut scene, monitor)?,
+        Method::Relief => relief::divide(&mut scene, settings.bent_seeds, monitor)?,
     };
     let minimum = settings.fewest_nodes(grid.pitch_mm);
     monitor.progress(0.95);

@@ -42,6 +42,11 @@ pub struct SegmentSettings {
     /// Regions that cover less than this, seen from the camera, stay unlabelled, square
     /// millimetres; 0 for no such limit.
     pub minimum_area_mm2: f64,
+    /// Whether regions also begin where a quadric fits and no plane does, which finds rounds and
+    /// flanks of ridges that are only so many nodes wide. For free forms with creases: on parts of
+    /// planes, cylinders and the like such regions take nodes from their neighbours.
+    /// [`Method::Relief`] alone.
+    pub bent_seeds: bool,
     /// Seed of the clustering's random starts; [`Method::Relief`] draws nothing.
     pub seed: u64,
 }
@@ -55,6 +60,7 @@ impl Default for SegmentSettings {
             step_factor: 1.0,
             minimum_nodes: 25,
             minimum_area_mm2: 0.0,
+            bent_seeds: false,
             seed: 0,
         }
     }

@@ -132,6 +132,27 @@ fn oblique_and_round_steps_part_the_surface_and_do_not_ring() {
 }
 
 #[test]
+fn a_round_ridge_with_steep_flanks_parts_the_surface_and_does_not_ring() {
+    // Both flanks fall by 45 degrees at the ridge; no plane fits any window of the inner one.
+    let off = |x: f64, y: f64| {
+        let (x, y, radius) = (x - 0.45, y - 0.52, 0.3);
+        80.0 * (x * x + y * y - radius * radius) / (2.0 * radius)
+    };
+    let inside = |x: f64, y: f64| waves(x, y) + off(x, y);
+    let outside = |x: f64, y: f64| waves(x, y) - off(x, y);
+    let z = |x: f64, y: f64| inside(x, y).min(outside(x, y));
+    // Of the first, nodes at the ridge lie on the wrong side of it by their noise.
+    for seed in [101, 72, 73] {
+        let made = made(z, seed, [-3.0, 5.0]);
+        holds(&made, [&inside, &outside], 10.0);
+        assert!(made.report.control_points <= 400, "{:?}", made.report);
+        let lines = made.report.trimmed.unwrap();
+        assert!((lines.meeting_mm - 150.8).abs() < 2.0, "{lines:?}");
+        assert!(lines.step_mm < 1.0, "{lines:?}");
+    }
+}
+
+#[test]
 fn a_grid_off_its_lattice_is_trimmed_where_it_lies() {
     let z = |x: f64, y: f64| waves(x, y) + if past(x, y) > 0.0 { 8.0 } else { 0.0 };
     let (on, off) = (made(z, 5, [-3.0, 5.0]), made(z, 5, [-2.73, 5.41]));

@@ -22,7 +22,7 @@ const SEEDS: [(usize, f64); 6] = [
 ];
 /// Half the sides of the windows that what is left is looked through with in the end, for
 /// seeds of faces too bent for any plane: rounds and ridges that are only so many nodes wide.
-const CURVED_SEEDS: [usize; 2] = [6, 3];
+const BENT_SEEDS: [usize; 2] = [6, 3];
 const CLEAN: f64 = 1.3;
 const ROUGH: f64 = 4.0;
 /// A rough window is flat when a quadric leaves no less than this share of what its plane does.
@@ -42,8 +42,13 @@ const ROUNDS: usize = 30;
 /// Smaller pieces are none.
 const LEAST_NODES: usize = 12;
 
-/// Grows pieces until no seed is left. What no piece explains stays unlabelled.
-pub(crate) fn pieces(scene: &Scene<'_>, monitor: &dyn Monitor) -> Result<Pieces, Cancelled> {
+/// Grows pieces until no seed is left, of bent ones only if `bent_seeds`. What no piece explains
+/// stays unlabelled.
+pub(crate) fn pieces(
+    scene: &Scene<'_>,
+    bent_seeds: bool,
+    monitor: &dyn Monitor,
+) -> Result<Pieces, Cancelled> {
     let grid = &scene.grid;
     let directions = planes(grid, REACH);
     let mut grower = Grower {
@@ -76,15 +81,15 @@ pub(crate) fn pieces(scene: &Scene<'_>, monitor: &dyn Monitor) -> Result<Pieces,
         }
         monitor.progress(0.05 + 0.3 * (k + 1) as f64 / SEEDS.len() as f64);
     }
-    for (k, reach) in CURVED_SEEDS.into_iter().enumerate() {
+    for (k, reach) in BENT_SEEDS.into_iter().enumerate().filter(|_| bent_seeds) {
         monitor.check()?;
-        for seed in grower.curved_seeds(reach) {
+        for seed in grower.bent_seeds(reach) {
             if grower.is_open(seed, reach) {
                 monitor.check()?;
                 grower.grow(seed, reach, 1.0);
             }
         }
-        monitor.progress(0.35 + 0.05 * (k + 1) as f64 / CURVED_SEEDS.len() as f64);
+        monitor.progress(0.35 + 0.05 * (k + 1) as f64 / BENT_SEEDS.len() as f64);
     }
     Ok(grower.pieces)
 }
@@ -142,7 +147,7 @@ impl Grower<'_> {
 
     /// The middles of windows that are open for the most part and that a quadric fits, the
     /// best fitted first.
-    fn curved_seeds(&self, reach: usize) -> Vec<usize> {
+    fn bent_seeds(&self, reach: usize) -> Vec<usize> {
         let side = 2 * reach + 1;
         let mut seeds: Vec<(f64, usize)> = (0..self.pieces.labels.len())
             .filter(|&node| {

@@ -34,7 +34,7 @@ use crate::problem::Problem;
 use crate::surface::{Part, Piece, in_space};
 use crate::within::fit_within;
 use block::{Block, MARGIN};
-use trims::Trimmed;
+use trims::{Mend, Trimmed};
 
 /// Shares of the tolerance that pieces which part where they should meet are fitted within the next
 /// time: two that pass the same nodes within half of it meet within it. There is none after the last.
@@ -124,7 +124,12 @@ pub(crate) fn parted(
             }
         }
         let part = part(from + 0.6 * round, 0.4 * round);
-        let trimmed = trims::trimmed(grid, &image, &map, &pieces, tolerance_mm, &part)?;
+        let mend = if begun + 1 < SHARES.len() {
+            Mend::Surfaces
+        } else {
+            Mend::Borders
+        };
+        let trimmed = trims::trimmed(grid, &image, &map, &pieces, tolerance_mm, mend, &part)?;
         let Some(Trimmed {
             model,
             lines,

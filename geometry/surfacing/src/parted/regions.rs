@@ -79,6 +79,7 @@ pub(super) fn regions(
         crease_angle_rad: CREASE_RAD,
         step_factor: STEP_PITCHES.min(STEP_TOLERANCES * tolerance_mm / grid.pitch_mm()),
         minimum_nodes: FEWEST_NODES,
+        bent_seeds: true,
         ..SegmentSettings::default()
     };
     let wanted_mm = (ROUGHNESS * tolerance_mm).min(ROUGH_PITCHES * grid.pitch_mm());

@@ -25,6 +25,9 @@ const LEAST_STEP: f64 = 0.5;
 const FAR_NODES: usize = 4;
 /// How closely a border can be drawn to the nodes.
 const CLOSEST: u8 = 3;
+/// A node of another face that is off by no more than this many tolerances lies beside a crease, where
+/// both surfaces nearly pass it: a border drawn closer to the nodes would leave the crease.
+const BESIDE_CREASE: f64 = 3.0;
 /// Times that borders are drawn: as a rule, two for each step by which they can be drawn closer.
 const MOST_DRAWINGS: usize = 12;
 /// Places along an edge, for each pitch, at which both sides are compared.
@@ -42,6 +45,15 @@ pub(super) struct Trimmed {
     pub(super) across: Vec<(usize, Option<u16>)>,
 }
 
+/// What gives way where a node lies a little on the wrong side of a crease.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Mend {
+    /// The surfaces, which are to pass the node both.
+    Surfaces,
+    /// The border, which is drawn around the node.
+    Borders,
+}
+
 /// The model of the pieces, one for each label, and its lines. `None` where they cannot all be
 /// trimmed on their own surfaces.
 ///
@@ -53,6 +65,7 @@ pub(super) fn trimmed(
     map: &RegionMap,
     pieces: &[Piece],
     tolerance_mm: f64,
+    mend: Mend,
     monitor: &dyn Monitor,
 ) -> Result<Option<Trimmed>, SurfaceError> {
     // The image lies on its lattice, the grid where it was measured.
@@ -74,6 +87,10 @@ pub(super) fn trimmed(
         surfaces
             .get(usize::from(face.region).wrapping_sub(1))
             .is_some_and(|own| own.0 == *patches)
+    };
+    let least_mm = match mend {
+        Mend::Surfaces => BESIDE_CREASE * tolerance_mm,
+        Mend::Borders => tolerance_mm,
     };
     let mut closeness = vec![0; grid.raw_z_mm().len()];
     for _ in 0..MOST_DRAWINGS {
@@ -108,7 +125,11 @@ pub(super) fn trimmed(
             let [i, j] = [0, 1].map(|d| open.at[d].min([grid.columns(), grid.rows()][d] - 1));
             square(i * grid.rows() + j, FAR_NODES, grid.columns(), grid.rows())
         });
-        let asking: BTreeSet<usize> = across.iter().copied().chain(beyond).chain(far).collect();
+        let by_border = elsewhere
+            .iter()
+            .filter(|(_, off_mm)| off_mm.is_nan() || off_mm.abs() > least_mm)
+            .map(|(n, _)| *n);
+        let asking: BTreeSet<usize> = by_border.chain(beyond).chain(far).collect();
         let mut is_nearer = false;
         for n in asking {
             is_nearer |= closeness[n] < CLOSEST;
