@@ -7,6 +7,7 @@
 mod mlms;
 mod row;
 mod scan;
+mod scattered;
 mod stages;
 mod timing;
 mod work;
@@ -39,6 +40,17 @@ struct Options {
     /// Print what the textbook of MLMS answers for so many windows, for others to be held against
     #[arg(long, value_name = "WINDOWS", conflicts_with = "work")]
     answers: Option<usize>,
+    /// Regrid a million samples and write them and what was found into this folder, for peers
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["work", "answers"])]
+    scattered: Option<PathBuf>,
+    /// Share of these that are outliers
+    #[arg(
+        long,
+        value_name = "SHARE",
+        default_value_t = 0.0,
+        requires = "scattered"
+    )]
+    outliers: f64,
     /// Write the whole table into this page, too, between its marks
     #[arg(long, value_name = "FILE", conflicts_with_all = ["work", "answers", "only", "short"])]
     write: Option<PathBuf>,
@@ -68,6 +80,9 @@ fn run(options: &Options) -> Result<()> {
     }
     if let Some(number) = options.answers {
         return mlms::print_answers(number);
+    }
+    if let Some(folder) = &options.scattered {
+        return scattered::write(folder, options.outliers);
     }
     if !options.json {
         println!("{}", row::HEAD);

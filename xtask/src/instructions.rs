@@ -77,9 +77,8 @@ fn has_lanes_on_record() -> bool {
 
 /// Holds the textbook that the bench measures our kernel against to what NumPy answers.
 pub(crate) fn judge_textbook() -> Result<()> {
-    build()?;
+    let program = build()?;
     let python = judge::python(&shell::root().join("target/judges"), &[])?;
-    let program = home().join("release/bench").display().to_string();
     let answers = shell::output(&program, &["--answers", WINDOWS])?;
     let place = home().join("answers.jsonl");
     fs::write(&place, answers)?;
@@ -93,8 +92,8 @@ fn home() -> PathBuf {
     shell::target().join("instructions")
 }
 
-/// Builds what is counted.
-pub(crate) fn build() -> Result<()> {
+/// Builds what is counted, and tells where it is.
+pub(crate) fn build() -> Result<String> {
     let off = || "false".to_owned();
     let words = ["build", "--release", "--package", "relief-benches"];
     shell::run_with(
@@ -105,7 +104,8 @@ pub(crate) fn build() -> Result<()> {
             ("CARGO_PROFILE_RELEASE_DEBUG_ASSERTIONS", off()),
             ("CARGO_PROFILE_RELEASE_OVERFLOW_CHECKS", off()),
         ],
-    )
+    )?;
+    Ok(home().join("release/bench").display().to_string())
 }
 
 fn compare(counts: &BTreeMap<String, f64>, recorded: &BTreeMap<String, f64>) -> Result<()> {

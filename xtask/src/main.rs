@@ -1,6 +1,7 @@
 //! The project's chores. `cargo xtask --help` lists them.
 
 mod apt;
+mod cross;
 mod deb;
 mod fillings;
 mod fuzz;
@@ -86,6 +87,10 @@ enum Chore {
     ///
     /// Needs valgrind; installs it on Debian as root.
     Instructions(instructions::Options),
+    /// Check that the geometry, or with `--whole` the product, compiles for 64-bit Arm.
+    ///
+    /// Needs rustup; with `--whole` a C compiler for it, which it installs on Debian as root.
+    Cross(cross::Options),
     /// Keep the service at work, and watch its memory, descriptors and threads.
     #[command(disable_help_flag = true)]
     Soak {
@@ -126,6 +131,7 @@ fn main() -> anyhow::Result<()> {
         Chore::Bench { options } => study::program("bench", &options),
         Chore::JudgeTextbook => instructions::judge_textbook(),
         Chore::Instructions(options) => instructions::run(&options),
+        Chore::Cross(options) => cross::check(&options),
         Chore::Soak { options } => {
             study::service()?;
             study::program("soak", &options)
@@ -186,6 +192,7 @@ fn full() -> anyhow::Result<()> {
         features: false,
         out: None,
     })?;
+    cross::check(&cross::Options { whole: true })?;
     peers::run(&peers::Peers::Skin(peers::Options { short: false }))?;
     toolpath::run(&toolpath::Options {
         surfaces: 20,

@@ -1,16 +1,15 @@
 //! Keeping a scan's columns, and passing them on.
 
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Instant;
 
-use range_image::Calibration;
-use relief_api::{Event, ScanState, ScannerLink};
-use scan_record::{EndCause, Header, JournalWriter, RawColumn};
+use relief_api::{ScanState, ScannerLink};
+use scan_record::{EndCause, JournalWriter, RawColumn};
 use scanner_driver::ScanStream;
 
 use super::AbortRequest;
 use super::feed::{Fed, feed};
-use super::live::Live;
+use super::onlookers::{Onlookers, Shown};
 use super::run::{Ticket, despite_defects};
 use crate::config::JournalConfig;
 use crate::liveness::Pulse;
@@ -20,6 +19,13 @@ use crate::station::Station;
 /// Columns between the driver and the journal.
 const CHANNEL_COLUMNS: usize = 64;
 
+/// Where columns go while they are kept.
+struct Ways<'a> {
+    pulse: &'a Pulse,
+    acknowledge: &'a dyn Fn(u32),
+    shown: SyncSender<Shown>,
+}
+
 /// What a column meets on its way.
 pub(super) struct Keeper<'a> {
     service: &'a Service,
@@ -27,50 +33,56 @@ pub(super) struct Keeper<'a> {
     id: &'a str,
     abort: &'a AbortRequest,
     policy: JournalConfig,
-    calibration: Calibration,
     journal: JournalWriter,
-    live: Live<'a>,
 }
 
 impl<'a> Keeper<'a> {
-    /// One that keeps the columns behind those that are in the journal and in the live range
-    /// image.
-    pub(super) fn new(
-        service: &'a Service,
-        ticket: &'a Ticket,
-        header: &Header,
-        journal: JournalWriter,
-        live: Live<'a>,
-    ) -> Self {
+    /// One that keeps the columns behind those that are in the journal.
+    pub(super) fn new(service: &'a Service, ticket: &'a Ticket, journal: JournalWriter) -> Self {
         Self {
             service,
             station: &ticket.station,
             id: &ticket.scan.id,
             abort: &ticket.abort,
             policy: service.config().journal,
-            calibration: header.calibration,
             journal,
-            live,
         }
     }
 
-    /// Keeps all that comes, to the end.
-    pub(super) fn keep_all(mut self, stream: ScanStream, pulse: &Pulse) -> Result<(), String> {
+    /// Keeps all that comes, to the end, and has those who look on shown what is kept.
+    pub(super) fn keep_all(
+        mut self,
+        stream: ScanStream,
+        mut onlookers: Onlookers<'_>,
+        pulse: &Pulse,
+    ) -> Result<(), String> {
         let (service, station) = (self.service, self.station);
         let acknowledger = stream.acknowledger();
         let (sender, receiver) = sync_channel(CHANNEL_COLUMNS);
+        let (shown, to_show) = sync_channel(CHANNEL_COLUMNS);
         let result = std::thread::scope(|scope| {
-            let feeder = std::thread::Builder::new()
-                .name(station.loop_name("scan-feed"))
+            let thread = |name| std::thread::Builder::new().name(station.loop_name(name));
+            let refused = |error| format!("cannot start a thread: {error}");
+            let onlookers = &mut onlookers;
+            thread("scan-live")
+                .spawn_scoped(scope, move || onlookers.show_all(&to_show))
+                .map_err(refused)?;
+            let feeder = thread("scan-feed")
                 .spawn_scoped(scope, move || feed(service, station, stream, &sender))
-                .map_err(|error| format!("cannot start a thread: {error}"))?;
+                .map_err(refused)?;
             // The feeder has the stream: unless it is told of a defect here, too, it waits for
             // columns for which nobody acknowledges those before.
             let acknowledge = |index| acknowledger.acknowledge(index);
-            let result = despite_defects(|| self.drain(&receiver, pulse, &acknowledge));
+            let ways = Ways {
+                pulse,
+                acknowledge: &acknowledge,
+                shown,
+            };
+            let result = despite_defects(|| self.drain(&receiver, &ways));
             // With the receiver gone the feeder ends at its next column; an abort wakes a
-            // feeder that waits for one.
+            // feeder that waits for one. With the sender gone all is shown that will be.
             drop(receiver);
+            drop(ways);
             if result.is_err()
                 && !feeder.is_finished()
                 && let Err(error) = station.scanner.abort()
@@ -87,19 +99,15 @@ impl<'a> Keeper<'a> {
         let closed = self.journal.finish(&cause).map_err(|e| e.to_string());
         let result = result.and(closed.map(drop));
         if result.is_ok() {
-            self.live.finish();
+            onlookers.finish();
         }
         result
     }
 
     /// Keeps column after column until the end. One sync serves all columns that came
     /// while the one before was under way, or within the configured interval.
-    fn drain(
-        &mut self,
-        receiver: &Receiver<Fed>,
-        pulse: &Pulse,
-        acknowledge: &dyn Fn(u32),
-    ) -> Result<(), String> {
+    fn drain(&mut self, receiver: &Receiver<Fed>, ways: &Ways<'_>) -> Result<(), String> {
+        let pulse = ways.pulse;
         let mut batch: Vec<RawColumn> = Vec::new();
         let mut due = Instant::now();
         loop {
@@ -118,14 +126,14 @@ impl<'a> Keeper<'a> {
                     self.journal.append(&column).map_err(|e| e.to_string())?;
                     batch.push(column);
                     if batch.len() >= self.policy.sync_columns as usize {
-                        self.commit(&mut batch, acknowledge)?;
+                        self.commit(&mut batch, ways)?;
                     }
                 }
                 Ok(Fed::Paused {
                     reason,
                     needs_person,
                 }) => {
-                    self.commit(&mut batch, acknowledge)?;
+                    self.commit(&mut batch, ways)?;
                     tracing::warn!(scan = self.id, %reason, "scan paused");
                     self.station.laser.scan_paused(&reason);
                     if needs_person {
@@ -137,7 +145,7 @@ impl<'a> Keeper<'a> {
                     self.note_pause(Some(reason), needs_person);
                 }
                 Ok(Fed::Resumed) => {
-                    self.commit(&mut batch, acknowledge)?;
+                    self.commit(&mut batch, ways)?;
                     tracing::info!(scan = self.id, "scan goes on");
                     self.station.laser.scan_goes_on();
                     self.abort.presence.restore();
@@ -150,12 +158,12 @@ impl<'a> Keeper<'a> {
                     }
                 }
                 Ok(Fed::End(end)) => {
-                    self.commit(&mut batch, acknowledge)?;
+                    self.commit(&mut batch, ways)?;
                     return end.map_err(|e| e.to_string());
                 }
-                Err(RecvTimeoutError::Timeout) => self.commit(&mut batch, acknowledge)?,
+                Err(RecvTimeoutError::Timeout) => self.commit(&mut batch, ways)?,
                 Err(RecvTimeoutError::Disconnected) => {
-                    self.commit(&mut batch, acknowledge)?;
+                    self.commit(&mut batch, ways)?;
                     return Err("the scanner's driver ended without a word".into());
                 }
             }
@@ -189,37 +197,24 @@ impl<'a> Keeper<'a> {
     }
 
     /// Syncs, and only then acknowledges and passes on.
-    fn commit(
-        &mut self,
-        batch: &mut Vec<RawColumn>,
-        acknowledge: &dyn Fn(u32),
-    ) -> Result<(), String> {
+    fn commit(&mut self, batch: &mut Vec<RawColumn>, ways: &Ways<'_>) -> Result<(), String> {
         if batch.is_empty() {
             return Ok(());
         }
         self.journal.sync().map_err(|e| e.to_string())?;
         self.abort.presence.beat();
         for column in batch.iter() {
-            acknowledge(column.index);
+            (ways.acknowledge)(column.index);
         }
         let before = self.journal.columns() - batch.len() as u32;
+        // Where showing takes longer than measuring, the table waits in the end.
+        ways.pulse.rest();
         for (column, kept) in batch.drain(..).zip(before + 1..) {
-            let scan = self.station.update_active(|scan| scan.columns = kept);
-            let columns_planned = scan.map_or(0, |scan| scan.columns_planned);
-            let live = self.live.push(column.calibrated(&self.calibration));
-            if self.service.hub.has_listeners() {
-                self.service.hub.tell(Event::Column {
-                    scan: self.id.to_owned(),
-                    scanner: self.station.name().to_owned(),
-                    columns: kept,
-                    columns_planned,
-                    samples: column.samples.len() as u32,
-                    x_mm: self.calibration.x_mm(column.table_counts),
-                    pitch_mm: self.live.pitch_mm(),
-                    live,
-                });
-            }
+            self.station.update_active(|scan| scan.columns = kept);
+            // Those who show have ended only for a defect, which they have told of.
+            let _ = ways.shown.send(Shown { column, kept });
         }
+        ways.pulse.work(self.station.longest_wait);
         Ok(())
     }
 }

@@ -1,5 +1,8 @@
 //! The range image that grows while the scanner moves.
 
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
 use range_image::{Column, GridColumn};
 use regrid::Regridder;
 use relief_api::LiveColumn;
@@ -8,6 +11,7 @@ use scanner_protocol::ScanPlan;
 
 use super::grid_file::GridFile;
 use crate::config::Processing;
+use crate::error::panic_text;
 use crate::fit::Fit;
 use crate::service::{KeptGrid, Service};
 
@@ -58,7 +62,8 @@ impl<'a> Live<'a> {
         let Some(growing) = &mut self.growing else {
             return Vec::new();
         };
-        match growing.push(column) {
+        let pushed = catch_unwind(AssertUnwindSafe(|| growing.push(column)));
+        match pushed.unwrap_or_else(|panic| Err(defect(&*panic))) {
             Ok(finished) => finished
                 .iter()
                 .map(|column| LiveColumn::new(column.i, column.j_first, &column.z_mm))
@@ -96,6 +101,12 @@ impl<'a> Live<'a> {
         }
         tracing::debug!(scan = self.scan, "live range image finished");
     }
+}
+
+/// A defect of the regridding costs the live range image, and no scan.
+fn defect(panic: &(dyn Any + Send)) -> String {
+    let text = panic_text(panic);
+    format!("{text}; this is a defect of the program, please report it")
 }
 
 /// One that nobody has finished is wanted by no job.

@@ -7,6 +7,7 @@ pub(crate) mod grid_file;
 mod heading;
 mod keep;
 mod live;
+mod onlookers;
 mod plan;
 pub(crate) mod presence;
 mod preview;

@@ -1,11 +1,11 @@
 //! One scan from its start to its end.
 //!
 //! ```text
-//! driver --> feed thread --> bounded channel --> this thread: journal, sync,
-//!                                                acknowledge, regrid, tell
+//! driver --> feed thread --> bounded channel --> this thread: journal, sync, acknowledge
+//!                --> bounded channel --> live thread: regrid, tell
 //! ```
 //!
-//! Everything behind the channel may block for a moment without the scanner noticing;
+//! Everything behind the channels may block for a moment without the scanner noticing;
 //! when it blocks for longer, the scanner's credit runs out and the table waits.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,6 +20,7 @@ use super::AbortRequest;
 use super::heading::header;
 use super::keep::Keeper;
 use super::live::Live;
+use super::onlookers::Onlookers;
 use super::plan::ResolvedPlan;
 use super::taken_up::{TakeUp, take_up};
 use crate::config::Processing;
@@ -194,7 +195,8 @@ fn take_all(
         })
         .map_err(|error| format!("{}: {error}", path.display()))?;
     let live = Live::new(service, id, &ticket.processing, &header, &plan.plan);
-    Keeper::new(service, ticket, &header, journal, live).keep_all(stream, pulse)
+    let onlookers = Onlookers::new(service, station, id, header.calibration, live);
+    Keeper::new(service, ticket, journal).keep_all(stream, onlookers, pulse)
 }
 
 /// Homes the table if need be, and starts.

@@ -10,6 +10,7 @@ use super::columns::measured;
 use super::heading::interrupted;
 use super::keep::Keeper;
 use super::live::Live;
+use super::onlookers::Onlookers;
 use super::presence::since_boot;
 use super::run::{Failure, Ticket};
 use crate::liveness::Pulse;
@@ -129,8 +130,9 @@ pub(super) fn take_up(
         drop(stream);
         return aborted(journal, reason);
     }
-    let keeper = Keeper::new(service, ticket, &header, journal, live);
-    Ok(keeper.keep_all(stream, pulse)?)
+    let station = &*ticket.station;
+    let onlookers = Onlookers::new(service, station, id, header.calibration, live);
+    Ok(Keeper::new(service, ticket, journal).keep_all(stream, onlookers, pulse)?)
 }
 
 /// Ends a scan that nobody wants any more, before it has gone on.

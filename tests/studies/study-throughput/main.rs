@@ -7,6 +7,7 @@
 
 mod disk;
 mod page;
+mod stream;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -49,10 +50,11 @@ fn run(options: &Options) -> Result<()> {
         std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))
     });
     let ways = ways(options.short)?;
+    let streams = stream::study(options.short)?;
     let disks = disk::study(options.short)?;
     if let Some(page) = &options.page {
         let usb = usb.context("the page needs --usb")??;
-        std::fs::write(page, page::page(&usb, &ways, &disks))
+        std::fs::write(page, page::page(&usb, &ways, &streams, &disks))
             .with_context(|| format!("cannot write {}", page.display()))?;
     }
     Ok(())

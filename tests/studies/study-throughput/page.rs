@@ -4,7 +4,7 @@ use std::fmt::Display;
 
 use throughput::TABLE_HEAD;
 
-use crate::disk;
+use crate::{disk, stream};
 
 fn rows<T: Display>(rows: &[T]) -> String {
     rows.iter().map(|row| format!("{row}\n")).collect()
@@ -30,7 +30,12 @@ fn compared(ways: &[throughput::Row]) -> String {
     )
 }
 
-pub(crate) fn page(usb: &str, ways: &[throughput::Row], disks: &[disk::Row]) -> String {
+pub(crate) fn page(
+    usb: &str,
+    ways: &[throughput::Row],
+    streams: &[stream::Row],
+    disks: &[disk::Row],
+) -> String {
     format!(
         "# Throughput and backpressure\n\n\
          Written by `cargo xtask study throughput --usb --page docs/studies/throughput.md`. The \
@@ -59,6 +64,12 @@ pub(crate) fn page(usb: &str, ways: &[throughput::Row], disks: &[disk::Row]) -> 
          ## Without USB, on the machine itself\n\n\
          {TABLE_HEAD}\n{}\n\
          {}\n\n\
+         ## Through the service\n\n\
+         As fast as it takes them, from a device in memory: decoded, kept in a journal on disk, \
+         acknowledged, and put on a grid while they come. The device is a thread of the same \
+         program. Times are from the first columns kept to the end of the scan, when all columns \
+         are in the journal and all nodes in the grid; the job is not waited for.\n\n\
+         {}\n{}\n\
          ## A slow disk\n\n\
          A scan through the service, over a pseudo-terminal, on a disk that takes so much longer for \
          each sync of the journal. One sync serves 8 columns (`journal.sync_columns`) or what came in \
@@ -68,6 +79,8 @@ pub(crate) fn page(usb: &str, ways: &[throughput::Row], disks: &[disk::Row]) -> 
          {}\n{}",
         rows(ways),
         compared(ways),
+        stream::TABLE_HEAD,
+        rows(streams),
         disk::TABLE_HEAD,
         rows(disks)
     )

@@ -57,6 +57,18 @@ impl Attached {
     }
 }
 
+impl Attached {
+    /// The driver before the device, and what is dropped when that is no longer needed.
+    ///
+    /// # Errors
+    /// When the driver cannot start.
+    pub fn driven(self, link: LinkSettings) -> Result<(LinkScanner, Box<dyn Any>)> {
+        let connector = Watched::new(self.connector, Arc::default());
+        let scanner = LinkScanner::start(connector, link).context("cannot start the driver")?;
+        Ok((scanner, self.device))
+    }
+}
+
 /// A device that sends this, on a pseudo-terminal.
 ///
 /// # Errors

@@ -12,6 +12,8 @@ pub(super) struct Assembly {
     shape: Option<Shape>,
     /// By fragment index; as long as the number of fragments.
     parts: Vec<Option<Part>>,
+    /// All samples, each at its place in the column. Fragments are too many for memory of their own.
+    samples: Vec<Sample>,
     have: usize,
     /// The number of samples that the column's end told.
     told_samples: Option<usize>,
@@ -23,10 +25,11 @@ struct Shape {
     fragments: u16,
 }
 
-#[derive(Debug)]
+/// Where the samples of a fragment are.
+#[derive(Debug, Clone, Copy)]
 struct Part {
     first_sample: usize,
-    samples: Box<[Sample]>,
+    count: usize,
 }
 
 /// The parts of a column contradict each other.
@@ -58,10 +61,19 @@ impl Assembly {
         if part.is_some() {
             return Ok(false);
         }
+        let count = fragment.len();
         *part = Some(Part {
             first_sample,
-            samples: fragment.samples().collect(),
+            count,
         });
+        let end = first_sample + count;
+        if self.samples.len() < end {
+            self.samples.resize(end, Sample::default());
+        }
+        let places = self.samples.iter_mut().skip(first_sample);
+        for (place, sample) in places.zip(fragment.samples()) {
+            *place = sample;
+        }
         self.have += 1;
         Ok(true)
     }
@@ -114,36 +126,48 @@ impl Assembly {
     }
 
     /// The column, once it is complete. Checks that the fragments join without gap or overlap.
-    pub(super) fn finish(self, index: u32) -> Result<RawColumn, Contradiction> {
-        let mut column = RawColumn {
-            index,
-            table_counts: self.shape.map_or(0, |shape| shape.table_counts),
-            ..RawColumn::default()
-        };
+    /// Ready for another column afterwards.
+    pub(super) fn finish(&mut self, index: u32) -> Result<RawColumn, Contradiction> {
+        let column = self.column(index);
+        self.clear();
+        column
+    }
+
+    /// Forgets all that has come, and keeps the memory for what will.
+    pub(super) fn clear(&mut self) {
+        self.shape = None;
+        self.parts.clear();
+        self.samples.clear();
+        self.have = 0;
+        self.told_samples = None;
+    }
+
+    fn column(&self, index: u32) -> Result<RawColumn, Contradiction> {
         let mut count = 0;
         for part in self.parts.iter().flatten() {
             if part.first_sample != count {
                 return Err(Contradiction("its fragments do not join"));
             }
-            count += part.samples.len();
-            for sample in &part.samples {
-                let reading = sample.reading;
-                if reading.no_return {
-                    column.dropouts += 1;
-                } else {
-                    column.samples.push(RawSample {
-                        lateral_counts: sample.lateral_counts,
-                        range_counts: reading.range_counts,
-                        intensity: reading.intensity,
-                        saturated: reading.saturated,
-                    });
-                }
-            }
+            count += part.count;
         }
         if self.told_samples.is_some_and(|told| told != count) {
             return Err(Contradiction("its end tells another number of samples"));
         }
-        Ok(column)
+        // The one block of memory that the column travels in from here on.
+        let mut samples = Vec::with_capacity(count);
+        let returned = self.samples.iter().filter(|s| !s.reading.no_return);
+        samples.extend(returned.map(|sample| RawSample {
+            lateral_counts: sample.lateral_counts,
+            range_counts: sample.reading.range_counts,
+            intensity: sample.reading.intensity,
+            saturated: sample.reading.saturated,
+        }));
+        Ok(RawColumn {
+            index,
+            table_counts: self.shape.map_or(0, |shape| shape.table_counts),
+            dropouts: (count - samples.len()) as u32,
+            samples,
+        })
     }
 }
 

@@ -103,6 +103,8 @@ pub(super) struct ScanTracker {
     next: u32,
     /// Columns `next..granted()` as far as anything of them has come.
     window: VecDeque<Slot>,
+    /// Memory of columns that have been handed on, for those to come.
+    spare: Vec<Assembly>,
     /// There is evidence that every column below has been sent once.
     sent_below: u32,
     taken: Taken,
@@ -139,6 +141,7 @@ impl ScanTracker {
             total: info.columns,
             next: taken.first_column,
             window: VecDeque::new(),
+            spare: Vec::new(),
             sent_below: taken.first_column,
             taken,
             grant_due: false,
@@ -163,8 +166,11 @@ impl ScanTracker {
             return None;
         }
         let at = usize::try_from(column.checked_sub(self.next)?).ok()?;
-        if at >= self.window.len() {
-            self.window.resize_with(at + 1, Slot::default);
+        while at >= self.window.len() {
+            self.window.push_back(Slot {
+                assembly: self.spare.pop().unwrap_or_default(),
+                ..Slot::default()
+            });
         }
         self.window.get_mut(at)
     }
@@ -223,7 +229,7 @@ impl ScanTracker {
         if !slot.assembly.is_complete() {
             return;
         }
-        match std::mem::take(&mut slot.assembly).finish(index) {
+        match slot.assembly.finish(index) {
             Ok(column) => {
                 slot.column = Some(column);
                 self.progress = now;
@@ -250,7 +256,8 @@ impl ScanTracker {
     /// The next column in order, if it is complete.
     pub(super) fn take(&mut self) -> Option<RawColumn> {
         let column = self.window.front_mut()?.column.take()?;
-        self.window.pop_front();
+        self.spare
+            .extend(self.window.pop_front().map(|slot| slot.assembly));
         self.next += 1;
         // Of columns measured again those that have come are safe: the device need not keep
         // them, and may have no room for more.
@@ -391,7 +398,7 @@ impl Slot {
     /// Begins the column anew. It is asked for again at the next look, as any gap is.
     fn restart(&mut self, column: u32, contradiction: Contradiction) {
         tracing::warn!(column, reason = contradiction.0, "column discarded");
-        self.assembly = Assembly::default();
+        self.assembly.clear();
         self.column = None;
         self.restarts += 1;
     }
