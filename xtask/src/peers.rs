@@ -16,6 +16,8 @@ pub(crate) enum Peers {
     /// Medians in the cells of a grid by SciPy and Verde against the regridder, on a million samples
     /// without and with outliers.
     Regrid(RegridOptions),
+    /// `relief surface` against FITPACK on a grid with an oblique step.
+    Step,
 }
 
 #[derive(Debug, Args)]
@@ -46,6 +48,7 @@ pub(crate) fn run(peers: &Peers) -> Result<()> {
     match peers {
         Peers::Skin(options) => skin(options),
         Peers::Regrid(options) => regrid(options),
+        Peers::Step => step(),
     }
 }
 
@@ -67,6 +70,18 @@ fn regrid(options: &RegridOptions) -> Result<()> {
         write(&table).with_context(|| format!("cannot write {PAGE}"))?;
     }
     Ok(())
+}
+
+fn step() -> Result<()> {
+    let target = shell::root().join("target");
+    let python = judge::python(&target.join("judges"), &[judge::SCIPY])?;
+    shell::run("cargo", &["build", "--release", "--bin", "relief"])?;
+    let program = shell::target().join("release/relief").display().to_string();
+    let folder = target.join("studies/step").display().to_string();
+    shell::run(
+        &python,
+        &["-B", "tests/peers/step_surface.py", &program, &folder],
+    )
 }
 
 /// Puts a table where the page's marks are.
