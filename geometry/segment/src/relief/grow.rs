@@ -1,6 +1,10 @@
 //! Growing pieces from seeds (Besl & Jain 1988, *Segmentation through variable-order surface
 //! fitting*).
 
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
 use super::piece::Pieces;
 use super::surface::Surface;
 use super::windows::{WindowPlane, best_windows, planes};
@@ -58,10 +62,19 @@ pub(crate) fn pieces(scene: &Scene<'_>, monitor: &dyn Monitor) -> Result<Pieces,
         stamp: 0,
     };
     // Nodes by the last kind of seed that came to nothing there.
-    let mut vain = vec![0; grid.nodes()];
-    for (k, (reach, noises)) in SEEDS.into_iter().enumerate() {
+    let mut vain = vec![0_u8; grid.nodes()];
+    let mut known = BTreeMap::new();
+    for ((reach, noises), k) in SEEDS.into_iter().zip(0_u8..) {
         monitor.check()?;
-        for (roughness, seed) in seeds(scene, reach, noises) {
+        let left = known.entry(reach).or_insert_with(|| match reach {
+            REACH => left(scene, &grower.directions),
+            _ => left(scene, &planes(grid, reach)),
+        });
+        // Those that are taken by now would be passed over one by one.
+        let seeds = seeds(left, noises, &|node| {
+            vain[node] <= k && grower.is_open(node, reach)
+        });
+        for (roughness, seed) in seeds {
             if vain[seed] <= k && grower.is_open(seed, reach) {
                 monitor.check()?;
                 if !grower.grow(seed, reach, roughness) {
@@ -74,7 +87,7 @@ pub(crate) fn pieces(scene: &Scene<'_>, monitor: &dyn Monitor) -> Result<Pieces,
                 }
             }
         }
-        monitor.progress(0.05 + 0.3 * (k + 1) as f64 / SEEDS.len() as f64);
+        monitor.progress(0.05 + 0.3 * f64::from(k + 1) / SEEDS.len() as f64);
     }
     for (k, reach) in CURVED_SEEDS.into_iter().enumerate() {
         monitor.check()?;
@@ -89,30 +102,37 @@ pub(crate) fn pieces(scene: &Scene<'_>, monitor: &dyn Monitor) -> Result<Pieces,
     Ok(grower.pieces)
 }
 
-/// The middles of windows whose planes leave less than so many noises, the flattest first, with
-/// their roughness.
-fn seeds(scene: &Scene<'_>, reach: usize, noises: f64) -> Vec<(f64, usize)> {
-    let planes = planes(&scene.grid, reach);
-    // Flatness is in squared noises, those of the window's slope.
-    let mut seeds: Vec<(f32, usize)> = planes
-        .iter()
-        .enumerate()
-        .filter_map(|(node, plane)| {
-            let rise_mm = plane.rise_mm.map(f64::from);
-            let noise_mm = scene.noise.on_slope_mm(rise_mm, scene.grid.pitch_mm);
-            let left = plane.variance_mm2 / (noise_mm * noise_mm) as f32;
-            (left < (noises * noises) as f32).then_some((left, node))
-        })
-        .collect();
-    seeds.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let roughness = |left: f32| {
-        let left = libm::sqrt(f64::from(left));
-        if left < CLEAN { 1.0 } else { left }
+/// What the planes of windows leave, in squared noises, those of the window's slope; infinite where
+/// there is none.
+fn left(scene: &Scene<'_>, planes: &[WindowPlane]) -> Vec<f32> {
+    let left = |plane: &WindowPlane| {
+        let rise_mm = plane.rise_mm.map(f64::from);
+        let noise_mm = scene.noise.on_slope_mm(rise_mm, scene.grid.pitch_mm);
+        plane.variance_mm2 / (noise_mm * noise_mm) as f32
     };
-    seeds
-        .into_iter()
-        .map(|(left, node)| (roughness(left), node))
-        .collect()
+    planes.par_iter().map(left).collect()
+}
+
+/// The middles of windows that leave less than so many noises, of those that may be seeds, the
+/// flattest first, with their roughness.
+fn seeds(
+    left: &[f32],
+    noises: f64,
+    may: &dyn Fn(usize) -> bool,
+) -> impl Iterator<Item = (f64, usize)> + use<> {
+    let most = (noises * noises) as f32;
+    let flat = left.iter().zip(0_u32..);
+    let mut keys: Vec<u64> = flat
+        .filter(|(left, node)| **left < most && may(*node as usize))
+        .map(|(left, node)| u64::from(left.to_bits()) << 32 | u64::from(node))
+        .collect();
+    // What is left is nowhere below 0, so that its bits are in its order.
+    keys.par_sort_unstable();
+    keys.into_iter().map(|key| {
+        let left = libm::sqrt(f64::from(f32::from_bits((key >> 32) as u32)));
+        let roughness = if left < CLEAN { 1.0 } else { left };
+        (roughness, key as u32 as usize)
+    })
 }
 
 struct Grower<'a> {
