@@ -43,6 +43,8 @@ const TURN_ERRORS: f64 = 4.0;
 const TURN_SHARE: f64 = 0.5;
 /// Growth that has not settled after so many rounds wanders.
 const ROUNDS: usize = 30;
+/// Nodes that are looked at by one thread at least.
+const AT_ONCE: usize = 512;
 /// Smaller pieces are none.
 const LEAST_NODES: usize = 12;
 
@@ -165,6 +167,7 @@ impl Grower<'_> {
     fn curved_seeds(&self, reach: usize) -> Vec<usize> {
         let side = 2 * reach + 1;
         let mut seeds: Vec<(f64, usize)> = (0..self.pieces.labels.len())
+            .into_par_iter()
             .filter(|&node| {
                 self.pieces.labels[node] == NONE
                     && self.scene.grid.is_valid(node)
@@ -250,11 +253,10 @@ impl Grower<'_> {
     fn flood(&mut self, nodes: &[u32], surface: &Surface, layers: usize) -> Vec<u32> {
         self.stamp += 1;
         let mut found: Vec<u32> = Vec::with_capacity(2 * nodes.len());
-        for &node in nodes {
-            if self.lies_on(node as usize, surface) {
-                self.seen[node as usize] = self.stamp;
-                found.push(node);
-            }
+        let lying = nodes.par_iter().with_min_len(AT_ONCE).copied();
+        found.par_extend(lying.filter(|&node| self.lies_on(node as usize, surface)));
+        for &node in &found {
+            self.seen[node as usize] = self.stamp;
         }
         let mut from = 0;
         for _ in 0..layers {
@@ -292,14 +294,14 @@ impl Grower<'_> {
         if f64::from(plane.variance_mm2) > clear * clear {
             return miss <= 0.5 * MISS_NOISES;
         }
-        let turn = turn(grid, plane, rise_mm);
+        let turn = Turn::of(grid, plane, rise_mm);
         // The standard error of a full window's slope: its sum of u u is a third of
         // n reach (reach + 1).
         let reach = REACH as f64;
         let side = 2.0 * reach + 1.0;
         let error = noise_mm / grid.pitch_mm
             * libm::sqrt(3.0 * noise.area_nodes / (side * side * reach * (reach + 1.0)));
-        turn.angle <= (TURN_SHARE * self.scene.crease_rad).max(TURN_ERRORS * error * turn.facing)
+        turn.is_within((TURN_SHARE * self.scene.crease_rad).max(TURN_ERRORS * error * turn.facing))
     }
 
     /// Nodes without what hangs on by fewer than three nodes side by side, the largest
@@ -358,23 +360,63 @@ impl Grower<'_> {
     }
 }
 
-/// An angle between normals, and how squarely they face the camera: slopes' errors shrink by
-/// this in angles.
+/// A turn between normals, and how squarely they face the camera: slopes' errors shrink by this in
+/// angles.
 struct Turn {
-    angle: f64,
+    sine: f64,
+    cosine: f64,
     facing: f64,
 }
 
-fn turn(grid: &Grid<'_>, plane: &WindowPlane, rise_mm: [f64; 2]) -> Turn {
-    let [p, q] = rise_mm.map(|r| r / grid.pitch_mm);
-    let [a, b] = plane.rise_mm.map(|r| f64::from(r) / grid.pitch_mm);
-    // Cross product of (-p, -q, 1) and (-a, -b, 1), and the squares of their lengths.
-    let cross = [b - q, p - a, p * b - q * a];
-    let squares = (1.0 + p * p + q * q) * (1.0 + a * a + b * b);
-    let sine = libm::sqrt(cross.iter().map(|c| c * c).sum::<f64>() / squares);
-    let cosine = (p * a + q * b + 1.0) / libm::sqrt(squares);
-    Turn {
-        angle: libm::atan2(sine, cosine),
-        facing: 1.0 / libm::sqrt(squares),
+impl Turn {
+    fn of(grid: &Grid<'_>, plane: &WindowPlane, rise_mm: [f64; 2]) -> Self {
+        let [p, q] = rise_mm.map(|r| r / grid.pitch_mm);
+        let [a, b] = plane.rise_mm.map(|r| f64::from(r) / grid.pitch_mm);
+        // Cross product of (-p, -q, 1) and (-a, -b, 1), and the squares of their lengths.
+        let cross = [b - q, p - a, p * b - q * a];
+        let squares = (1.0 + p * p + q * q) * (1.0 + a * a + b * b);
+        let root = libm::sqrt(squares);
+        Self {
+            sine: libm::sqrt(cross.iter().map(|c| c * c).sum::<f64>() / squares),
+            cosine: (p * a + q * b + 1.0) / root,
+            facing: 1.0 / root,
+        }
+    }
+
+    /// Whether the angle is no greater. It is worked out only where its sine does not tell: that is
+    /// less than the angle, by a sixth of the angle's cube at most.
+    fn is_within(&self, angle: f64) -> bool {
+        let least_sine = angle - angle * angle * angle / 6.0;
+        if self.cosine > 0.0 && self.sine <= (1.0 - ROUNDING) * least_sine {
+            return true;
+        }
+        self.sine <= (1.0 + ROUNDING) * angle && libm::atan2(self.sine, self.cosine) <= angle
+    }
+}
+
+/// More than rounding does to an angle or its sine, of these.
+const ROUNDING: f64 = 1e-12;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_is_within_an_angle_as_its_own_angle_is() {
+        for k in 0..2_000_000 {
+            let own = f64::from(k) * 1.7e-6;
+            let turn = Turn {
+                sine: libm::sin(own).abs(),
+                cosine: libm::cos(own),
+                facing: 1.0,
+            };
+            for limit in [0.05, 0.3, 1.2, core::f64::consts::FRAC_PI_2, 2.0] {
+                let close = own * (1.0 + f64::from(k % 7 - 3) * 2e-16);
+                for angle in [limit, close] {
+                    let exact = libm::atan2(turn.sine, turn.cosine) <= angle;
+                    assert_eq!(turn.is_within(angle), exact, "{own} {angle}");
+                }
+            }
+        }
     }
 }

@@ -10,7 +10,7 @@ use crate::grid::Grid;
 use strip::Strip;
 
 /// A plane fitted to a window.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct WindowPlane {
     /// Rise of z per column and per row, millimetres.
     pub(crate) rise_mm: [f32; 2],
@@ -107,4 +107,79 @@ pub(crate) fn best_windows(
         }
     }
     chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The plane of a window as defined, its terms summed up in the same order.
+    fn plane(grid: &Grid<'_>, node: usize, reach: usize) -> WindowPlane {
+        let (column, row) = grid.column_row(node);
+        let (columns, rows) = grid.window(node, reach);
+        let reference_mm = reference_mm(grid);
+        let (mut s, mut along) = ([0.0; 6], [0.0; 4]);
+        for c in columns {
+            let mut line = [0.0; 6];
+            for r in rows.clone() {
+                let z = grid.z_mm[c * grid.rows + r] - reference_mm;
+                let v = r as f64 - row as f64;
+                if !z.is_nan() {
+                    for (sum, term) in line.iter_mut().zip([1.0, v, v * v, z, v * z, z * z]) {
+                        *sum += term;
+                    }
+                }
+            }
+            let u = c as f64 - column as f64;
+            for (sum, term) in s.iter_mut().zip(line) {
+                *sum += term;
+            }
+            let terms = [u * line[0], u * u * line[0], u * line[1], u * line[3]];
+            for (sum, term) in along.iter_mut().zip(terms) {
+                *sum += term;
+            }
+        }
+        let [n, v, vv, z, vz, zz] = s;
+        let [u, uu, uv, uz] = along;
+        let (uu, uv, vv) = (uu - u * u / n, uv - u * v / n, vv - v * v / n);
+        let (uz, vz, zz) = (uz - u * z / n, vz - v * z / n, zz - z * z / n);
+        let determinant = uu * vv - uv * uv;
+        let side = 2 * reach + 1;
+        if !grid.is_valid(node) || n < (side * side / 2) as f64 || determinant < 1e-6 {
+            return WindowPlane::NONE;
+        }
+        let a = (uz * vv - vz * uv) / determinant;
+        let b = (vz * uu - uz * uv) / determinant;
+        let left = (zz - a * uz - b * vz).max(0.0);
+        WindowPlane {
+            rise_mm: [a as f32, b as f32],
+            variance_mm2: (left / (n - 3.0)) as f32,
+        }
+    }
+
+    #[test]
+    fn planes_are_those_of_each_window_alone_whatever_the_threads() {
+        let (columns, rows) = (37, 29);
+        let z_mm: Vec<f64> = (0..columns * rows)
+            .map(|k| match k * 7919 % 13 {
+                0 => f64::NAN,
+                stray => 0.3 * (k / rows) as f64 - 0.1 * (k % rows) as f64 + 0.01 * stray as f64,
+            })
+            .collect();
+        let grid = Grid {
+            columns,
+            rows,
+            pitch_mm: 0.5,
+            z_mm: &z_mm,
+        };
+        for reach in [2, 3, 12] {
+            let alone: Vec<WindowPlane> =
+                (0..grid.nodes()).map(|n| plane(&grid, n, reach)).collect();
+            for threads in [1, 2, 3] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+                let planes = pool.build().unwrap().install(|| planes(&grid, reach));
+                assert_eq!(planes, alone, "reach {reach}, {threads} threads");
+            }
+        }
+    }
 }
