@@ -277,13 +277,14 @@ fn polynomial<const N: usize>(
     if !enough(N) {
         return None;
     }
-    let pairs = || (0..=degree).flat_map(|i| (0..=degree - i).map(move |j| (i, j)));
-    let terms = |u: &[f64], v: &[f64]| {
-        let mut terms = SVector::<f64, N>::zeros();
-        for (term, (i, j)) in terms.iter_mut().zip(pairs()) {
+    let pairs = (0..=degree).flat_map(|i| (0..=degree - i).map(move |j| (i, j)));
+    let pairs: Vec<(usize, usize)> = pairs.collect();
+    let terms = |u: &[f64; 7], v: &[f64; 7]| {
+        let mut terms = [0.0; N];
+        for (term, &(i, j)) in terms.iter_mut().zip(&pairs) {
             *term = u[i] * v[j];
         }
-        terms
+        SVector::from(terms)
     };
     let place = |sample: &Sample| {
         let [u, v, w] = frame.coordinates(&sample.point_mm);
