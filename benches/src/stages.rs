@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use cad_exchange::iges;
-use pipeline::{Observer, Outcome, Settings, Stage};
+use pipeline::{InMemory, Observer, Outcome, Settings, Stage, View};
 use range_image::{Column, Monitor, RangeImage, Unmonitored};
 use regrid::{Estimator, RegridSettings, regrid};
 
@@ -102,6 +102,24 @@ pub(crate) fn processed(
     let mut settings = Settings::new(pitch_mm);
     settings.regrid.threads = 1;
     Ok(pipeline::process_columns(columns, &settings, observer)?)
+}
+
+/// From the range image to the model, with the samples at hand.
+pub(crate) fn modelled(image: &RangeImage, columns: &[Column], pitch_mm: f64) -> Result<Outcome> {
+    let mut settings = Settings::new(pitch_mm);
+    settings.regrid.threads = 1;
+    let scan = InMemory {
+        columns,
+        camera_mm: None,
+    };
+    let view = View::default();
+    Ok(pipeline::process_in_view(
+        image,
+        Some(&scan),
+        &view,
+        &settings,
+        &Unmonitored,
+    )?)
 }
 
 pub(crate) fn iges_file(outcome: &Outcome) -> Result<Vec<u8>> {

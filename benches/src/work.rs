@@ -6,12 +6,13 @@ use std::hint::black_box;
 use anyhow::{Context, Result};
 use pipeline::Outcome;
 use range_image::{RangeImage, Unmonitored};
+use reconstruct::{ReconstructSettings, reconstruct};
 use regrid::{Estimator, LeastMedian};
 use segment::{SegmentSettings, segment};
 
 use crate::mlms::windows;
 use crate::scan::house;
-use crate::stages::{iges_file, processed, regridded};
+use crate::stages::{iges_file, modelled, processed, regridded};
 
 /// Columns of the scan, and samples of each.
 const SCAN: (u32, u32) = (72, 72);
@@ -19,7 +20,7 @@ const SCAN: (u32, u32) = (72, 72);
 /// Does its work so many times, and says how many nodes it has each time.
 type Work = fn(u64) -> Result<usize>;
 
-pub(crate) const WORK: [(&str, Work); 6] = [
+pub(crate) const WORK: [(&str, Work); 8] = [
     ("mlms-32", |times| Ok(mlms(32, times))),
     ("mlms-128", |times| Ok(mlms(128, times))),
     ("regrid-mlms", |times| regrid(Estimator::LeastMedian, times)),
@@ -30,6 +31,27 @@ pub(crate) const WORK: [(&str, Work); 6] = [
         let (image, _) = scan()?;
         for _ in 0..times {
             black_box(segment(&image, &SegmentSettings::default(), &Unmonitored)?);
+        }
+        Ok(image.valid_nodes())
+    }),
+    ("reconstruct", |times| {
+        let (image, outcome) = scan()?;
+        let settings = ReconstructSettings::default();
+        for _ in 0..times {
+            black_box(reconstruct(
+                &image,
+                &outcome.regions,
+                &settings,
+                &Unmonitored,
+            )?);
+        }
+        Ok(image.valid_nodes())
+    }),
+    ("model", |times| {
+        let (columns, pitch_mm) = house(SCAN.0, SCAN.1);
+        let (image, _) = processed(&columns, pitch_mm, &Unmonitored)?;
+        for _ in 0..times {
+            black_box(modelled(&image, &columns, pitch_mm)?);
         }
         Ok(image.valid_nodes())
     }),

@@ -27,12 +27,14 @@ const TIMES: u64 = 3;
 const WINDOWS: &str = "25";
 
 /// What is counted, as the bench calls it.
-const WORK: [&str; 6] = [
+const WORK: [&str; 8] = [
     "mlms-32",
     "mlms-128",
     "regrid-mlms",
     "regrid-consensus",
     "segment",
+    "reconstruct",
+    "model",
     "iges",
 ];
 

@@ -1,6 +1,7 @@
 //! Nodes given to the pieces that explain them best.
 
 use range_image::{Cancelled, Monitor};
+use rayon::prelude::*;
 use shapes::Fit;
 
 use crate::field::Field;
@@ -45,14 +46,16 @@ impl Pieces<'_, '_> {
             if moved == 0 {
                 break;
             }
-            for (label, set) in self.inner().into_iter().enumerate() {
-                let samples = self.field.samples_of(&set, SAMPLES);
-                if let Some(fit) = &mut self.fits[label]
-                    && let Some(again) = fit.again(&samples, self.field.area())
+            let (field, inner) = (self.field, self.inner());
+            let each = self.fits.par_iter_mut().zip(inner);
+            each.for_each(|(fit, set)| {
+                let samples = field.samples_of(&set, SAMPLES);
+                if let Some(fit) = fit
+                    && let Some(again) = fit.again(&samples, field.area())
                 {
                     *fit = again;
                 }
-            }
+            });
         }
         Ok(())
     }
@@ -80,10 +83,10 @@ impl Pieces<'_, '_> {
     /// What the samples at a node cost in a piece. Nodes themselves are the middles of windows,
     /// and beside a border those lie on both sides.
     fn cost(&self, label: usize, place: usize) -> f64 {
-        let samples = self.field.samples_of(&[place], usize::MAX);
+        let samples = self.field.at(place);
         match &self.fits[label] {
             Some(fit) => fit
-                .offs(&samples)
+                .offs(samples)
                 .map(|off| off.abs().min(MOST_OFF).powi(2))
                 .sum(),
             None => FREE * samples.len() as f64,

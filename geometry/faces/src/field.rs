@@ -264,6 +264,12 @@ impl<'a> Field<'a> {
         parts
     }
 
+    /// The samples at a place.
+    pub(crate) fn at(&self, place: usize) -> &[Sample] {
+        let node = self.nodes[place].as_ref();
+        node.map_or(&[], |node| self.observations.at(node.index))
+    }
+
     /// At most so many samples at these places.
     pub(crate) fn samples_of(&self, places: &[usize], most: usize) -> Vec<Sample> {
         let nodes: Vec<usize> = places

@@ -21,6 +21,8 @@ pub(crate) struct Rounding {
     shapes: [Shape; 2],
     /// 1 where the edge stands out, -1 where it lies deep.
     sign: f64,
+    /// Square of the sine of [`LEAST_TURN`].
+    least_sine2: f64,
 }
 
 /// What a place near an edge is of.
@@ -36,16 +38,18 @@ impl Rounding {
     /// `None` where the shapes have no edge by these samples near it.
     pub(crate) fn of(shapes: [Shape; 2], near: &[Sample]) -> Option<Self> {
         let (mut sum_mm, mut turned) = (0.0, 0_usize);
+        let most_cosine = libm::cos(LEAST_TURN);
         for sample in near {
             let p = &sample.point_mm;
             // What lies below both is the edge of a body.
             sum_mm += shapes.iter().map(|s| s.distance_mm(p)).sum::<f64>();
             let [a, b] = shapes.map(|shape| shape.normal(p));
-            turned += usize::from(a.dot(&b) <= libm::cos(LEAST_TURN));
+            turned += usize::from(a.dot(&b) <= most_cosine);
         }
         (2 * turned > near.len()).then_some(Self {
             shapes,
             sign: if sum_mm < 0.0 { 1.0 } else { -1.0 },
+            least_sine2: libm::sin(LEAST_TURN).powi(2),
         })
     }
 
@@ -81,7 +85,7 @@ impl Rounding {
             let [na, nb] = [a.normal(&middle), b.normal(&middle)];
             let cos = na.dot(&nb);
             let sine2 = 1.0 - cos * cos;
-            if sine2 < libm::sin(LEAST_TURN).powi(2) {
+            if sine2 < self.least_sine2 {
                 return self.nearer(place);
             }
             let from = place - middle;

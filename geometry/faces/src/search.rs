@@ -1,11 +1,13 @@
 //! The place where something is the least, found without its slope.
 
+use rayon::prelude::*;
+
 /// Of places between two, where `left` is the least: the best of `first` evenly spread, and then of
 /// those beside it, at half the distance so many times. `first` is at least 2.
 pub(crate) fn least(
     (low, high): (f64, f64),
     (first, halvings): (u32, u32),
-    left: impl Fn(f64) -> f64,
+    left: impl Fn(f64) -> f64 + Sync,
 ) -> f64 {
     let of = |at: f64| {
         let at = at.clamp(low, high);
@@ -13,13 +15,15 @@ pub(crate) fn least(
     };
     let less = |a: (f64, f64), b: (f64, f64)| if b.0 < a.0 { b } else { a };
     let mut step = (high - low) / f64::from(first - 1);
-    let all = (0..first).map(|k| of(low + step * f64::from(k)));
-    let mut best = all.fold((f64::INFINITY, low), less);
+    let all = (0..first)
+        .into_par_iter()
+        .map(|k| of(low + step * f64::from(k)));
+    let all: Vec<(f64, f64)> = all.collect();
+    let mut best = all.into_iter().fold((f64::INFINITY, low), less);
     for _ in 0..halvings {
         step /= 2.0;
-        for beside in [best.1 - step, best.1 + step] {
-            best = less(best, of(beside));
-        }
+        let (below, above) = rayon::join(|| of(best.1 - step), || of(best.1 + step));
+        best = less(less(best, below), above);
     }
     best.1
 }

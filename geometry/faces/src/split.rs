@@ -160,9 +160,13 @@ fn apart(
     };
     let touching = touching(field, pieces);
     let mut is_free: Vec<bool> = pieces.iter().map(|piece| piece.fit.is_none()).collect();
-    for &(a, b) in &touching {
+    let is_smooth = touching.par_iter().map(|pair| {
         monitor.check()?;
-        if is_smooth_between(field, pieces, &touching, (a, b)) {
+        Ok(is_smooth_between(field, pieces, &touching, *pair))
+    });
+    let is_smooth: Vec<Result<bool, Cancelled>> = is_smooth.collect();
+    for (&(a, b), is_smooth) in touching.iter().zip(is_smooth) {
+        if is_smooth? {
             (is_free[a], is_free[b]) = (true, true);
             unite(a, b);
         }
@@ -190,7 +194,9 @@ fn apart(
 pub(crate) fn touching(field: &Field<'_>, pieces: &[Piece]) -> Vec<(usize, usize)> {
     let touch = |a: &Piece, b: &Piece| count(&field.near(&a.nodes, &b.nodes, 1)) >= CONTACT;
     let pairs = (0..pieces.len()).flat_map(|a| (a + 1..pieces.len()).map(move |b| (a, b)));
+    let pairs: Vec<_> = pairs.collect();
     pairs
+        .into_par_iter()
         .filter(|(a, b)| touch(&pieces[*a], &pieces[*b]))
         .collect()
 }
@@ -314,7 +320,7 @@ fn is_free_form(field: &Field<'_>, pieces: &[Piece]) -> bool {
     let pairs = touching.iter().filter(|(a, b)| tells(*a) && tells(*b));
     let pairs: Vec<_> = pairs.collect();
     let smooth = pairs
-        .iter()
+        .par_iter()
         .filter(|pair| is_smooth_between(field, pieces, &touching, ***pair));
     let smooth = smooth.count();
     smooth >= FEW_PAIRS && 2 * smooth > pairs.len()

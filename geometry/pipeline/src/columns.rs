@@ -1,6 +1,7 @@
 //! Columns that can be gone through more than once.
 
 use range_image::Column;
+use rayon::prelude::*;
 use regrid::Roi;
 
 /// What goes wrong when columns are read again.
@@ -21,6 +22,39 @@ pub trait Columns: Sync {
     fn camera_mm(&self) -> Option<[f64; 2]> {
         None
     }
+}
+
+/// Columns that threads share out among them at a time.
+const AT_ONCE: usize = 128;
+
+/// Makes something `of` each column, and hands it to `take` in the order of the columns, until one is
+/// refused with `false`.
+///
+/// # Errors
+/// As [`Columns::visit`].
+pub(crate) fn each<T: Send>(
+    columns: &dyn Columns,
+    of: impl Fn(&Column) -> T + Sync,
+    mut take: impl FnMut(T) -> bool,
+) -> Result<(), ReadAgainError> {
+    let mut waiting: Vec<Column> = Vec::with_capacity(AT_ONCE);
+    let mut goes_on = true;
+    let mut hand_over = |waiting: &mut Vec<Column>| {
+        let made: Vec<T> = waiting.par_iter().map(&of).collect();
+        waiting.clear();
+        made.into_iter().all(&mut take)
+    };
+    columns.visit(&mut |column| {
+        waiting.push(column.clone());
+        if waiting.len() == AT_ONCE {
+            goes_on = hand_over(&mut waiting);
+        }
+        goes_on
+    })?;
+    if goes_on {
+        hand_over(&mut waiting);
+    }
+    Ok(())
 }
 
 /// Columns as far as they lie in the region of interest: what lies outside of it is not there.

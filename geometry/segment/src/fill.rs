@@ -1,5 +1,7 @@
 //! Lone masked nodes get a working value, so that dropouts do not tear surfaces apart.
 
+use rayon::prelude::*;
+
 use crate::grid::Grid;
 
 /// Rounds of filling; each closes gaps by what the last has filled.
@@ -15,6 +17,7 @@ pub(crate) fn filled(grid: &Grid<'_>) -> Vec<f64> {
     let mut z = grid.z_mm.to_vec();
     for _ in 0..ROUNDS {
         let found: Vec<(usize, f64)> = (0..grid.nodes())
+            .into_par_iter()
             .filter(|&node| z[node].is_nan())
             .filter_map(|node| Some((node, value(grid, &z, node)?)))
             .collect();
@@ -26,8 +29,11 @@ pub(crate) fn filled(grid: &Grid<'_>) -> Vec<f64> {
 }
 
 fn value(grid: &Grid<'_>, z: &[f64], node: usize) -> Option<f64> {
+    let (column, row) = grid.column_row(node);
     let at = |c: isize, r: isize| {
-        let z = z[grid.offset(node, c, r)?];
+        let column = column.checked_add_signed(c).filter(|&c| c < grid.columns)?;
+        let row = row.checked_add_signed(r).filter(|&r| r < grid.rows)?;
+        let z = z[column * grid.rows + row];
         (!z.is_nan()).then_some(z)
     };
     let mut neighbours = 0;

@@ -4,6 +4,7 @@
 use core::cmp::Ordering;
 
 use range_image::RangeImage;
+use rayon::prelude::*;
 
 /// Nodes of an image by flat number, column by column, upwards within a column.
 #[derive(Debug, Clone, Copy)]
@@ -84,8 +85,9 @@ impl Links {
     /// the surface, beyond what both sides' own slopes foretell.
     pub(crate) fn new(grid: &Grid<'_>, step_mm: f64) -> Self {
         let mut bits = vec![0; grid.nodes()];
-        for column in 0..grid.columns {
-            for row in 0..grid.rows {
+        let columns = bits.par_chunks_mut(grid.rows.max(1)).enumerate();
+        columns.for_each(|(column, bits)| {
+            for (row, bits) in bits.iter_mut().enumerate() {
                 let node = column * grid.rows + row;
                 if row + 1 < grid.rows {
                     let line = Line {
@@ -95,7 +97,7 @@ impl Links {
                         before: row,
                         after: grid.rows - row - 2,
                     };
-                    bits[node] |= line.judge(step_mm, UP, STEP_UP);
+                    *bits |= line.judge(step_mm, UP, STEP_UP);
                 }
                 if column + 1 < grid.columns {
                     let line = Line {
@@ -105,10 +107,10 @@ impl Links {
                         before: column,
                         after: grid.columns - column - 2,
                     };
-                    bits[node] |= line.judge(step_mm, RIGHT, STEP_RIGHT);
+                    *bits |= line.judge(step_mm, RIGHT, STEP_RIGHT);
                 }
             }
-        }
+        });
         Self {
             rows: grid.rows,
             bits,

@@ -50,9 +50,11 @@ impl Noise {
 /// by as much as their samples stray. So what the regridder says of each node's samples is
 /// asked, too; the greatest figure counts.
 pub(crate) fn noise(image: &RangeImage, grid: &Grid<'_>) -> Noise {
-    let near = third_differences(grid, 1);
-    let middle = third_differences(grid, 2);
-    let far = third_differences(grid, FAR).min(2.0 * near.max(middle));
+    let ((near, middle), far) = rayon::join(
+        || rayon::join(|| third_differences(grid, 1), || third_differences(grid, 2)),
+        || third_differences(grid, FAR),
+    );
+    let far = far.min(2.0 * near.max(middle));
     let told = told_mm(image);
     let deviation_mm = near
         .max(middle)

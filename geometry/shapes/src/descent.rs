@@ -43,21 +43,19 @@ pub(crate) struct Equations {
 
 impl Equations {
     pub(crate) fn at<R: Residual>(local: &Local, samples: &[Sample], weights: &[f64]) -> Self {
-        let (mut matrix, mut right, mut cost) = (Matrix::zeros(), Step::zeros(), 0.0);
         let free = local.free();
-        let distances = local.distances();
-        let weighed = samples.iter().zip(weights);
-        for (sample, weight) in weighed.filter(|(_, weight)| **weight > 0.0) {
-            let Sloped { value, by } = R::of(&distances, sample);
-            cost += weight * value * value;
-            for i in 0..free {
-                let weighed = weight * by[i];
-                right[i] -= weighed * value;
-                for j in 0..=i {
-                    matrix[(i, j)] += weighed * by[j];
-                }
-            }
-        }
+        let sums = match free {
+            3 => sums::<R, 3>,
+            4 => sums::<R, 4>,
+            5 => sums::<R, 5>,
+            6 => sums::<R, 6>,
+            _ => sums::<R, MOST_FREE>,
+        };
+        let Self {
+            mut matrix,
+            right,
+            cost,
+        } = sums(local, samples, weights);
         for i in 0..MOST_FREE {
             if i >= free {
                 matrix[(i, i)] = 1.0;
@@ -81,6 +79,41 @@ impl Equations {
         }
         Some(damped.cholesky()?.solve(&self.right))
     }
+}
+
+/// The lower half of the equations of the first so many numbers: with their count known, sums stay
+/// at hand.
+fn sums<R: Residual, const FREE: usize>(
+    local: &Local,
+    samples: &[Sample],
+    weights: &[f64],
+) -> Equations {
+    let (mut products, mut right, mut cost) = ([[0.0; FREE]; FREE], [0.0; FREE], 0.0);
+    let distances = local.distances();
+    let weighed = samples.iter().zip(weights);
+    for (sample, weight) in weighed.filter(|(_, weight)| **weight > 0.0) {
+        let Sloped { value, by } = R::of(&distances, sample);
+        cost += weight * value * value;
+        for i in 0..FREE {
+            let weighed = weight * by[i];
+            right[i] -= weighed * value;
+            for (sum, by) in products[i].iter_mut().zip(by).take(i + 1) {
+                *sum += weighed * by;
+            }
+        }
+    }
+    let mut equations = Equations {
+        matrix: Matrix::zeros(),
+        right: Step::zeros(),
+        cost,
+    };
+    for (i, (row, right)) in products.iter().zip(right).enumerate() {
+        equations.right[i] = right;
+        for (j, sum) in row.iter().enumerate().take(i + 1) {
+            equations.matrix[(i, j)] = *sum;
+        }
+    }
+    equations
 }
 
 /// Levenberg and Marquardt's descent, until a step lessens the cost by no more than the share

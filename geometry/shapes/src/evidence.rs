@@ -242,14 +242,29 @@ pub(crate) fn polynomials_of(samples: &[Sample], independent: f64) -> Vec<Surfac
 }
 
 /// Polynomials over the samples' plane, of degrees 2, 3, 4 and 6.
-fn polynomials(samples: &[Sample], frame: &Frame, enough: &impl Fn(usize) -> bool) -> Vec<Surface> {
-    let all = [
-        polynomial::<6>(samples, frame, 2, enough),
-        polynomial::<10>(samples, frame, 3, enough),
-        polynomial::<15>(samples, frame, 4, enough),
-        polynomial::<28>(samples, frame, 6, enough),
-    ];
-    all.into_iter().flatten().collect()
+fn polynomials(
+    samples: &[Sample],
+    frame: &Frame,
+    enough: &(impl Fn(usize) -> bool + Sync),
+) -> Vec<Surface> {
+    let low = || {
+        rayon::join(
+            || polynomial::<6>(samples, frame, 2, enough),
+            || polynomial::<10>(samples, frame, 3, enough),
+        )
+    };
+    let high = || {
+        rayon::join(
+            || polynomial::<15>(samples, frame, 4, enough),
+            || polynomial::<28>(samples, frame, 6, enough),
+        )
+    };
+    // The last of them takes most of the time.
+    let ((fourth, sixth), (second, third)) = rayon::join(high, low);
+    [second, third, fourth, sixth]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// The polynomial of a degree with its `N` terms.
@@ -262,13 +277,14 @@ fn polynomial<const N: usize>(
     if !enough(N) {
         return None;
     }
-    let pairs = || (0..=degree).flat_map(|i| (0..=degree - i).map(move |j| (i, j)));
-    let terms = |u: &[f64], v: &[f64]| {
-        let mut terms = SVector::<f64, N>::zeros();
-        for (term, (i, j)) in terms.iter_mut().zip(pairs()) {
+    let pairs = (0..=degree).flat_map(|i| (0..=degree - i).map(move |j| (i, j)));
+    let pairs: Vec<(usize, usize)> = pairs.collect();
+    let terms = |u: &[f64; 7], v: &[f64; 7]| {
+        let mut terms = [0.0; N];
+        for (term, &(i, j)) in terms.iter_mut().zip(&pairs) {
             *term = u[i] * v[j];
         }
-        terms
+        SVector::from(terms)
     };
     let place = |sample: &Sample| {
         let [u, v, w] = frame.coordinates(&sample.point_mm);

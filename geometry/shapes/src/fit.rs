@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use crate::descent::{Distance, Equations, Off, descend};
 use crate::local::Local;
@@ -163,11 +164,13 @@ pub(crate) fn found(family: Family, samples: &[Sample], middle: &Middle) -> Opti
     let least = tried.first()?.0;
     tried.dedup_by(|other, _| other.0 <= (1.0 + SAME) * least);
     let some = some_of(samples, FOLLOWED_ON);
-    let followed = tried.into_iter().filter_map(|(_, local)| {
+    let followed = tried.into_par_iter().filter_map(|(_, local)| {
         let local = settled(local, &some)?;
         Some((scale(&local, &some), local))
     });
+    let followed: Vec<_> = followed.collect();
     followed
+        .into_iter()
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, local)| local)
 }
@@ -206,7 +209,7 @@ impl Trial {
     fn of(&self, starts: Vec<Local>, samples: &[Sample]) -> Vec<(f64, Local)> {
         let few = some_of(samples, self.samples);
         let led = starts
-            .into_iter()
+            .into_par_iter()
             .filter_map(|start| self.lead(start, &few));
         let mut led: Vec<_> = led.collect();
         // Stable, so that of equals the first stays first.

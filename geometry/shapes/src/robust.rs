@@ -1,6 +1,7 @@
 //! Linear least squares that strays have little part in.
 
 use nalgebra::{SMatrix, SVector};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::spread::spread;
 
@@ -56,18 +57,7 @@ fn weighed<const N: usize>(
 ) -> Option<(SVector<f64, N>, Vec<f64>)> {
     let mut solution = SVector::zeros();
     for _ in 0..rounds {
-        let mut matrix = SMatrix::<f64, N, N>::zeros();
-        let mut right = SVector::<f64, N>::zeros();
-        for ((terms, value), weight) in equations.iter().zip(&by) {
-            for column in 0..N {
-                let weighed = terms[column] * weight;
-                right[column] += weighed * value;
-                // The lower half is all that the factors are made from.
-                for row in column..N {
-                    matrix[(row, column)] += weighed * terms[row];
-                }
-            }
-        }
+        let (matrix, right) = Arch::new().dispatch(Summed { equations, by: &by });
         let factors = matrix.cholesky()?;
         let is_unique = (0..N).all(|k| {
             let pivot = factors.l_dirty()[(k, k)];
@@ -80,6 +70,36 @@ fn weighed<const N: usize>(
         by = weights(equations, &solution)?;
     }
     Some((solution, by))
+}
+
+/// Equations to be summed up with the lanes that the processor has.
+struct Summed<'a, const N: usize> {
+    equations: &'a [Equation<N>],
+    /// What each weighs.
+    by: &'a [f64],
+}
+
+impl<const N: usize> WithSimd for Summed<'_, N> {
+    type Output = (SMatrix<f64, N, N>, SVector<f64, N>);
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        let mut matrix = [[0.0; N]; N];
+        let mut right = [0.0; N];
+        for ((terms, value), weight) in self.equations.iter().zip(self.by) {
+            let terms: &[f64; N] = &terms.data.0[0];
+            for (column, right) in right.iter_mut().enumerate() {
+                let weighed = terms[column] * weight;
+                *right += weighed * value;
+                // Whole columns, although the lower half is all that the factors are made from: lanes
+                // take them at once.
+                for (sum, term) in matrix[column].iter_mut().zip(terms) {
+                    *sum += weighed * term;
+                }
+            }
+        }
+        (SMatrix::from(matrix), SVector::from(right))
+    }
 }
 
 /// What each equation weighs by how far it is off. `None` where there are none.

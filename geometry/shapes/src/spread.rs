@@ -8,8 +8,15 @@ const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 /// each so-manieth of them would be of one row.
 pub fn spread(count: usize, most: usize) -> impl Iterator<Item = usize> {
     let few = most.min(count);
+    let of_all = move |k: usize| match k.checked_mul(count) {
+        Some(all) => all / few,
+        None => (k as u128 * count as u128 / few as u128) as usize,
+    };
     (0..few).map(move |k| {
-        let [first, next] = [k, k + 1].map(|k| (k as u128 * count as u128 / few as u128) as usize);
+        if few == count {
+            return k;
+        }
+        let [first, next] = [k, k + 1].map(of_all);
         let turn = u128::from((k as u64).wrapping_mul(GOLDEN));
         first + ((turn * (next - first) as u128) >> 64) as usize
     })

@@ -54,9 +54,9 @@ impl Edge {
         let few = spread(near.len(), PLACES).map(|k| near[k]);
         let tagged: Vec<Tagged> = few
             .flat_map(|place| {
-                let samples = pieces.field.samples_of(&[place], usize::MAX);
                 let label = pieces.labels[place];
-                samples.into_iter().map(move |sample| (label, sample))
+                let samples = pieces.field.at(place).iter();
+                samples.map(move |sample| (label, *sample))
             })
             .collect();
         let samples: Vec<Sample> = tagged.iter().map(|(_, sample)| *sample).collect();

@@ -1,22 +1,13 @@
 //! Least squares for some of a spline's coefficients, the others held.
 
-use core::ops::Range;
-
-use super::{Axis, UniformSpline};
-use crate::fit::Observation;
+use super::UniformSpline;
+use super::design::{Design, Lines, runs};
 
 /// Most steps of the conjugate gradients.
 const MAX_STEPS: usize = 60;
 
 /// Part of the first gradient, in the norm of the preconditioner, at which they end.
 const CONVERGED: f64 = 1e-4;
-
-/// Observations and what a spline leaves of them, line by line of equal u.
-#[derive(Debug, Clone)]
-pub struct Lines<'a> {
-    observations: &'a [Observation],
-    lines: Vec<(f64, Range<usize>)>,
-}
 
 /// What single basis functions would gain if each alone were added to a spline.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,103 +28,6 @@ impl Scores {
         } else {
             0.0
         }
-    }
-}
-
-impl<'a> Lines<'a> {
-    /// Gathers neighbours in the list that have one u. Work grows with the number of such
-    /// lines, so observations of a grid should come line by line.
-    #[must_use]
-    pub fn new(observations: &'a [Observation]) -> Self {
-        let mut lines: Vec<(f64, Range<usize>)> = Vec::new();
-        for (k, o) in observations.iter().enumerate() {
-            match lines.last_mut() {
-                Some((u, range)) if *u == o.u => range.end = k + 1,
-                _ => lines.push((o.u, k..k + 1)),
-            }
-        }
-        Self {
-            observations,
-            lines,
-        }
-    }
-
-    /// The observations.
-    #[must_use]
-    pub fn observations(&self) -> &'a [Observation] {
-        self.observations
-    }
-
-    /// The bases in v, observation by observation.
-    fn bases(&self, axis: &Axis) -> Vec<(usize, [f64; 4])> {
-        self.observations.iter().map(|o| axis.basis(o.v)).collect()
-    }
-}
-
-/// Basis functions of a grid at observations.
-struct Design<'a> {
-    lines: &'a Lines<'a>,
-    u: Vec<(usize, [f64; 4])>,
-    v: Vec<(usize, [f64; 4])>,
-    columns: usize,
-    rows: usize,
-}
-
-impl<'a> Design<'a> {
-    fn new(spline: &UniformSpline, lines: &'a Lines<'a>) -> Self {
-        Self {
-            lines,
-            u: lines.lines.iter().map(|l| spline.u.basis(l.0)).collect(),
-            v: lines.bases(&spline.v),
-            columns: spline.u.functions(),
-            rows: spline.v.functions(),
-        }
-    }
-
-    /// Values at the observations of the function with these coefficients.
-    fn values(&self, coefficients: &[f64], values: &mut [f64]) {
-        let rows = self.rows;
-        let mut combined = vec![0.0; rows];
-        for ((_, range), (i, a)) in self.lines.lines.iter().zip(&self.u) {
-            combined.fill(0.0);
-            for (k, a) in a.iter().enumerate() {
-                let line = &coefficients[(i + k) * rows..][..rows];
-                for (sum, c) in combined.iter_mut().zip(line) {
-                    *sum += a * c;
-                }
-            }
-            for (value, (j, b)) in values[range.clone()].iter_mut().zip(&self.v[range.clone()]) {
-                let c = &combined[*j..j + 4];
-                *value = b[0] * c[0] + b[1] * c[1] + b[2] * c[2] + b[3] * c[3];
-            }
-        }
-    }
-
-    /// Weighted sums over the observations of `values` times each function; with `squared`
-    /// times its square.
-    fn sums(&self, squared: bool, values: &[f64]) -> Vec<f64> {
-        let rows = self.rows;
-        let mut sums = vec![0.0; self.columns * rows];
-        let mut gathered = vec![0.0; rows];
-        let power = |x: f64| if squared { x * x } else { x };
-        for ((_, range), (i, a)) in self.lines.lines.iter().zip(&self.u) {
-            gathered.fill(0.0);
-            for k in range.clone() {
-                let (j, b) = &self.v[k];
-                let value = self.lines.observations[k].weight * values[k];
-                for (sum, b) in gathered[*j..j + 4].iter_mut().zip(b) {
-                    *sum += power(*b) * value;
-                }
-            }
-            for (k, a) in a.iter().enumerate() {
-                let factor = power(*a);
-                let line = &mut sums[(i + k) * rows..][..rows];
-                for (sum, g) in line.iter_mut().zip(&gathered) {
-                    *sum += factor * g;
-                }
-            }
-        }
-        sums
     }
 }
 
@@ -189,8 +83,9 @@ impl UniformSpline {
     #[must_use]
     pub fn scores(&self, lines: &Lines<'_>, residuals: &[f64]) -> Scores {
         let design = Design::new(self, lines);
-        let products = design.sums(false, residuals);
-        let mass = design.sums(true, &vec![1.0; residuals.len()]);
+        let mut products = vec![0.0; self.coefficients.len()];
+        design.sums(residuals, &mut products);
+        let mass = design.masses();
         let gain = products
             .iter()
             .zip(&mass)
@@ -204,9 +99,9 @@ impl UniformSpline {
     /// The observations less the spline.
     #[must_use]
     pub fn residuals(&self, lines: &Lines<'_>) -> Vec<f64> {
-        let mut values = vec![0.0; lines.observations.len()];
+        let mut values = vec![0.0; lines.observations().len()];
         Design::new(self, lines).values(&self.coefficients, &mut values);
-        let pairs = values.iter().zip(lines.observations);
+        let pairs = values.iter().zip(lines.observations());
         pairs.map(|(value, o)| o.value - value).collect()
     }
 
@@ -231,12 +126,7 @@ impl UniformSpline {
             "as many as coefficients"
         );
         let design = Design::new(self, lines);
-        let hold = |x: &mut [f64]| {
-            for (x, _) in x.iter_mut().zip(free).filter(|(_, free)| !**free) {
-                *x = 0.0;
-            }
-        };
-        let mut diagonal = design.sums(true, &vec![1.0; residuals.len()]);
+        let mut diagonal = design.masses();
         let greatest = diagonal.iter().copied().fold(0.0, f64::max);
         let curb = Bending::new(free, design.columns, design.rows, bending * greatest);
         curb.add_diagonal(&mut diagonal);
@@ -246,13 +136,19 @@ impl UniformSpline {
             *d += least;
         }
 
-        let mut gradient = design.sums(false, residuals);
-        hold(&mut gradient);
-        let mut change = vec![0.0; gradient.len()];
-        let conditioned =
-            |g: &[f64]| -> Vec<f64> { g.iter().zip(&diagonal).map(|(g, d)| g / d).collect() };
-        let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-        let mut direction = conditioned(&gradient);
+        // Of each vector only what is free is looked at; the rest of the direction and of the
+        // change is 0.
+        let design = design.restricted(free);
+        let runs = runs(0..free.len(), |k| free[k]);
+        let all_free = || runs.iter().cloned().flatten();
+        let dot = |a: &[f64], b: &[f64]| -> f64 { all_free().map(|k| a[k] * b[k]).sum() };
+        let mut gradient = vec![0.0; free.len()];
+        design.sums(residuals, &mut gradient);
+        let mut change = vec![0.0; free.len()];
+        let mut direction = vec![0.0; free.len()];
+        let mut next = vec![0.0; free.len()];
+        let mut product = vec![0.0; free.len()];
+        all_free().for_each(|k| direction[k] = gradient[k] / diagonal[k]);
         let mut size = dot(&gradient, &direction);
         let enough = CONVERGED * CONVERGED * size;
         let mut values = vec![0.0; residuals.len()];
@@ -261,26 +157,19 @@ impl UniformSpline {
                 break;
             }
             design.values(&direction, &mut values);
-            let mut product = design.sums(false, &values);
+            design.sums(&values, &mut product);
             curb.add_to(&direction, &mut product);
-            for (p, d) in product.iter_mut().zip(&direction) {
-                *p += least * d;
-            }
-            hold(&mut product);
+            all_free().for_each(|k| product[k] += least * direction[k]);
             let step = size / dot(&direction, &product);
-            for (c, d) in change.iter_mut().zip(&direction) {
-                *c += step * d;
+            for k in all_free() {
+                change[k] += step * direction[k];
+                gradient[k] -= step * product[k];
+                next[k] = gradient[k] / diagonal[k];
             }
-            for (g, p) in gradient.iter_mut().zip(&product) {
-                *g -= step * p;
-            }
-            let next = conditioned(&gradient);
             let before = size;
             size = dot(&gradient, &next);
             let share = size / before;
-            for (d, n) in direction.iter_mut().zip(&next) {
-                *d = n + share * *d;
-            }
+            all_free().for_each(|k| direction[k] = next[k] + share * direction[k]);
         }
 
         design.values(&change, &mut values);
@@ -301,6 +190,7 @@ impl UniformSpline {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::Observation;
     use crate::uniform::Parameter;
 
     fn data(value: impl Fn(f64, f64) -> f64) -> Vec<Observation> {

@@ -5,10 +5,12 @@
 //! All have the same shape, and each is the sum of five of half the width (the two-scale
 //! relation), so that a spline is carried over to a finer grid without any loss.
 
+mod design;
 mod far;
 mod fit;
 
-pub use fit::{Lines, Scores};
+pub use design::Lines;
+pub use fit::Scores;
 
 use crate::banded::{BandedMatrix, Singular};
 use crate::fit::{Observation, thirds};
@@ -159,19 +161,30 @@ impl UniformSpline {
         ridge: f64,
     ) -> Result<Self, Singular> {
         let (u, v) = (Axis::new(u_domain), Axis::new(v_domain));
-        let mut matrix = BandedMatrix::zero(terms.len(), terms.len());
-        let mut solution = vec![0.0; terms.len()];
-        let mut row = vec![(0, 0.0); terms.len()];
+        let count = terms.len();
+        // Rows of the lower half.
+        let mut products = vec![0.0; count * count];
+        let mut solution = vec![0.0; count];
+        let mut values = vec![0.0; count];
         let unit = |axis: &Axis, t: f64| 2.0 * (t - axis.first) / (axis.last - axis.first) - 1.0;
         for o in observations.iter().filter(|o| o.weight > 0.0) {
             let (a, b) = (legendre(unit(&u, o.u)), legendre(unit(&v, o.v)));
-            for (k, &(p, q)) in terms.iter().enumerate() {
-                row[k] = (k, a[p] * b[q]);
+            for (value, &(p, q)) in values.iter_mut().zip(terms) {
+                *value = a[p] * b[q];
             }
-            for (k, &(_, value)) in row.iter().enumerate() {
-                let weighted = o.weight * value;
-                solution[k] += weighted * o.value;
-                matrix.add_to_row(k, weighted, &row[..=k]);
+            let rows = products.chunks_exact_mut(count).zip(&mut solution);
+            for (k, (row, right)) in rows.enumerate() {
+                let weighted = o.weight * values[k];
+                *right += weighted * o.value;
+                for (sum, value) in row[..=k].iter_mut().zip(&values) {
+                    *sum += weighted * value;
+                }
+            }
+        }
+        let mut matrix = BandedMatrix::zero(count, count);
+        for (k, row) in products.chunks_exact(count).enumerate() {
+            for (column, sum) in row[..=k].iter().enumerate() {
+                matrix.add(k, column, *sum);
             }
         }
         let hold = ridge * matrix.trace() / terms.len() as f64;

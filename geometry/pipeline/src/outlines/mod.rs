@@ -8,10 +8,10 @@ mod lane;
 mod nodes;
 mod owner;
 
-use range_image::{Monitor, RangeImage, RegionMap};
+use range_image::{Column, Monitor, RangeImage, RegionMap};
 use reconstruct::OutlineSample;
 
-use crate::columns::Columns;
+use crate::columns::{Columns, each};
 use crate::process::PipelineError;
 use lane::Lane;
 pub use nodes::SettledNodes;
@@ -42,15 +42,14 @@ pub(crate) fn samples(
     let mut lanes: Vec<Lane> = Vec::new();
     let mut entries = 0;
     let mut go_on = Ok(());
-    columns
-        .visit(&mut |column| {
-            let lane = Lane::of(column, &owners);
-            entries += lane.entries();
-            lanes.push(lane);
-            go_on = monitor.check();
-            go_on.is_ok() && entries <= MOST
-        })
-        .map_err(PipelineError::ReadAgain)?;
+    let of = |column: &Column| Lane::of(column, &owners);
+    each(columns, of, |lane| {
+        entries += lane.entries();
+        lanes.push(lane);
+        go_on = monitor.check();
+        go_on.is_ok() && entries <= MOST
+    })
+    .map_err(PipelineError::ReadAgain)?;
     go_on?;
     if entries > MOST {
         return Ok(None);
@@ -72,7 +71,7 @@ pub(crate) fn samples(
 
 #[cfg(test)]
 mod tests {
-    use range_image::{Column, GridColumn, Lattice, RangeImageBuilder, Sample, Unmonitored};
+    use range_image::{GridColumn, Lattice, RangeImageBuilder, Sample, Unmonitored};
 
     use super::*;
     use crate::columns::InMemory;

@@ -31,6 +31,8 @@ const SATURATED: f64 = 20.0;
 /// Chances that are multiplied before a logarithm is taken: none is so small that the product
 /// vanishes.
 const FACTORS: u32 = 16;
+/// Sightings between two looks at what they have come to.
+const LOOK: usize = 32;
 /// Chance that a sample is there although the middle of its spot misses the surface.
 const GRAZED: f64 = 0.003;
 /// Share of samples lost where too few are known to tell, and how many that counts for.
@@ -86,6 +88,29 @@ impl Sightings {
             cost.add(s.seen, s.inside - linear.sum(basis, at));
         }
         cost.total()
+    }
+
+    /// The same, if it is no more than so much: most outlines cost far more, which some of the
+    /// sightings tell. Of those that cost hardly more, some are told of, too.
+    pub(crate) fn cost_up_to(
+        &self,
+        linear: &Linear<'_>,
+        at: &DVector<f64>,
+        most: f64,
+    ) -> Option<f64> {
+        let mut cost = Cost::new(self.dropped, WIDTHS[WIDTHS.len() - 1]);
+        let far = cost.of_far();
+        let mut each = self.all.iter().zip(linear.bases).peekable();
+        while each.peek().is_some() {
+            for (s, basis) in each.by_ref().take(LOOK) {
+                cost.add(s.seen, s.inside - linear.sum(basis, at));
+            }
+            // Each sighting adds to it.
+            if cost.at_least(far) > most {
+                return None;
+            }
+        }
+        Some(cost.total())
     }
 
     /// `None` where they are too few to tell of an outline.
@@ -237,6 +262,17 @@ impl Cost {
             (self.product, self.factors) = (1.0, 0);
         }
         Some((chance, slope))
+    }
+
+    /// What each of those far off costs.
+    fn of_far(&self) -> [f64; 2] {
+        [GRAZED, 1.0 - self.share].map(|chance| -libm::log(chance))
+    }
+
+    /// What it comes to at least, if those far off cost so much.
+    fn at_least(&self, [of_present, of_missing]: [f64; 2]) -> f64 {
+        let [present, missing] = self.far.map(f64::from);
+        self.sum + present * of_present + missing * of_missing
     }
 
     fn total(&self) -> f64 {

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use nurbs::Basis;
+use rayon::prelude::*;
 
 use super::deflect::Deflection;
 use super::layout::Splines;
@@ -31,6 +32,9 @@ const BEFORE: f64 = 0.5;
 const AROUND: f64 = 0.8;
 const STEP: f64 = 0.05;
 const WORSE: f64 = 2.0;
+/// What costs more than the likeliest by this is as likely as nothing: the exponential of minus it
+/// is 0.
+const NOTHING: f64 = 760.0;
 
 impl Sway {
     /// The likeliest amount by which a path is moved inwards, and what it costs: minus the
@@ -128,14 +132,20 @@ fn mean_line(sightings: &Sightings, linear: &Linear<'_>, likeliest: &Likeliest) 
         &likeliest.coefficients + DVector::from_iterator(linear.count, each)
     };
     let least = sightings.cost_of(linear, &moved([0.0; 2]));
+    let shared = |by: [f64; 2]| {
+        let cost = sightings.cost_up_to(linear, &moved(by), least + NOTHING);
+        let share = cost.map_or(0.0, |cost| libm::exp(least - cost));
+        (by, share)
+    };
+    let shares = (-reach..=reach).into_par_iter().flat_map_iter(|a| {
+        let ends = (-reach..=reach).map(move |b| [a, b]);
+        ends.map(|ends| shared(ends.map(|n| STEP * f64::from(n))))
+    });
+    let shares: Vec<([f64; 2], f64)> = shares.collect();
     let (mut sum, mut all) = ([0.0; 2], 0.0);
-    for a in -reach..=reach {
-        for b in -reach..=reach {
-            let by = [a, b].map(|n| STEP * f64::from(n));
-            let share = libm::exp(least - sightings.cost_of(linear, &moved(by)));
-            sum = [0, 1].map(|end| sum[end] + share * by[end]);
-            all += share;
-        }
+    for (by, share) in shares {
+        sum = [0, 1].map(|end| sum[end] + share * by[end]);
+        all += share;
     }
     let mean = moved(sum.map(|sum| sum / all));
     // Likely lines on two sides of unlikely ones.

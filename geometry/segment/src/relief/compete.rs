@@ -1,9 +1,12 @@
 //! Border nodes go to the piece whose surface explains them best.
 
+mod stale;
+
 use super::grow::MISS_NOISES;
 use super::piece::Pieces;
 use crate::scene::{NONE, Scene};
 use range_image::{Cancelled, Monitor};
+use stale::Stale;
 
 /// Rounds of deciding borders and fitting surfaces anew.
 const ROUNDS: usize = 3;
@@ -26,15 +29,17 @@ pub(crate) fn settle(
 ) -> Result<(), Cancelled> {
     for _ in 0..ROUNDS {
         monitor.check()?;
+        let mut stale = Stale::all(&scene.grid);
         for sweep in 0..2 * SWEEPS {
-            sweep_borders(scene, pieces, sweep % 2);
+            sweep_borders(scene, pieces, &mut stale, sweep % 2);
         }
         pieces.refit(scene);
         spread(scene, pieces, 1.5 * MISS_NOISES);
     }
     spread(scene, pieces, f64::INFINITY);
+    let mut stale = Stale::all(&scene.grid);
     for colour in [0, 1] {
-        sweep_borders(scene, pieces, colour);
+        sweep_borders(scene, pieces, &mut stale, colour);
     }
     Ok(())
 }
@@ -72,51 +77,59 @@ pub(crate) fn spread(scene: &Scene<'_>, pieces: &mut Pieces, most: f64) {
     }
 }
 
-/// Decides every second border node anew, as on the fields of one colour of a chessboard.
-fn sweep_borders(scene: &Scene<'_>, pieces: &mut Pieces, colour: usize) {
-    let grid = &scene.grid;
-    let mut rivals: Vec<u32> = Vec::new();
-    for node in 0..pieces.labels.len() {
-        let own = pieces.labels[node];
-        let (column, row) = grid.column_row(node);
-        if own == NONE || (column + row) % 2 != colour {
-            continue;
+/// Decides every second border node anew, as on the fields of one colour of a chessboard: those
+/// that are stale, since the others would stay what they are.
+fn sweep_borders(scene: &Scene<'_>, pieces: &mut Pieces, stale: &mut Stale, colour: usize) {
+    let mut rivals = Vec::new();
+    let mut from = 0;
+    while let Some(node) = stale.take(colour, from) {
+        from = node + 1;
+        let best = best(scene, pieces, node, &mut rivals);
+        if best != pieces.labels[node] {
+            pieces.labels[node] = best;
+            stale.add_around(&scene.grid, node);
         }
-        rivals.clear();
-        rivals.push(own);
-        let (columns, rows) = grid.window(node, 1);
-        let mut beside = [NONE; 8];
-        let mut count = 0;
-        for c in columns {
-            for r in rows.clone() {
-                let k = c * grid.rows + r;
-                let label = pieces.labels[k];
-                if label == NONE || k == node {
-                    continue;
-                }
-                beside[count] = label;
-                count += 1;
-                // Also cornerwise, since a step may leave a node no other link to its own.
-                if !rivals.contains(&label) {
-                    rivals.push(label);
-                }
+    }
+}
+
+/// The piece that a node is of at the least cost, of its own and those around it.
+fn best(scene: &Scene<'_>, pieces: &Pieces, node: usize, rivals: &mut Vec<u32>) -> u32 {
+    let grid = &scene.grid;
+    let own = pieces.labels[node];
+    if own == NONE {
+        return own;
+    }
+    rivals.clear();
+    rivals.push(own);
+    let (columns, rows) = grid.window(node, 1);
+    let mut beside = [NONE; 8];
+    let mut count = 0;
+    for c in columns {
+        for k in c * grid.rows + rows.start..c * grid.rows + rows.end {
+            let label = pieces.labels[k];
+            if label == NONE || k == node {
+                continue;
+            }
+            beside[count] = label;
+            count += 1;
+            // Also cornerwise, since a step may leave a node no other link to its own.
+            if !rivals.contains(&label) {
+                rivals.push(label);
             }
         }
-        if rivals.len() == 1 {
-            continue;
-        }
-        let cost = |label: u32| {
-            let apart = beside[..count].iter().filter(|&&l| l != label).count();
-            cost_of_miss(pieces.miss(scene, label, node))
-                + pieces.doubt(label)
-                + APART * apart as f64
-        };
-        let best = rivals
-            .iter()
-            .copied()
-            .min_by(|&a, &b| cost(a).total_cmp(&cost(b)));
-        pieces.labels[node] = best.unwrap_or(own);
     }
+    if rivals.len() == 1 {
+        return own;
+    }
+    let cost = |label: u32| {
+        let apart = beside[..count].iter().filter(|&&l| l != label).count();
+        cost_of_miss(pieces.miss(scene, label, node)) + pieces.doubt(label) + APART * apart as f64
+    };
+    let best = rivals
+        .iter()
+        .map(|&label| (cost(label), label))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map_or(own, |(_, label)| label)
 }
 
 /// In squared noises.

@@ -1,6 +1,10 @@
 //! Growing pieces from seeds (Besl & Jain 1988, *Segmentation through variable-order surface
 //! fitting*).
 
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
 use super::piece::Pieces;
 use super::surface::Surface;
 use super::windows::{WindowPlane, best_windows, planes};
@@ -39,6 +43,8 @@ const TURN_ERRORS: f64 = 4.0;
 const TURN_SHARE: f64 = 0.5;
 /// Growth that has not settled after so many rounds wanders.
 const ROUNDS: usize = 30;
+/// Nodes that are looked at by one thread at least.
+const AT_ONCE: usize = 512;
 /// Smaller pieces are none.
 const LEAST_NODES: usize = 12;
 
@@ -63,10 +69,19 @@ pub(crate) fn pieces(
         stamp: 0,
     };
     // Nodes by the last kind of seed that came to nothing there.
-    let mut vain = vec![0; grid.nodes()];
-    for (k, (reach, noises)) in SEEDS.into_iter().enumerate() {
+    let mut vain = vec![0_u8; grid.nodes()];
+    let mut known = BTreeMap::new();
+    for ((reach, noises), k) in SEEDS.into_iter().zip(0_u8..) {
         monitor.check()?;
-        for (roughness, seed) in seeds(scene, reach, noises) {
+        let left = known.entry(reach).or_insert_with(|| match reach {
+            REACH => left(scene, &grower.directions),
+            _ => left(scene, &planes(grid, reach)),
+        });
+        // Those that are taken by now would be passed over one by one.
+        let seeds = seeds(left, noises, &|node| {
+            vain[node] <= k && grower.is_open(node, reach)
+        });
+        for (roughness, seed) in seeds {
             if vain[seed] <= k && grower.is_open(seed, reach) {
                 monitor.check()?;
                 if !grower.grow(seed, reach, roughness) {
@@ -79,7 +94,7 @@ pub(crate) fn pieces(
                 }
             }
         }
-        monitor.progress(0.05 + 0.3 * (k + 1) as f64 / SEEDS.len() as f64);
+        monitor.progress(0.05 + 0.3 * f64::from(k + 1) / SEEDS.len() as f64);
     }
     for (k, reach) in BENT_SEEDS.into_iter().enumerate().filter(|_| bent_seeds) {
         monitor.check()?;
@@ -94,30 +109,37 @@ pub(crate) fn pieces(
     Ok(grower.pieces)
 }
 
-/// The middles of windows whose planes leave less than so many noises, the flattest first, with
-/// their roughness.
-fn seeds(scene: &Scene<'_>, reach: usize, noises: f64) -> Vec<(f64, usize)> {
-    let planes = planes(&scene.grid, reach);
-    // Flatness is in squared noises, those of the window's slope.
-    let mut seeds: Vec<(f32, usize)> = planes
-        .iter()
-        .enumerate()
-        .filter_map(|(node, plane)| {
-            let rise_mm = plane.rise_mm.map(f64::from);
-            let noise_mm = scene.noise.on_slope_mm(rise_mm, scene.grid.pitch_mm);
-            let left = plane.variance_mm2 / (noise_mm * noise_mm) as f32;
-            (left < (noises * noises) as f32).then_some((left, node))
-        })
-        .collect();
-    seeds.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let roughness = |left: f32| {
-        let left = libm::sqrt(f64::from(left));
-        if left < CLEAN { 1.0 } else { left }
+/// What the planes of windows leave, in squared noises, those of the window's slope; infinite where
+/// there is none.
+fn left(scene: &Scene<'_>, planes: &[WindowPlane]) -> Vec<f32> {
+    let left = |plane: &WindowPlane| {
+        let rise_mm = plane.rise_mm.map(f64::from);
+        let noise_mm = scene.noise.on_slope_mm(rise_mm, scene.grid.pitch_mm);
+        plane.variance_mm2 / (noise_mm * noise_mm) as f32
     };
-    seeds
-        .into_iter()
-        .map(|(left, node)| (roughness(left), node))
-        .collect()
+    planes.par_iter().map(left).collect()
+}
+
+/// The middles of windows that leave less than so many noises, of those that may be seeds, the
+/// flattest first, with their roughness.
+fn seeds(
+    left: &[f32],
+    noises: f64,
+    may: &dyn Fn(usize) -> bool,
+) -> impl Iterator<Item = (f64, usize)> + use<> {
+    let most = (noises * noises) as f32;
+    let flat = left.iter().zip(0_u32..);
+    let mut keys: Vec<u64> = flat
+        .filter(|(left, node)| **left < most && may(*node as usize))
+        .map(|(left, node)| u64::from(left.to_bits()) << 32 | u64::from(node))
+        .collect();
+    // What is left is nowhere below 0, so that its bits are in its order.
+    keys.par_sort_unstable();
+    keys.into_iter().map(|key| {
+        let left = libm::sqrt(f64::from(f32::from_bits((key >> 32) as u32)));
+        let roughness = if left < CLEAN { 1.0 } else { left };
+        (roughness, key as u32 as usize)
+    })
 }
 
 struct Grower<'a> {
@@ -150,6 +172,7 @@ impl Grower<'_> {
     fn bent_seeds(&self, reach: usize) -> Vec<usize> {
         let side = 2 * reach + 1;
         let mut seeds: Vec<(f64, usize)> = (0..self.pieces.labels.len())
+            .into_par_iter()
             .filter(|&node| {
                 self.pieces.labels[node] == NONE
                     && self.scene.grid.is_valid(node)
@@ -235,11 +258,10 @@ impl Grower<'_> {
     fn flood(&mut self, nodes: &[u32], surface: &Surface, layers: usize) -> Vec<u32> {
         self.stamp += 1;
         let mut found: Vec<u32> = Vec::with_capacity(2 * nodes.len());
-        for &node in nodes {
-            if self.lies_on(node as usize, surface) {
-                self.seen[node as usize] = self.stamp;
-                found.push(node);
-            }
+        let lying = nodes.par_iter().with_min_len(AT_ONCE).copied();
+        found.par_extend(lying.filter(|&node| self.lies_on(node as usize, surface)));
+        for &node in &found {
+            self.seen[node as usize] = self.stamp;
         }
         let mut from = 0;
         for _ in 0..layers {
@@ -277,14 +299,14 @@ impl Grower<'_> {
         if f64::from(plane.variance_mm2) > clear * clear {
             return miss <= 0.5 * MISS_NOISES;
         }
-        let turn = turn(grid, plane, rise_mm);
+        let turn = Turn::of(grid, plane, rise_mm);
         // The standard error of a full window's slope: its sum of u u is a third of
         // n reach (reach + 1).
         let reach = REACH as f64;
         let side = 2.0 * reach + 1.0;
         let error = noise_mm / grid.pitch_mm
             * libm::sqrt(3.0 * noise.area_nodes / (side * side * reach * (reach + 1.0)));
-        turn.angle <= (TURN_SHARE * self.scene.crease_rad).max(TURN_ERRORS * error * turn.facing)
+        turn.is_within((TURN_SHARE * self.scene.crease_rad).max(TURN_ERRORS * error * turn.facing))
     }
 
     /// Nodes without what hangs on by fewer than three nodes side by side, the largest
@@ -343,23 +365,63 @@ impl Grower<'_> {
     }
 }
 
-/// An angle between normals, and how squarely they face the camera: slopes' errors shrink by
-/// this in angles.
+/// A turn between normals, and how squarely they face the camera: slopes' errors shrink by this in
+/// angles.
 struct Turn {
-    angle: f64,
+    sine: f64,
+    cosine: f64,
     facing: f64,
 }
 
-fn turn(grid: &Grid<'_>, plane: &WindowPlane, rise_mm: [f64; 2]) -> Turn {
-    let [p, q] = rise_mm.map(|r| r / grid.pitch_mm);
-    let [a, b] = plane.rise_mm.map(|r| f64::from(r) / grid.pitch_mm);
-    // Cross product of (-p, -q, 1) and (-a, -b, 1), and the squares of their lengths.
-    let cross = [b - q, p - a, p * b - q * a];
-    let squares = (1.0 + p * p + q * q) * (1.0 + a * a + b * b);
-    let sine = libm::sqrt(cross.iter().map(|c| c * c).sum::<f64>() / squares);
-    let cosine = (p * a + q * b + 1.0) / libm::sqrt(squares);
-    Turn {
-        angle: libm::atan2(sine, cosine),
-        facing: 1.0 / libm::sqrt(squares),
+impl Turn {
+    fn of(grid: &Grid<'_>, plane: &WindowPlane, rise_mm: [f64; 2]) -> Self {
+        let [p, q] = rise_mm.map(|r| r / grid.pitch_mm);
+        let [a, b] = plane.rise_mm.map(|r| f64::from(r) / grid.pitch_mm);
+        // Cross product of (-p, -q, 1) and (-a, -b, 1), and the squares of their lengths.
+        let cross = [b - q, p - a, p * b - q * a];
+        let squares = (1.0 + p * p + q * q) * (1.0 + a * a + b * b);
+        let root = libm::sqrt(squares);
+        Self {
+            sine: libm::sqrt(cross.iter().map(|c| c * c).sum::<f64>() / squares),
+            cosine: (p * a + q * b + 1.0) / root,
+            facing: 1.0 / root,
+        }
+    }
+
+    /// Whether the angle is no greater. It is worked out only where its sine does not tell: that is
+    /// less than the angle, by a sixth of the angle's cube at most.
+    fn is_within(&self, angle: f64) -> bool {
+        let least_sine = angle - angle * angle * angle / 6.0;
+        if self.cosine > 0.0 && self.sine <= (1.0 - ROUNDING) * least_sine {
+            return true;
+        }
+        self.sine <= (1.0 + ROUNDING) * angle && libm::atan2(self.sine, self.cosine) <= angle
+    }
+}
+
+/// More than rounding does to an angle or its sine, of these.
+const ROUNDING: f64 = 1e-12;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_is_within_an_angle_as_its_own_angle_is() {
+        for k in 0..2_000_000 {
+            let own = f64::from(k) * 1.7e-6;
+            let turn = Turn {
+                sine: libm::sin(own).abs(),
+                cosine: libm::cos(own),
+                facing: 1.0,
+            };
+            for limit in [0.05, 0.3, 1.2, core::f64::consts::FRAC_PI_2, 2.0] {
+                let close = own * (1.0 + f64::from(k % 7 - 3) * 2e-16);
+                for angle in [limit, close] {
+                    let exact = libm::atan2(turn.sine, turn.cosine) <= angle;
+                    assert_eq!(turn.is_within(angle), exact, "{own} {angle}");
+                }
+            }
+        }
     }
 }

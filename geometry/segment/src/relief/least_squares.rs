@@ -30,10 +30,12 @@ impl<const N: usize> LeastSquares<N> {
         }
     }
 
+    /// Whole rows, although nothing asks for what lies above the diagonal: lanes take them at once.
+    #[inline(always)]
     pub(crate) fn add(&mut self, terms: &[f64; N], z: f64, weight: f64) {
         for i in 0..N {
             let t = weight * terms[i];
-            for (sum, term) in self.products[i][..=i].iter_mut().zip(terms) {
+            for (sum, term) in self.products[i].iter_mut().zip(terms) {
                 *sum += t * term;
             }
             self.with_z[i] += t * z;

@@ -7,6 +7,8 @@ pub(crate) use joints::{bridge, joints};
 
 use std::collections::BTreeSet;
 
+use rayon::prelude::*;
+
 use super::grow::MISS_NOISES;
 use super::piece::Pieces;
 use super::surface::Surface;
@@ -31,12 +33,13 @@ const ROUNDS: usize = 12;
 /// Makes pieces of nodes without one that lie near each other, whatever lies between, on a plane
 /// of their own; those from the first label on that follow each other become one.
 pub(crate) fn find(scene: &Scene<'_>, pieces: &mut Pieces, first: u32) {
-    let open =
-        (0..pieces.labels.len()).filter(|&n| pieces.labels[n] == NONE && scene.grid.is_valid(n));
+    let open = (0..pieces.labels.len())
+        .into_par_iter()
+        .filter(|&n| pieces.labels[n] == NONE && scene.grid.is_valid(n));
     // The flattest first.
     let mut seeds: Vec<(f64, usize)> = open
         .filter_map(|seed| {
-            let nodes = about(scene, pieces, seed);
+            let nodes = about(scene, &*pieces, seed);
             let surface = narrow_plane(scene, &nodes)?;
             Some((left(scene, &surface, &nodes), seed))
         })

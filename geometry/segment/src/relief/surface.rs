@@ -1,6 +1,9 @@
 //! A plane, quadric or quartic over the nodes of a piece.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::least_squares::LeastSquares;
+use crate::grid::Grid;
 use crate::scene::Scene;
 
 /// Terms by degree: u^a v^b.
@@ -129,9 +132,9 @@ impl Surface {
     }
 
     /// z at a place in columns and rows, millimetres.
+    #[inline]
     pub(crate) fn z_mm(&self, column: f64, row: f64) -> f64 {
-        let u = (column - self.origin[0]) / self.scale;
-        let v = (row - self.origin[1]) / self.scale;
+        let [u, v] = self.place(column, row);
         let [a, b, c, d, e, f, ..] = self.terms;
         let mut z = a + b * u + c * v + d * u * u + e * u * v + f * v * v;
         if self.is_quartic() {
@@ -141,6 +144,11 @@ impl Surface {
             }
         }
         self.z0_mm + z
+    }
+
+    #[inline]
+    fn place(&self, column: f64, row: f64) -> [f64; 2] {
+        [column - self.origin[0], row - self.origin[1]].map(|at| at / self.scale)
     }
 
     /// Standard deviation of z to expect at its middle, roughness left aside, millimetres.
@@ -156,6 +164,7 @@ impl Surface {
     }
 
     /// How far a node lies off, along z, in standard deviations of its noise there.
+    #[inline]
     pub(crate) fn miss(&self, scene: &Scene<'_>, node: usize) -> f64 {
         let (c, r) = scene.grid.column_row(node);
         let (c, r) = (c as f64, r as f64);
@@ -174,9 +183,9 @@ impl Surface {
     }
 
     /// Rise of z per column and per row, millimetres.
+    #[inline]
     pub(crate) fn rise_mm(&self, column: f64, row: f64) -> [f64; 2] {
-        let u = (column - self.origin[0]) / self.scale;
-        let v = (row - self.origin[1]) / self.scale;
+        let [u, v] = self.place(column, row);
         let [_, b, c, d, e, f, ..] = self.terms;
         let mut rise = [b + 2.0 * d * u + e * v, c + e * u + 2.0 * f * v];
         if self.is_quartic() {
@@ -191,6 +200,7 @@ impl Surface {
 }
 
 /// 1, x, x^2, x^3, x^4.
+#[inline(always)]
 fn powers(x: f64) -> [f64; 5] {
     let square = x * x;
     [1.0, x, square, square * x, square * square]
@@ -224,19 +234,11 @@ impl Frame {
     }
 
     fn sums<const N: usize>(&self, scene: &Scene<'_>, nodes: &[u32]) -> LeastSquares<N> {
-        let grid = &scene.grid;
-        let mut sums = LeastSquares::new();
-        for &node in nodes {
-            let (c, r) = grid.column_row(node as usize);
-            let u = powers((c as f64 - self.origin[0]) / self.scale);
-            let v = powers((r as f64 - self.origin[1]) / self.scale);
-            let mut terms = [0.0; N];
-            for (term, (a, b)) in terms.iter_mut().zip(POWERS) {
-                *term = u[a] * v[b];
-            }
-            sums.add(&terms, grid.z_mm[node as usize] - self.z0_mm, 1.0);
-        }
-        sums
+        Arch::new().dispatch(Summed {
+            frame: self,
+            grid: &scene.grid,
+            nodes,
+        })
     }
 
     fn surface<const N: usize>(
@@ -259,5 +261,33 @@ impl Frame {
             error_mm2: solution.error,
             roughness,
         })
+    }
+}
+
+/// Nodes to be summed up with the lanes that the processor has.
+struct Summed<'a, const N: usize> {
+    frame: &'a Frame,
+    grid: &'a Grid<'a>,
+    nodes: &'a [u32],
+}
+
+impl<const N: usize> WithSimd for Summed<'_, N> {
+    type Output = LeastSquares<N>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> LeastSquares<N> {
+        let Self { frame, grid, nodes } = self;
+        let mut sums = LeastSquares::new();
+        for &node in nodes {
+            let (c, r) = grid.column_row(node as usize);
+            let u = powers((c as f64 - frame.origin[0]) / frame.scale);
+            let v = powers((r as f64 - frame.origin[1]) / frame.scale);
+            let mut terms = [0.0; N];
+            for (term, (a, b)) in terms.iter_mut().zip(POWERS) {
+                *term = u[a] * v[b];
+            }
+            sums.add(&terms, grid.z_mm[node as usize] - frame.z0_mm, 1.0);
+        }
+        sums
     }
 }

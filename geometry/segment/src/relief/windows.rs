@@ -1,9 +1,16 @@
 //! Planes over square windows around every node, of several sizes.
 
+mod lanes;
+mod strip;
+
+use pulp::Arch;
+use rayon::prelude::*;
+
 use crate::grid::Grid;
+use strip::Strip;
 
 /// A plane fitted to a window.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct WindowPlane {
     /// Rise of z per column and per row, millimetres.
     pub(crate) rise_mm: [f32; 2],
@@ -19,93 +26,31 @@ impl WindowPlane {
     };
 }
 
-/// Sums over a line of nodes: count, v, v v, z, v z, z z.
-type Line = [f64; 6];
-
 /// The planes of all windows that reach so many nodes to each side and are at least half full.
-///
-/// Windows are summed up along rows first, then along columns, which costs by their side, not
-/// by their area.
 pub(crate) fn planes(grid: &Grid<'_>, reach: usize) -> Vec<WindowPlane> {
-    let (columns, rows) = (grid.columns, grid.rows);
-    let mut planes = Vec::with_capacity(grid.nodes());
-    let mut lines: Vec<Line> = vec![[0.0; 6]; grid.nodes()];
-    let reference = reference(grid);
-    let mut z = vec![0.0; rows];
-    for column in 0..columns {
-        for (slot, z) in z.iter_mut().zip(&grid.z_mm[column * rows..]) {
-            *slot = z - reference;
-        }
-        for row in 0..rows {
-            let line = &mut lines[column * rows + row];
-            let from = row.saturating_sub(reach);
-            let to = (row + reach + 1).min(rows);
-            for (k, &z) in z[from..to].iter().enumerate() {
-                if !z.is_nan() {
-                    let v = (from + k) as f64 - row as f64;
-                    for (sum, term) in line.iter_mut().zip([1.0, v, v * v, z, v * z, z * z]) {
-                        *sum += term;
-                    }
-                }
-            }
-        }
+    let mut planes = vec![WindowPlane::NONE; grid.nodes()];
+    if planes.is_empty() {
+        return planes;
     }
-    let least = (((2 * reach + 1) * (2 * reach + 1)) / 2) as f64;
-    for column in 0..columns {
-        let from = column.saturating_sub(reach);
-        let to = (column + reach + 1).min(columns);
-        for row in 0..rows {
-            if !grid.is_valid(column * rows + row) {
-                planes.push(WindowPlane::NONE);
-                continue;
-            }
-            let mut total = [0.0; 6];
-            let (mut u1, mut uu, mut uv, mut uz) = (0.0, 0.0, 0.0, 0.0);
-            for c in from..to {
-                let u = c as f64 - column as f64;
-                let line = &lines[c * rows + row];
-                for (sum, term) in total.iter_mut().zip(line) {
-                    *sum += term;
-                }
-                u1 += u * line[0];
-                uu += u * u * line[0];
-                uv += u * line[1];
-                uz += u * line[3];
-            }
-            let [n, v1, vv, z1, vz, zz] = total;
-            planes.push(if n >= least {
-                plane(n, [u1, v1], [uu, uv, vv], [z1, uz, vz, zz])
-            } else {
-                WindowPlane::NONE
-            });
-        }
-    }
+    let reference_mm = reference_mm(grid);
+    // Each strip sums up the columns beside it once more, so there are no more than need be.
+    let width = grid.columns.div_ceil(rayon::current_num_threads());
+    let strips = planes.par_chunks_mut(width * grid.rows).enumerate();
+    strips.for_each(|(k, planes)| {
+        let first = k * width;
+        Arch::new().dispatch(Strip {
+            grid,
+            reach,
+            reference_mm,
+            columns: first..first + planes.len() / grid.rows,
+            planes,
+        });
+    });
     planes
 }
 
-fn plane(
-    n: f64,
-    [u, v]: [f64; 2],
-    [uu, uv, vv]: [f64; 3],
-    [z, uz, vz, zz]: [f64; 4],
-) -> WindowPlane {
-    let (uu, uv, vv) = (uu - u * u / n, uv - u * v / n, vv - v * v / n);
-    let (uz, vz, zz) = (uz - u * z / n, vz - v * z / n, zz - z * z / n);
-    let determinant = uu * vv - uv * uv;
-    if n < 4.0 || determinant < 1e-6 {
-        return WindowPlane::NONE;
-    }
-    let a = (uz * vv - vz * uv) / determinant;
-    let b = (vz * uu - uz * uv) / determinant;
-    let left = (zz - a * uz - b * vz).max(0.0);
-    WindowPlane {
-        rise_mm: [a as f32, b as f32],
-        variance_mm2: (left / (n - 3.0)) as f32,
-    }
-}
-
 /// Some z of the image, so that squares of z stay small.
-fn reference(grid: &Grid<'_>) -> f64 {
+fn reference_mm(grid: &Grid<'_>) -> f64 {
     grid.z_mm
         .iter()
         .copied()
@@ -162,4 +107,79 @@ pub(crate) fn best_windows(
         }
     }
     chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The plane of a window as defined, its terms summed up in the same order.
+    fn plane(grid: &Grid<'_>, node: usize, reach: usize) -> WindowPlane {
+        let (column, row) = grid.column_row(node);
+        let (columns, rows) = grid.window(node, reach);
+        let reference_mm = reference_mm(grid);
+        let (mut s, mut along) = ([0.0; 6], [0.0; 4]);
+        for c in columns {
+            let mut line = [0.0; 6];
+            for r in rows.clone() {
+                let z = grid.z_mm[c * grid.rows + r] - reference_mm;
+                let v = r as f64 - row as f64;
+                if !z.is_nan() {
+                    for (sum, term) in line.iter_mut().zip([1.0, v, v * v, z, v * z, z * z]) {
+                        *sum += term;
+                    }
+                }
+            }
+            let u = c as f64 - column as f64;
+            for (sum, term) in s.iter_mut().zip(line) {
+                *sum += term;
+            }
+            let terms = [u * line[0], u * u * line[0], u * line[1], u * line[3]];
+            for (sum, term) in along.iter_mut().zip(terms) {
+                *sum += term;
+            }
+        }
+        let [n, v, vv, z, vz, zz] = s;
+        let [u, uu, uv, uz] = along;
+        let (uu, uv, vv) = (uu - u * u / n, uv - u * v / n, vv - v * v / n);
+        let (uz, vz, zz) = (uz - u * z / n, vz - v * z / n, zz - z * z / n);
+        let determinant = uu * vv - uv * uv;
+        let side = 2 * reach + 1;
+        if !grid.is_valid(node) || n < (side * side / 2) as f64 || determinant < 1e-6 {
+            return WindowPlane::NONE;
+        }
+        let a = (uz * vv - vz * uv) / determinant;
+        let b = (vz * uu - uz * uv) / determinant;
+        let left = (zz - a * uz - b * vz).max(0.0);
+        WindowPlane {
+            rise_mm: [a as f32, b as f32],
+            variance_mm2: (left / (n - 3.0)) as f32,
+        }
+    }
+
+    #[test]
+    fn planes_are_those_of_each_window_alone_whatever_the_threads() {
+        let (columns, rows) = (37, 29);
+        let z_mm: Vec<f64> = (0..columns * rows)
+            .map(|k| match k * 7919 % 13 {
+                0 => f64::NAN,
+                stray => 0.3 * (k / rows) as f64 - 0.1 * (k % rows) as f64 + 0.01 * stray as f64,
+            })
+            .collect();
+        let grid = Grid {
+            columns,
+            rows,
+            pitch_mm: 0.5,
+            z_mm: &z_mm,
+        };
+        for reach in [2, 3, 12] {
+            let alone: Vec<WindowPlane> =
+                (0..grid.nodes()).map(|n| plane(&grid, n, reach)).collect();
+            for threads in [1, 2, 3] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+                let planes = pool.build().unwrap().install(|| planes(&grid, reach));
+                assert_eq!(planes, alone, "reach {reach}, {threads} threads");
+            }
+        }
+    }
 }
