@@ -4,6 +4,7 @@
 //! cargo xtask bench
 //! ```
 
+mod floor;
 mod mlms;
 mod row;
 mod scan;
@@ -12,12 +13,18 @@ mod stages;
 mod timing;
 mod work;
 
+use std::alloc::System;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use clap::Parser;
+use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
+
+/// Counts allocations; two additions for each do not show in any time.
+#[global_allocator]
+static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
 /// Measure how fast each stage is
 #[derive(Debug, Parser)]
@@ -29,8 +36,8 @@ struct Options {
     /// Only the kernel of MLMS, or only the stages of a scan
     #[arg(long, value_name = "NAME", value_parser = BENCHES.map(|(name, _)| name))]
     only: Option<String>,
-    /// Do one piece of work and measure nothing, for instructions to be counted: prints how many
-    /// nodes it has each time
+    /// Do one piece of work and measure no time, for instructions to be counted: prints how many
+    /// nodes it has each time, and how many blocks of memory the program has asked for
     #[arg(long, value_name = "NAME", value_parser = work::WORK.map(|(name, _)| name))]
     work: Option<String>,
     /// How many times the work is done
@@ -75,7 +82,9 @@ const BENCHES: [(&str, Bench); 2] = [("mlms", mlms::rows), ("scan", stages::rows
 
 fn run(options: &Options) -> Result<()> {
     if let Some(name) = &options.work {
-        println!("{}", work::work(name, options.times)?);
+        let nodes = work::work(name, options.times)?;
+        let told = ALLOCATOR.stats();
+        println!("{nodes} {}", told.allocations + told.reallocations);
         return Ok(());
     }
     if let Some(number) = options.answers {

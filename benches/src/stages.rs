@@ -36,6 +36,7 @@ fn scan_rows(columns: u32, samples: u32) -> Result<Vec<Row>> {
         size: size.clone(),
         unit: "node",
         ns: 1e9 * seconds / nodes.max(1) as f64,
+        floor_ns: None,
         peer: None,
     };
     let mut rows = Vec::new();

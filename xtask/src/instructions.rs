@@ -1,4 +1,5 @@
-//! Instructions that each stage takes, which no other program on the machine changes.
+//! Instructions and blocks of memory that each stage takes, which no other program on the machine
+//! changes.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -6,6 +7,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
+use serde::{Deserialize, Serialize};
 
 use crate::{apt, judge, shell};
 
@@ -18,8 +20,10 @@ pub(crate) struct Options {
 
 /// Counts on record, from the workspace's root.
 const RECORD: &str = "benches/instructions.json";
-/// Counts may grow to this many times those on record.
+/// Counts may grow to this many times those on record, and by this much where these are next to
+/// nothing.
 const MOST: f64 = 1.1;
+const LEAST: f64 = 0.01;
 /// What is done so many times is held against what is done once.
 const TIMES: u64 = 3;
 
@@ -38,7 +42,23 @@ const WORK: [&str; 8] = [
     "iges",
 ];
 
-/// Counts instructions a node, and fails if they have grown.
+/// What is counted for each node of a work.
+#[derive(Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Counts {
+    instructions: BTreeMap<String, f64>,
+    /// Blocks of memory asked for.
+    allocations: BTreeMap<String, f64>,
+}
+
+/// What one run of the program comes to.
+struct Run {
+    instructions: u64,
+    allocations: u64,
+    nodes: u64,
+}
+
+/// Counts what a node takes, and fails if it has grown.
 pub(crate) fn run(options: &Options) -> Result<()> {
     if !has_lanes_on_record() {
         ensure!(
@@ -50,13 +70,22 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     }
     apt::need(&[("valgrind", "valgrind")])?;
     build()?;
-    let mut counts = BTreeMap::new();
+    let mut counts = Counts::default();
     for work in WORK {
-        let (once, units) = count(work, 1)?;
-        let (often, _) = count(work, 1 + TIMES)?;
-        ensure!(units > 0, "{work} has no nodes");
-        let each = often.saturating_sub(once) as f64 / (TIMES * units) as f64;
-        counts.insert(work.to_owned(), each.round());
+        let (once, often) = (count(work, 1)?, count(work, 1 + TIMES)?);
+        ensure!(once.nodes > 0, "{work} has no nodes");
+        let each = |of: fn(&Run) -> u64| {
+            of(&often).saturating_sub(of(&once)) as f64 / (TIMES * once.nodes) as f64
+        };
+        let (instructions, allocations) =
+            (each(|run| run.instructions), each(|run| run.allocations));
+        let kept = |count: f64, digits: f64| (count * digits).round() / digits;
+        counts
+            .instructions
+            .insert(work.to_owned(), kept(instructions, 1.0));
+        counts
+            .allocations
+            .insert(work.to_owned(), kept(allocations, 1e3));
     }
     let place = shell::root().join(RECORD);
     if options.record {
@@ -64,7 +93,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         fs::write(&place, text).with_context(|| format!("cannot write {RECORD}"))?;
     }
     let text = fs::read_to_string(&place).with_context(|| format!("cannot read {RECORD}"))?;
-    let recorded: BTreeMap<String, f64> =
+    let recorded: Counts =
         serde_json::from_str(&text).with_context(|| format!("{RECORD} is no record"))?;
     compare(&counts, &recorded)
 }
@@ -110,31 +139,47 @@ pub(crate) fn build() -> Result<String> {
     Ok(home().join("release/bench").display().to_string())
 }
 
-fn compare(counts: &BTreeMap<String, f64>, recorded: &BTreeMap<String, f64>) -> Result<()> {
+fn compare(counts: &Counts, recorded: &Counts) -> Result<()> {
     let mut grown = Vec::new();
-    println!("| work | instructions a node | on record |\n|---|---:|---:|");
-    for (work, count) in counts {
-        let before = recorded
-            .get(work)
-            .with_context(|| format!("{work} is not in {RECORD}; `--record` writes it"))?;
-        println!("| {work} | {count} | {before} |");
-        if *count > MOST * before {
-            grown.push(format!("{work}: {count}, {before} on record"));
+    println!("| work | instructions a node | on record | allocations a node | on record |");
+    println!("|---|---:|---:|---:|---:|");
+    for (work, instructions) in &counts.instructions {
+        let on_record = |kept: &BTreeMap<String, f64>| {
+            let found = kept.get(work).copied();
+            found.with_context(|| format!("{work} is not in {RECORD}; `--record` writes it"))
+        };
+        let allocations = counts.allocations.get(work).copied().unwrap_or_default();
+        let before = [
+            on_record(&recorded.instructions)?,
+            on_record(&recorded.allocations)?,
+        ];
+        println!(
+            "| {work} | {instructions} | {} | {allocations} | {} |",
+            before[0], before[1]
+        );
+        let kinds = [
+            ("instructions", *instructions),
+            ("allocations", allocations),
+        ];
+        for ((kind, count), before) in kinds.into_iter().zip(before) {
+            if count > (MOST * before).max(before + LEAST) {
+                grown.push(format!("{work}: {count} {kind}, {before} on record"));
+            }
         }
     }
     if grown.is_empty() {
         return Ok(());
     }
     bail!(
-        "instructions a node have grown by more than {:.0} %; where that has to be, \
-         `cargo xtask instructions --record` writes the new ones down:\n  {}",
+        "what a node takes has grown by more than {:.0} %; where that has to be, \
+         `cargo xtask instructions --record` writes the new counts down:\n  {}",
         100.0 * (MOST - 1.0),
         grown.join("\n  ")
     )
 }
 
-/// Instructions of the whole program, and the units of the work.
-fn count(work: &str, times: u64) -> Result<(u64, u64)> {
+/// What the whole program takes that does its work so many times.
+fn count(work: &str, times: u64) -> Result<Run> {
     let program = home().join("release/bench");
     let counts = home().join("counts.out");
     let told = format!("--cachegrind-out-file={}", counts.display());
@@ -151,16 +196,23 @@ fn count(work: &str, times: u64) -> Result<(u64, u64)> {
         &times,
     ];
     let said = shell::output("valgrind", &words)?;
-    let units = said
-        .trim()
-        .parse()
-        .with_context(|| format!("{work}: {said}"))?;
+    let told: Vec<u64> = said
+        .split_whitespace()
+        .map(|word| word.parse().with_context(|| format!("{work}: {said}")))
+        .collect::<Result<_>>()?;
+    let &[nodes, allocations] = told.as_slice() else {
+        bail!("{work}: {said}");
+    };
     let counts = fs::read_to_string(&counts)?;
     let summary = counts
         .lines()
         .find_map(|line| line.strip_prefix("summary:"))
         .context("valgrind told no summary")?;
-    Ok((summary.trim().parse()?, units))
+    Ok(Run {
+        instructions: summary.trim().parse()?,
+        allocations,
+        nodes,
+    })
 }
 
 #[cfg(test)]
@@ -169,10 +221,26 @@ mod tests {
 
     #[test]
     fn growth_by_more_than_a_tenth_is_told() {
-        let counts = |count: f64| BTreeMap::from([("regrid".to_owned(), count)]);
-        assert!(compare(&counts(109.0), &counts(100.0)).is_ok());
-        let error = compare(&counts(111.0), &counts(100.0)).unwrap_err();
-        assert!(error.to_string().contains("regrid: 111, 100 on record"));
-        assert!(compare(&counts(1.0), &BTreeMap::new()).is_err());
+        let counts = |instructions: f64, allocations: f64| {
+            let of = |count: f64| BTreeMap::from([("regrid".to_owned(), count)]);
+            Counts {
+                instructions: of(instructions),
+                allocations: of(allocations),
+            }
+        };
+        assert!(compare(&counts(109.0, 0.009), &counts(100.0, 0.0)).is_ok());
+        let error = compare(&counts(111.0, 0.0), &counts(100.0, 0.0)).unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .contains("regrid: 111 instructions, 100 on record")
+        );
+        let error = compare(&counts(1.0, 0.02), &counts(1.0, 0.0)).unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .contains("regrid: 0.02 allocations, 0 on record")
+        );
+        assert!(compare(&counts(1.0, 0.0), &Counts::default()).is_err());
     }
 }

@@ -5,6 +5,7 @@ mod textbook;
 use anyhow::{Context, Result, ensure};
 use regrid::LeastMedian;
 
+use crate::floor;
 use crate::row::Row;
 use crate::scan::Uniform;
 use crate::timing::race;
@@ -49,6 +50,7 @@ fn row((samples, planes): (usize, usize), short: bool) -> Result<Row> {
         size: format!("M = {samples}, N_s = {planes}"),
         unit: "node",
         ns: each_ns(ours_s),
+        floor_ns: Some(floor::ns(floor::least_median(samples, planes))),
         peer: Some(("textbook", theirs_s / ours_s)),
     })
 }
