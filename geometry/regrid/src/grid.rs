@@ -10,12 +10,12 @@ use crate::consensus::{Consensus, Noise, Silhouette, noise};
 use crate::draws::Draws;
 use crate::exhaustive;
 use crate::least_median::LeastMedian;
-use crate::neighbours::{Neighbour, Search};
+use crate::neighbours::{Near, Neighbour, Search};
 use crate::plane::{Fit, Plane};
 use crate::settings::{Estimator, LEAST_WINDOW, RegridSettings};
 use crate::strip::{Strip, typical};
 use crate::support::{Place, Surroundings};
-use crate::window::{Spacing, Window};
+use crate::window::{Spacing, Window, around};
 
 /// Computes grid columns; keeps its buffers from one to the next.
 #[derive(Debug, Default)]
@@ -34,10 +34,10 @@ pub(crate) struct GridWorker {
 
 impl GridWorker {
     /// Distance in x from the outermost column at which nodes may still have a value,
-    /// given the columns within reach of there, in ascending x.
-    pub(crate) fn margin_mm<'a>(
+    /// given columns in ascending x that include all within reach of there.
+    pub(crate) fn margin_mm(
         &mut self,
-        strips: impl Iterator<Item = &'a Strip>,
+        strips: &[Strip],
         x_mm: f64,
         settings: &RegridSettings,
     ) -> Option<f64> {
@@ -47,9 +47,9 @@ impl GridWorker {
 
     /// The grid column with lattice index `i`, from columns in ascending x that include all
     /// within reach. `None` when all its nodes are masked.
-    pub(crate) fn column<'a>(
+    pub(crate) fn column(
         &mut self,
-        strips: impl Iterator<Item = &'a Strip>,
+        strips: &[Strip],
         i: i64,
         settings: &RegridSettings,
     ) -> Option<GridColumn> {
@@ -65,7 +65,7 @@ impl GridWorker {
         let near_x_mm = settings.support.radius * greatest.x_mm;
         let near_y_mm = settings.support.radius * greatest.y_mm;
         let noise = match settings.estimator {
-            Estimator::Consensus => noise(window.near(NOISE_COLUMNS, x_mm), &mut self.lengths),
+            Estimator::Consensus => noise(around(window.strips, NOISE_COLUMNS, x_mm).iter(), &mut self.lengths),
             Estimator::LeastMedian | Estimator::ExhaustiveLeastMedian | Estimator::LeastSquares => {
                 None
             }
@@ -77,33 +77,26 @@ impl GridWorker {
             quality: Vec::new(),
         };
         self.before = None;
-        self.search.begin(&window);
-        self.search.advance(&window, f64::NEG_INFINITY);
+        self.search.begin(&window, x_mm);
         let first_row = |y_mm: f64| {
             let low = (y_mm - near_y_mm).max(settings.roi.y_mm.0);
             lattice.first_at_or_above(low)
         };
-        let mut next = self
-            .search
-            .next_above(&window, x_mm, near_x_mm)
-            .map(first_row);
+        let mut next = self.search.lowest(&window, near_x_mm).map(first_row);
         while let Some(j) = next {
             let y_mm = lattice.line_mm(j);
             if y_mm > settings.roi.y_mm.1 {
                 break;
             }
-            self.search.advance(&window, y_mm);
-            let above = self.search.next_above(&window, x_mm, near_x_mm);
-            let below = self.search.next_below(&window, x_mm, near_x_mm);
-            if below.is_none_or(|y| y_mm - y > near_y_mm)
-                && above.is_none_or(|y| y - y_mm > near_y_mm)
-            {
-                // Nothing near: on to where the next sample comes near, if there is one.
-                next = above.map(|y| first_row(y).max(j + 1));
-                continue;
+            match self.search.near(&window, y_mm, [near_x_mm, near_y_mm]) {
+                Near::Some => {}
+                Near::Above(y) => {
+                    next = Some(first_row(y).max(j + 1));
+                    continue;
+                }
+                Near::Nothing => break,
             }
             let node = Node {
-                x_mm,
                 y_mm,
                 i,
                 j,
@@ -124,11 +117,10 @@ impl GridWorker {
         node: Node,
         settings: &RegridSettings,
     ) -> Option<(f64, NodeQuality)> {
-        let (x_mm, y_mm) = (node.x_mm, node.y_mm);
         // Outliers take no place in a window, so that as much is known of the surface.
         let clean_share = node.noise.map_or(1.0, |noise| noise.clean_share);
         let neighbours = (settings.neighbours as f64 / clean_share).round() as usize;
-        let nearest = self.search.nearest(window, x_mm, y_mm, neighbours);
+        let nearest = self.search.nearest(window, node.y_mm, neighbours);
         if nearest.len() < LEAST_WINDOW {
             return None;
         }
@@ -215,7 +207,6 @@ const NOISE_COLUMNS: usize = 8;
 /// A node to estimate.
 #[derive(Debug, Clone, Copy)]
 struct Node {
-    x_mm: f64,
     y_mm: f64,
     i: i64,
     j: i64,

@@ -21,11 +21,12 @@ pub(crate) struct Strip {
 
 impl Strip {
     /// The column cut to the region of interest, for consensus without the samples that lie
-    /// beneath others; `index` is its place in the scan.
+    /// beneath others; `index` is its place in the scan. The buffer is one to use again.
     pub(crate) fn new(
         column: &Column,
         settings: &RegridSettings,
         index: usize,
+        buffer: Vec<(f64, f64)>,
     ) -> Result<Self, RegridError> {
         let roi = &settings.roi;
         let within = |value: f64, (low, high): (f64, f64)| low <= value && value <= high;
@@ -42,8 +43,10 @@ impl Strip {
         };
         let x_mm = column.x_mm();
         reachable(x_mm)?;
-        let mut samples = Vec::new();
+        let mut samples = buffer;
+        samples.clear();
         if within(x_mm, roi.x_mm) {
+            samples.reserve(column.samples().len());
             for sample in column.samples() {
                 if within(sample.y_mm, roi.y_mm) && within(sample.z_mm, roi.z_mm) {
                     reachable(sample.y_mm)?;
@@ -119,12 +122,12 @@ mod tests {
             y_mm: (2.0, 8.0),
             z_mm: (30.0, 65.0),
         };
-        let strip = Strip::new(&column, &settings, 0).unwrap();
+        let strip = Strip::new(&column, &settings, 0, Vec::new()).unwrap();
         let heights: Vec<f64> = strip.samples.iter().map(|s| s.0).collect();
         assert_eq!(heights, [3.0, 4.0, 5.0, 6.0]);
         settings.roi.x_mm = (5.5, 6.0);
         assert!(
-            Strip::new(&column, &settings, 0)
+            Strip::new(&column, &settings, 0, vec![(0.0, 0.0)])
                 .unwrap()
                 .samples
                 .is_empty()
