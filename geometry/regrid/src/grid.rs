@@ -128,9 +128,7 @@ impl GridWorker {
         let dense = nearest.len() == neighbours;
         let support = &settings.support;
         // Inliers are some of the samples: where those do not suffice, inliers will not.
-        let all = self
-            .surroundings
-            .place(nearest, spacing, support, |_| true, |_| false);
+        let all = self.surroundings.place_of_all(nearest, spacing, support);
         // How far outside of all samples the node lies.
         let outside = match all {
             Place::Among => 0.0,
@@ -147,15 +145,13 @@ impl GridWorker {
         if settings.estimator == Estimator::LeastSquares {
             let fit = Fit::least_squares(nearest)?;
             let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm, dense);
-            let supported = self
-                .surroundings
-                .supported(nearest, spacing, support, &agrees);
+            let supported = self.surroundings.supported(nearest, support, &agrees);
             return supported.then(|| (fit.plane.c, quality(nearest, &fit.plane, agrees)));
         }
-        self.samples.clear();
-        self.samples.extend_from_slice(nearest);
         let mut draws = Draws::new(settings.seed, node.i, node.j);
         if settings.estimator == Estimator::Consensus {
+            self.samples.clear();
+            self.samples.extend_from_slice(nearest);
             let at = At {
                 window,
                 node,
@@ -167,32 +163,38 @@ impl GridWorker {
             };
             return self.by_consensus(&at, &mut draws);
         }
-        while self.samples.len() >= LEAST_WINDOW {
+        // Samples that are left: the first of these, or, once some are taken out, of the others.
+        let (mut left, mut is_whole) = (nearest.len(), true);
+        while left >= LEAST_WINDOW {
+            let samples = if is_whole { nearest } else { &self.samples };
+            let samples = &samples[..left];
             let fit = if settings.estimator == Estimator::ExhaustiveLeastMedian {
-                exhaustive::least_median(&self.samples, &mut self.lengths)?
+                exhaustive::least_median(samples, &mut self.lengths)?
             } else {
-                self.median.fit(&self.samples, settings.draws, &mut draws)?
+                self.median.fit(samples, settings.draws, &mut draws)?
             };
             if fit.tolerance > support.inlier_ceiling * spacing.mean_mm {
                 // No surface has a majority; the nearer half may show one.
-                let half = self.samples.len() / 2;
-                self.samples.truncate(half);
+                left /= 2;
                 continue;
             }
             let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm, dense);
-            if self
-                .surroundings
-                .supported(nearest, spacing, support, &agrees)
-            {
+            if self.surroundings.supported(nearest, support, &agrees) {
                 return Some((fit.plane.c, quality(nearest, &fit.plane, agrees)));
             }
             // The majority lies on another surface than the node, as at a corner in front of
             // a wall. Without it the node's own surface may be found.
-            let before = self.samples.len();
+            if is_whole {
+                self.samples.clear();
+                self.samples.extend_from_slice(&nearest[..left]);
+                is_whole = false;
+            }
+            self.samples.truncate(left);
             self.samples.retain(|n| !agrees(n));
-            if self.samples.len() == before {
+            if self.samples.len() == left {
                 return None;
             }
+            left = self.samples.len();
         }
         None
     }
@@ -236,10 +238,16 @@ const AREA_SHARE: f64 = 0.7;
 /// The spacing around a node, from the distances in y of the window's samples to the next
 /// ones in their columns, but no less than the window's area lets expect.
 fn local_spacing(window: &Window<'_>, nearest: &[Neighbour], lengths: &mut Vec<f64>) -> Spacing {
-    lengths.clear();
+    // Without branches, for which of them are 0 is hard to foresee.
+    lengths.resize(2 * nearest.len(), 0.0);
+    let mut number = 0;
     for n in nearest {
-        lengths.extend(window.strips[n.strip].gaps(n.index));
+        for gap in window.strips[n.strip].gaps(n.index) {
+            lengths[number] = gap;
+            number += usize::from(gap > 0.0);
+        }
     }
+    lengths.truncate(number);
     let limit_mm = window.greatest_sample_spacing_mm;
     let along = typical(lengths).map_or(limit_mm, |spacing| spacing.min(limit_mm));
     let area = nearest.last().map_or(0.0, |n| PI * n.distance2);
@@ -259,19 +267,21 @@ fn append(column: &mut GridColumn, j: i64, (z_mm, quality): (f64, NodeQuality)) 
     column.quality.push(quality);
 }
 
-/// What is told of a node with this plane.
+/// What is told of a node with this plane. The window's samples come in ascending distance.
 fn quality(
     window: &[Neighbour],
     plane: &Plane,
     agrees: impl Fn(&Neighbour) -> bool,
 ) -> NodeQuality {
-    let (mut inliers, mut squares, mut nearest2) = (0_u16, 0.0, f64::INFINITY);
-    for n in window.iter().filter(|n| agrees(n)) {
+    let (mut inliers, mut squares) = (0_u16, 0.0);
+    for n in window {
         let residual = plane.residual(n);
-        inliers = inliers.saturating_add(1);
-        squares += residual * residual;
-        nearest2 = n.distance2.min(nearest2);
+        let is_inlier = agrees(n);
+        inliers = inliers.saturating_add(u16::from(is_inlier));
+        squares += if is_inlier { residual * residual } else { 0.0 };
     }
+    let nearest = window.iter().find(|n| agrees(n));
+    let nearest2 = nearest.map_or(f64::INFINITY, |n| n.distance2);
     let freedom = f64::from(inliers) - 3.0;
     NodeQuality {
         inliers,

@@ -2,7 +2,7 @@
 
 use core::cmp::Ordering;
 
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::Neighbour;
 
@@ -60,7 +60,11 @@ impl Sorter {
         }));
         short_keys.resize(found.len().next_multiple_of(SIDE_BY_SIDE), NONE);
         ranks.resize(COUNTED / SIDE_BY_SIDE, [0; SIDE_BY_SIDE]);
-        Arch::new().dispatch(|| count_below(short_keys, found.len(), ranks));
+        Arch::new().dispatch(CountBelow {
+            keys: short_keys,
+            number: found.len(),
+            ranks,
+        });
         sorted.resize(found.len(), Neighbour::default());
         for (own, rank) in found.iter().zip(ranks.as_flattened()) {
             if let Some(place) = sorted.get_mut(*rank as usize) {
@@ -86,18 +90,28 @@ impl Sorter {
     }
 }
 
-/// For each key how many of the first `number` are below it.
-#[inline(always)]
-fn count_below(keys: &[i32], number: usize, ranks: &mut [[u32; SIDE_BY_SIDE]]) {
-    let (blocks, _) = keys.as_chunks::<SIDE_BY_SIDE>();
-    for (own, ranks) in blocks.iter().zip(ranks) {
-        let mut below = [0; SIDE_BY_SIDE];
-        for other in keys.iter().take(number) {
-            for (below, own) in below.iter_mut().zip(own) {
-                *below += u32::from(other < own);
+/// Counts for each key how many of the first `number` are below it.
+struct CountBelow<'a> {
+    keys: &'a [i32],
+    number: usize,
+    ranks: &'a mut [[u32; SIDE_BY_SIDE]],
+}
+
+impl WithSimd for CountBelow<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let (blocks, _) = self.keys.as_chunks::<SIDE_BY_SIDE>();
+        for (own, ranks) in blocks.iter().zip(self.ranks) {
+            let mut below = [0_u32; SIDE_BY_SIDE];
+            for other in self.keys.iter().take(self.number) {
+                for (below, own) in below.iter_mut().zip(own) {
+                    *below += u32::from(other < own);
+                }
             }
+            *ranks = below;
         }
-        *ranks = below;
     }
 }
 
