@@ -36,7 +36,7 @@ pub fn regrid(
         let mut worker = GridWorker::default();
         let mut margin = |x_mm: f64| {
             worker
-                .margin_mm(around(&strips, x_mm, settings), x_mm, settings)
+                .margin_mm(&strips, x_mm, settings)
                 .unwrap_or(0.0)
         };
         let i_first = lattice.first_at_or_above(first.x_mm - margin(first.x_mm));
@@ -62,7 +62,7 @@ fn ascending(
     let mut strips: Vec<Strip> = Vec::new();
     let mut travel = None;
     for (index, column) in columns.into_iter().enumerate() {
-        let strip = Strip::new(&column, settings, index)?;
+        let strip = Strip::new(&column, settings, index, Vec::new())?;
         if let Some(previous) = strips.last() {
             travel = Some(Travel::check(travel, previous.x_mm, strip.x_mm, index)?);
         }
@@ -74,19 +74,6 @@ fn ascending(
     Ok(strips)
 }
 
-/// The strips that the window at this x is cut from.
-fn around<'a>(
-    strips: &'a [Strip],
-    x_mm: f64,
-    settings: &RegridSettings,
-) -> impl Iterator<Item = &'a Strip> {
-    let left = strips.partition_point(|s| s.x_mm < x_mm);
-    let right = strips.partition_point(|s| s.x_mm <= x_mm);
-    let start = left.saturating_sub(settings.reach_columns);
-    let end = (right + settings.reach_columns).min(strips.len());
-    strips[start..end].iter()
-}
-
 fn grid_columns(
     strips: &[Strip],
     i_first: i64,
@@ -95,16 +82,12 @@ fn grid_columns(
     monitor: &dyn Monitor,
 ) -> Result<Vec<GridColumn>, Cancelled> {
     let number = (i_last - i_first + 1).max(0) as usize;
-    let lattice = Lattice {
-        pitch_mm: settings.pitch_mm,
-    };
     // Held while reporting, so that the reported share never decreases.
     let done = Mutex::new(0_usize);
     (i_first..=i_last)
         .into_par_iter()
         .map_init(GridWorker::default, |worker, i| {
             monitor.check()?;
-            let strips = around(strips, lattice.line_mm(i), settings);
             let column = worker.column(strips, i, settings);
             if let Ok(mut done) = done.lock() {
                 *done += 1;

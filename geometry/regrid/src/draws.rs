@@ -50,8 +50,15 @@ impl Draws {
         limit: u32,
     ) -> [[u32; LANES]; 3] {
         let mut randoms = [0; LANES];
-        for random in randoms.iter_mut().take(number) {
-            *random = self.generator.next_u64();
+        if number == LANES {
+            // The number of turns is known when this is compiled, which makes it fast.
+            for random in &mut randoms {
+                *random = self.generator.next_u64();
+            }
+        } else {
+            for random in randoms.iter_mut().take(number) {
+                *random = self.generator.next_u64();
+            }
         }
         let mut triples = [[0; LANES]; 3];
         for (lane, random) in randoms.into_iter().enumerate() {

@@ -10,12 +10,12 @@ use crate::consensus::{Consensus, Noise, Silhouette, noise};
 use crate::draws::Draws;
 use crate::exhaustive;
 use crate::least_median::LeastMedian;
-use crate::neighbours::{Neighbour, Search};
+use crate::neighbours::{Near, Neighbour, Search};
 use crate::plane::{Fit, Plane};
 use crate::settings::{Estimator, LEAST_WINDOW, RegridSettings};
 use crate::strip::{Strip, typical};
 use crate::support::{Place, Surroundings};
-use crate::window::{Spacing, Window};
+use crate::window::{Spacing, Window, around};
 
 /// Computes grid columns; keeps its buffers from one to the next.
 #[derive(Debug, Default)]
@@ -34,10 +34,10 @@ pub(crate) struct GridWorker {
 
 impl GridWorker {
     /// Distance in x from the outermost column at which nodes may still have a value,
-    /// given the columns within reach of there, in ascending x.
-    pub(crate) fn margin_mm<'a>(
+    /// given columns in ascending x that include all within reach of there.
+    pub(crate) fn margin_mm(
         &mut self,
-        strips: impl Iterator<Item = &'a Strip>,
+        strips: &[Strip],
         x_mm: f64,
         settings: &RegridSettings,
     ) -> Option<f64> {
@@ -47,9 +47,9 @@ impl GridWorker {
 
     /// The grid column with lattice index `i`, from columns in ascending x that include all
     /// within reach. `None` when all its nodes are masked.
-    pub(crate) fn column<'a>(
+    pub(crate) fn column(
         &mut self,
-        strips: impl Iterator<Item = &'a Strip>,
+        strips: &[Strip],
         i: i64,
         settings: &RegridSettings,
     ) -> Option<GridColumn> {
@@ -65,7 +65,7 @@ impl GridWorker {
         let near_x_mm = settings.support.radius * greatest.x_mm;
         let near_y_mm = settings.support.radius * greatest.y_mm;
         let noise = match settings.estimator {
-            Estimator::Consensus => noise(window.near(NOISE_COLUMNS, x_mm), &mut self.lengths),
+            Estimator::Consensus => noise(around(window.strips, NOISE_COLUMNS, x_mm).iter(), &mut self.lengths),
             Estimator::LeastMedian | Estimator::ExhaustiveLeastMedian | Estimator::LeastSquares => {
                 None
             }
@@ -77,33 +77,26 @@ impl GridWorker {
             quality: Vec::new(),
         };
         self.before = None;
-        self.search.begin(&window);
-        self.search.advance(&window, f64::NEG_INFINITY);
+        self.search.begin(&window, x_mm);
         let first_row = |y_mm: f64| {
             let low = (y_mm - near_y_mm).max(settings.roi.y_mm.0);
             lattice.first_at_or_above(low)
         };
-        let mut next = self
-            .search
-            .next_above(&window, x_mm, near_x_mm)
-            .map(first_row);
+        let mut next = self.search.lowest(&window, near_x_mm).map(first_row);
         while let Some(j) = next {
             let y_mm = lattice.line_mm(j);
             if y_mm > settings.roi.y_mm.1 {
                 break;
             }
-            self.search.advance(&window, y_mm);
-            let above = self.search.next_above(&window, x_mm, near_x_mm);
-            let below = self.search.next_below(&window, x_mm, near_x_mm);
-            if below.is_none_or(|y| y_mm - y > near_y_mm)
-                && above.is_none_or(|y| y - y_mm > near_y_mm)
-            {
-                // Nothing near: on to where the next sample comes near, if there is one.
-                next = above.map(|y| first_row(y).max(j + 1));
-                continue;
+            match self.search.near(&window, y_mm, [near_x_mm, near_y_mm]) {
+                Near::Some => {}
+                Near::Above(y) => {
+                    next = Some(first_row(y).max(j + 1));
+                    continue;
+                }
+                Near::Nothing => break,
             }
             let node = Node {
-                x_mm,
                 y_mm,
                 i,
                 j,
@@ -124,11 +117,10 @@ impl GridWorker {
         node: Node,
         settings: &RegridSettings,
     ) -> Option<(f64, NodeQuality)> {
-        let (x_mm, y_mm) = (node.x_mm, node.y_mm);
         // Outliers take no place in a window, so that as much is known of the surface.
         let clean_share = node.noise.map_or(1.0, |noise| noise.clean_share);
         let neighbours = (settings.neighbours as f64 / clean_share).round() as usize;
-        let nearest = self.search.nearest(window, x_mm, y_mm, neighbours);
+        let nearest = self.search.nearest(window, node.y_mm, neighbours);
         if nearest.len() < LEAST_WINDOW {
             return None;
         }
@@ -136,9 +128,7 @@ impl GridWorker {
         let dense = nearest.len() == neighbours;
         let support = &settings.support;
         // Inliers are some of the samples: where those do not suffice, inliers will not.
-        let all = self
-            .surroundings
-            .place(nearest, spacing, support, |_| true, |_| false);
+        let all = self.surroundings.place_of_all(nearest, spacing, support);
         // How far outside of all samples the node lies.
         let outside = match all {
             Place::Among => 0.0,
@@ -155,15 +145,13 @@ impl GridWorker {
         if settings.estimator == Estimator::LeastSquares {
             let fit = Fit::least_squares(nearest)?;
             let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm, dense);
-            let supported = self
-                .surroundings
-                .supported(nearest, spacing, support, &agrees);
+            let supported = self.surroundings.supported(nearest, support, &agrees);
             return supported.then(|| (fit.plane.c, quality(nearest, &fit.plane, agrees)));
         }
-        self.samples.clear();
-        self.samples.extend_from_slice(nearest);
         let mut draws = Draws::new(settings.seed, node.i, node.j);
         if settings.estimator == Estimator::Consensus {
+            self.samples.clear();
+            self.samples.extend_from_slice(nearest);
             let at = At {
                 window,
                 node,
@@ -175,32 +163,38 @@ impl GridWorker {
             };
             return self.by_consensus(&at, &mut draws);
         }
-        while self.samples.len() >= LEAST_WINDOW {
+        // Samples that are left: the first of these, or, once some are taken out, of the others.
+        let (mut left, mut is_whole) = (nearest.len(), true);
+        while left >= LEAST_WINDOW {
+            let samples = if is_whole { nearest } else { &self.samples };
+            let samples = &samples[..left];
             let fit = if settings.estimator == Estimator::ExhaustiveLeastMedian {
-                exhaustive::least_median(&self.samples, &mut self.lengths)?
+                exhaustive::least_median(samples, &mut self.lengths)?
             } else {
-                self.median.fit(&self.samples, settings.draws, &mut draws)?
+                self.median.fit(samples, settings.draws, &mut draws)?
             };
             if fit.tolerance > support.inlier_ceiling * spacing.mean_mm {
                 // No surface has a majority; the nearer half may show one.
-                let half = self.samples.len() / 2;
-                self.samples.truncate(half);
+                left /= 2;
                 continue;
             }
             let agrees = fit.agrees(support.inlier_floor * spacing.mean_mm, dense);
-            if self
-                .surroundings
-                .supported(nearest, spacing, support, &agrees)
-            {
+            if self.surroundings.supported(nearest, support, &agrees) {
                 return Some((fit.plane.c, quality(nearest, &fit.plane, agrees)));
             }
             // The majority lies on another surface than the node, as at a corner in front of
             // a wall. Without it the node's own surface may be found.
-            let before = self.samples.len();
+            if is_whole {
+                self.samples.clear();
+                self.samples.extend_from_slice(&nearest[..left]);
+                is_whole = false;
+            }
+            self.samples.truncate(left);
             self.samples.retain(|n| !agrees(n));
-            if self.samples.len() == before {
+            if self.samples.len() == left {
                 return None;
             }
+            left = self.samples.len();
         }
         None
     }
@@ -215,7 +209,6 @@ const NOISE_COLUMNS: usize = 8;
 /// A node to estimate.
 #[derive(Debug, Clone, Copy)]
 struct Node {
-    x_mm: f64,
     y_mm: f64,
     i: i64,
     j: i64,
@@ -245,10 +238,16 @@ const AREA_SHARE: f64 = 0.7;
 /// The spacing around a node, from the distances in y of the window's samples to the next
 /// ones in their columns, but no less than the window's area lets expect.
 fn local_spacing(window: &Window<'_>, nearest: &[Neighbour], lengths: &mut Vec<f64>) -> Spacing {
-    lengths.clear();
+    // Without branches, for which of them are 0 is hard to foresee.
+    lengths.resize(2 * nearest.len(), 0.0);
+    let mut number = 0;
     for n in nearest {
-        lengths.extend(window.strips[n.strip].gaps(n.index));
+        for gap in window.strips[n.strip].gaps(n.index) {
+            lengths[number] = gap;
+            number += usize::from(gap > 0.0);
+        }
     }
+    lengths.truncate(number);
     let limit_mm = window.greatest_sample_spacing_mm;
     let along = typical(lengths).map_or(limit_mm, |spacing| spacing.min(limit_mm));
     let area = nearest.last().map_or(0.0, |n| PI * n.distance2);
@@ -268,19 +267,21 @@ fn append(column: &mut GridColumn, j: i64, (z_mm, quality): (f64, NodeQuality)) 
     column.quality.push(quality);
 }
 
-/// What is told of a node with this plane.
+/// What is told of a node with this plane. The window's samples come in ascending distance.
 fn quality(
     window: &[Neighbour],
     plane: &Plane,
     agrees: impl Fn(&Neighbour) -> bool,
 ) -> NodeQuality {
-    let (mut inliers, mut squares, mut nearest2) = (0_u16, 0.0, f64::INFINITY);
-    for n in window.iter().filter(|n| agrees(n)) {
+    let (mut inliers, mut squares) = (0_u16, 0.0);
+    for n in window {
         let residual = plane.residual(n);
-        inliers = inliers.saturating_add(1);
-        squares += residual * residual;
-        nearest2 = n.distance2.min(nearest2);
+        let is_inlier = agrees(n);
+        inliers = inliers.saturating_add(u16::from(is_inlier));
+        squares += if is_inlier { residual * residual } else { 0.0 };
     }
+    let nearest = window.iter().find(|n| agrees(n));
+    let nearest2 = nearest.map_or(f64::INFINITY, |n| n.distance2);
     let freedom = f64::from(inliers) - 3.0;
     NodeQuality {
         inliers,

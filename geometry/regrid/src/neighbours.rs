@@ -1,12 +1,15 @@
 //! The M samples nearest to a node.
 
+mod order;
+
 use core::cmp::Ordering;
 
 use crate::strip::Strip;
 use crate::window::Window;
+use order::Sorter;
 
 /// A sample as seen from a node.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Neighbour {
     /// Squared distance in x and y.
     pub(crate) distance2: f64,
@@ -46,228 +49,258 @@ impl Neighbour {
     }
 }
 
-/// Puts samples in their order. Whole samples are moved once only: keys are sorted, of a distance but for
-/// its last bits, and of where its sample is in their place.
-#[derive(Debug, Default)]
-struct Sorter {
-    keys: Vec<u64>,
-    sorted: Vec<Neighbour>,
+/// Squares of distances searched, as a multiple of what sufficed for the node before: more spares
+/// searches that find too few, less spares samples that are not needed.
+const ROOM: f64 = 1.2;
+/// The same after a search that found too few.
+const MORE: f64 = 1.5;
+/// All samples whose squared distance is below this share of the radius' square have been found,
+/// whatever rounding did.
+const SURE: f64 = 1.0 - 1e-9;
+
+/// A strip as seen from the nodes of a grid column.
+#[derive(Debug)]
+struct Seen {
+    /// Offset from the nodes in x.
+    dx: f64,
+    /// Its square.
+    dx2: f64,
+    /// How far in y its samples count.
+    reach_mm: f64,
+    /// The first sample at or above the last node that looked.
+    above: usize,
 }
 
-/// Last bits of a key, which say where its sample is. Those above them are in the order of the
-/// distances, since none is negative.
-const PLACE: u64 = 0x3ff;
-
-impl Sorter {
-    /// Leaves the so many nearest, in their order.
-    fn nearest(&mut self, found: &mut Vec<Neighbour>, number: usize) {
-        if found.len() > PLACE as usize {
-            found.sort_unstable_by(Neighbour::order);
-        } else {
-            let Self { keys, sorted } = self;
-            keys.clear();
-            let places = (0_u64..).zip(&*found);
-            keys.extend(places.map(|(place, own)| own.distance2.to_bits() & !PLACE | place));
-            keys.sort_unstable();
-            sorted.clear();
-            let place = |key: &u64| (key & PLACE) as usize;
-            sorted.extend(keys.iter().filter_map(|key| found.get(place(key))));
-            core::mem::swap(found, sorted);
-            // Those that differ by less than keys tell, or by their places only, follow one another.
-            for last in 1..found.len() {
-                for k in (1..=last).rev() {
-                    if found[k].order(&found[k - 1]) != Ordering::Less {
-                        break;
-                    }
-                    found.swap(k, k - 1);
-                }
-            }
+impl Seen {
+    /// Moves to a node at this y, which must not be below the one before.
+    #[inline(always)]
+    fn advance(&mut self, strip: &Strip, y_mm: f64) {
+        while strip.samples.get(self.above).is_some_and(|s| s.0 < y_mm) {
+            self.above += 1;
         }
-        found.truncate(number);
     }
+
+    /// y of the last sample below the node, and of the first at or above it.
+    fn beside(&self, strip: &Strip) -> [Option<f64>; 2] {
+        let y = |index: usize| strip.samples.get(index).map(|s| s.0);
+        [self.above.checked_sub(1).and_then(y), y(self.above)]
+    }
+}
+
+/// What samples there are near a node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Near {
+    /// Some.
+    Some,
+    /// None; the next one above is at this y.
+    Above(f64),
+    /// None, and none above.
+    Nothing,
 }
 
 /// Finds the nearest samples of one node after the other, upwards along a grid column.
 #[derive(Debug, Default)]
 pub(crate) struct Search {
-    /// In each strip of the window the first sample at or above the current node.
-    above: Vec<usize>,
+    /// The strips of the window.
+    seen: Vec<Seen>,
     found: Vec<Neighbour>,
     sorter: Sorter,
-    /// Radius to begin with: what sufficed for the node before. Only speed depends on it.
-    radius_mm: f64,
+    /// Square of the radius to begin with. Only speed depends on it.
+    radius2: f64,
 }
 
 impl Search {
     /// Begins a new grid column.
-    pub(crate) fn begin(&mut self, window: &Window<'_>) {
-        self.above.clear();
-        self.above.resize(window.strips.len(), 0);
-        self.radius_mm = 2.0 * window.column_spacing_mm;
-    }
-
-    /// Moves to a node at this y, which must not be below the one before.
-    pub(crate) fn advance(&mut self, window: &Window<'_>, y_mm: f64) {
-        for (above, strip) in self.above.iter_mut().zip(&window.strips) {
-            while strip.samples.get(*above).is_some_and(|s| s.0 < y_mm) {
-                *above += 1;
-            }
-        }
-    }
-
-    /// y of the first sample at or above the current node in any strip as near in x.
-    pub(crate) fn next_above(&self, window: &Window<'_>, x_mm: f64, within_mm: f64) -> Option<f64> {
-        self.near(window, x_mm, within_mm)
-            .filter_map(|(strip, above)| strip.samples.get(above))
-            .map(|s| s.0)
-            .min_by(f64::total_cmp)
-    }
-
-    /// y of the last sample below the current node in any strip as near in x.
-    pub(crate) fn next_below(&self, window: &Window<'_>, x_mm: f64, within_mm: f64) -> Option<f64> {
-        self.near(window, x_mm, within_mm)
-            .filter_map(|(strip, above)| strip.samples.get(above.checked_sub(1)?))
-            .map(|s| s.0)
-            .max_by(f64::total_cmp)
-    }
-
-    fn near<'w>(
-        &'w self,
-        window: &'w Window<'_>,
-        x_mm: f64,
-        within_mm: f64,
-    ) -> impl Iterator<Item = (&'w Strip, usize)> {
-        window
-            .strips
-            .iter()
-            .zip(&self.above)
-            .filter(move |(strip, _)| (strip.x_mm - x_mm).abs() <= within_mm)
-            .map(|(strip, above)| (*strip, *above))
-    }
-
-    /// The `number` nearest samples in their order, or as many as the window holds; at
-    /// most half of `number` from one strip.
-    pub(crate) fn nearest(
-        &mut self,
-        window: &Window<'_>,
-        x_mm: f64,
-        y_mm: f64,
-        number: usize,
-    ) -> &[Neighbour] {
+    pub(crate) fn begin(&mut self, window: &Window<'_>, x_mm: f64) {
         let reach_x_mm = window
             .strips
             .iter()
             .map(|s| (s.x_mm - x_mm).abs())
             .fold(0.0, f64::max);
         let reach_mm = (reach_x_mm * reach_x_mm + window.reach_y_mm * window.reach_y_mm).sqrt();
-        let mut radius_mm = self.radius_mm.min(reach_mm);
-        loop {
-            self.gather(window, x_mm, y_mm, radius_mm, number.div_ceil(2));
-            if self.found.len() >= number || radius_mm >= reach_mm {
-                break;
+        self.seen.clear();
+        self.seen.extend(window.strips.iter().map(|strip| {
+            let dx = strip.x_mm - x_mm;
+            Seen {
+                dx,
+                dx2: dx * dx,
+                reach_mm: height(reach_mm * reach_mm, dx * dx).min(window.reach_y_mm),
+                above: 0,
             }
-            radius_mm = (1.5 * radius_mm).min(reach_mm);
-        }
-        let is_full = self.found.len() > number;
-        self.sorter.nearest(&mut self.found, number);
-        if is_full {
-            // A little more than sufficed here usually suffices for the next node.
-            let farthest2 = self.found.last().map_or(0.0, |n| n.distance2);
-            self.radius_mm = 1.1 * farthest2.sqrt();
-        } else {
-            self.radius_mm = radius_mm;
-        }
-        &self.found
+        }));
+        self.radius2 = 4.0 * window.column_spacing_mm * window.column_spacing_mm;
     }
 
-    /// The same for a window that is wider than that of the nodes to come.
-    pub(crate) fn wider(
+    /// y of the lowest sample in any strip as near in x.
+    pub(crate) fn lowest(&self, window: &Window<'_>, within_mm: f64) -> Option<f64> {
+        self.seen
+            .iter()
+            .zip(window.strips)
+            .filter(|(seen, _)| seen.dx.abs() <= within_mm)
+            .filter_map(|(_, strip)| strip.samples.first().map(|s| s.0))
+            .min_by(f64::total_cmp)
+    }
+
+    /// Whether there are samples as near to a node in x and in y. Its y must not be below that of
+    /// the one before.
+    pub(crate) fn near(
         &mut self,
         window: &Window<'_>,
-        x_mm: f64,
+        y_mm: f64,
+        [within_x_mm, within_y_mm]: [f64; 2],
+    ) -> Near {
+        let mut next: Option<f64> = None;
+        for (seen, strip) in self.seen.iter_mut().zip(window.strips) {
+            if seen.dx.abs() > within_x_mm {
+                continue;
+            }
+            seen.advance(strip, y_mm);
+            let [below, above] = seen.beside(strip);
+            if below.is_some_and(|y| y_mm - y <= within_y_mm)
+                || above.is_some_and(|y| y - y_mm <= within_y_mm)
+            {
+                return Near::Some;
+            }
+            next = match (next, above) {
+                (Some(next), Some(above)) => Some(next.min(above)),
+                (next, above) => next.or(above),
+            };
+        }
+        next.map_or(Near::Nothing, Near::Above)
+    }
+
+    /// The `number` nearest samples in their order, or as many as the window holds; at
+    /// most half of `number` from one strip. y must not be below that of the node before.
+    pub(crate) fn nearest(
+        &mut self,
+        window: &Window<'_>,
         y_mm: f64,
         number: usize,
     ) -> &[Neighbour] {
-        let radius_mm = self.radius_mm;
-        self.radius_mm = 2.0 * radius_mm;
-        self.nearest(window, x_mm, y_mm, number);
-        self.radius_mm = radius_mm;
-        &self.found
+        let mut radius2 = self.radius2;
+        loop {
+            let is_whole = self.gather(window, y_mm, radius2, number.div_ceil(2));
+            if is_whole || self.found.len() >= number {
+                let nearest = self.sorter.nearest(&self.found, number);
+                let farthest = nearest.get(number - 1).map(|n| n.distance2);
+                let is_sure = farthest.is_some_and(|farthest2| farthest2 <= SURE * radius2);
+                if is_whole || is_sure {
+                    self.radius2 = farthest.map_or(radius2, |farthest2| ROOM * farthest2);
+                    break;
+                }
+            }
+            radius2 *= MORE;
+        }
+        self.sorter.sorted(number)
     }
 
-    /// All samples within the radius and the window's reach in y, but of each strip no
-    /// more than the `limit` nearest.
-    fn gather(&mut self, window: &Window<'_>, x_mm: f64, y_mm: f64, radius_mm: f64, limit: usize) {
+    /// The same for a window that is wider than that of the nodes to come.
+    pub(crate) fn wider(&mut self, window: &Window<'_>, y_mm: f64, number: usize) -> &[Neighbour] {
+        let radius2 = self.radius2;
+        self.radius2 = 4.0 * radius2;
+        self.nearest(window, y_mm, number);
+        self.radius2 = radius2;
+        self.sorter.sorted(number)
+    }
+
+    /// Finds all samples within the radius and the window's reach, but of each strip no more than
+    /// the `limit` nearest. Whether that is all of the window's.
+    fn gather(&mut self, window: &Window<'_>, y_mm: f64, radius2: f64, limit: usize) -> bool {
         self.found.clear();
-        for (strip_index, (strip, &above)) in window.strips.iter().zip(&self.above).enumerate() {
-            let dx = strip.x_mm - x_mm;
-            let height2 = radius_mm * radius_mm - dx * dx;
-            if height2 < 0.0 {
-                continue;
-            }
-            let height = height2.sqrt().min(window.reach_y_mm);
-            let offset = |index: usize| strip.samples.get(index).map(|s| s.0 - y_mm);
-            let (mut low, mut high) = (above, above);
-            for _ in 0..limit {
-                let down = low
-                    .checked_sub(1)
-                    .and_then(offset)
-                    .filter(|dy| -dy <= height);
-                let up = offset(high).filter(|dy| *dy <= height);
-                let (index, dy) = match (down, up) {
-                    (Some(down), Some(up)) if up < -down => {
-                        high += 1;
-                        (high - 1, up)
-                    }
-                    (Some(down), _) => {
-                        low -= 1;
-                        (low, down)
-                    }
-                    (None, Some(up)) => {
-                        high += 1;
-                        (high - 1, up)
-                    }
-                    (None, None) => break,
-                };
-                self.found.push(Neighbour {
-                    distance2: dx * dx + dy * dy,
-                    dx,
-                    dy,
-                    z: strip.samples[index].1,
-                    strip: strip_index,
+        let mut is_whole = true;
+        for (index, (seen, strip)) in self.seen.iter_mut().zip(window.strips).enumerate() {
+            let height_mm = height(radius2, seen.dx2);
+            is_whole &= height_mm >= seen.reach_mm;
+            if height_mm >= 0.0 {
+                seen.advance(strip, y_mm);
+                let around = Around {
+                    seen,
+                    strip,
                     index,
-                });
+                    y_mm,
+                    height_mm: height_mm.min(seen.reach_mm),
+                };
+                around.gather(limit, &mut self.found);
             }
+        }
+        is_whole
+    }
+}
+
+/// Half of the length that a circle cuts from a line; less than nothing if it does not.
+#[inline(always)]
+fn height(radius2: f64, distance2: f64) -> f64 {
+    let height2 = radius2 - distance2;
+    if height2 < 0.0 { -1.0 } else { height2.sqrt() }
+}
+
+/// A strip around a node.
+struct Around<'a> {
+    seen: &'a Seen,
+    strip: &'a Strip,
+    /// Index of the strip.
+    index: usize,
+    y_mm: f64,
+    height_mm: f64,
+}
+
+impl Around<'_> {
+    /// Adds its samples within the height, those below the node downwards, then the others
+    /// upwards, but no more than the `limit` nearest.
+    #[inline(always)]
+    fn gather(&self, limit: usize, found: &mut Vec<Neighbour>) {
+        let samples = self.strip.samples.as_slice();
+        let (below, above) = samples.split_at(self.seen.above);
+        let start = found.len();
+        let from = below.len().saturating_sub(limit);
+        for (index, sample) in (from..below.len()).zip(&below[from..]).rev() {
+            let own = self.neighbour(index, *sample);
+            if -own.dy > self.height_mm {
+                break;
+            }
+            found.push(own);
+        }
+        let middle = found.len();
+        for (index, sample) in (self.seen.above..).zip(above).take(limit) {
+            let own = self.neighbour(index, *sample);
+            if own.dy > self.height_mm {
+                break;
+            }
+            found.push(own);
+        }
+        if found.len() - start > limit {
+            cut(found, start, middle, limit);
+        }
+    }
+
+    #[inline(always)]
+    fn neighbour(&self, index: usize, (y_mm, z): (f64, f64)) -> Neighbour {
+        let dy = y_mm - self.y_mm;
+        Neighbour {
+            distance2: self.seen.dx2 + dy * dy,
+            dx: self.seen.dx,
+            dy,
+            z,
+            strip: self.index,
+            index,
         }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_nearest_are_those_of_the_whole_order_with_ties_at_the_end_and_within() {
-        let mut sorter = Sorter::default();
-        for spread in [3_i32, 7, 50] {
-            // Distances on a grid, of which many are alike.
-            let all: Vec<Neighbour> = (0..90)
-                .map(|k| {
-                    let [dx, dy] = [k * 37 % spread, k * 53 % (2 * spread)].map(f64::from);
-                    Neighbour::at(dx - 1.0, dy - 2.0, f64::from(k * 29 % 11))
-                })
-                .collect();
-            for number in [1, 5, 16, 60, 89, 90, 200] {
-                let mut plain = all.clone();
-                plain.sort_by(Neighbour::order);
-                plain.truncate(number);
-                let mut found = all.clone();
-                sorter.nearest(&mut found, number);
-                let told = |all: &[Neighbour]| -> Vec<[f64; 3]> {
-                    all.iter().map(|n| [n.dx, n.dy, n.z]).collect()
-                };
-                assert_eq!(told(&found), told(&plain), "{spread} {number}");
-            }
+/// Leaves the `limit` nearest of a strip: of those below the node from `start` on, and of those
+/// above it from `middle` on, in either case the nearest first. Of two as near the one above goes.
+#[cold]
+fn cut(found: &mut Vec<Neighbour>, start: usize, middle: usize, limit: usize) {
+    let (mut below, mut above) = (middle - start, found.len() - middle);
+    while below + above > limit {
+        let up = above.checked_sub(1).and_then(|k| found.get(middle + k));
+        let down = below.checked_sub(1).and_then(|k| found.get(start + k));
+        match (down, up) {
+            (Some(down), Some(up)) if up.dy < -down.dy => below -= 1,
+            (Some(_), None) => below -= 1,
+            _ => above -= 1,
         }
     }
+    found.truncate(middle + above);
+    found.drain(start + below..middle);
 }

@@ -61,8 +61,10 @@ impl Travel {
 pub struct Regridder {
     settings: RegridSettings,
     worker: GridWorker,
-    /// The columns that nodes to come may need, in order of arrival.
+    /// The columns that nodes to come may need, in ascending x.
     strips: VecDeque<Strip>,
+    /// Buffers of columns let go of, for those to come.
+    spare: Vec<Vec<(f64, f64)>>,
     travel: Option<Travel>,
     /// Columns handed over so far.
     taken: usize,
@@ -81,6 +83,7 @@ impl Regridder {
             settings,
             worker: GridWorker::default(),
             strips: VecDeque::new(),
+            spare: Vec::new(),
             travel: None,
             taken: 0,
             next: None,
@@ -97,12 +100,16 @@ impl Regridder {
     /// Columns must come in strictly ascending or strictly descending x, with coordinates
     /// within 25 m. After an error the regridder is as it was before the call.
     pub fn push(&mut self, column: Column) -> Result<Vec<GridColumn>, RegridError> {
-        let strip = Strip::new(&column, &self.settings, self.taken)?;
-        if let Some(previous) = self.strips.back() {
-            let travel = Travel::check(self.travel, previous.x_mm, strip.x_mm, self.taken)?;
+        let buffer = self.spare.pop().unwrap_or_default();
+        let strip = Strip::new(&column, &self.settings, self.taken, buffer)?;
+        if let Some(previous) = self.newest_mm() {
+            let travel = Travel::check(self.travel, previous, strip.x_mm, self.taken)?;
             self.travel = Some(travel);
         }
-        self.strips.push_back(strip);
+        match self.travel {
+            Some(Travel::Descending) => self.strips.push_front(strip),
+            Some(Travel::Ascending) | None => self.strips.push_back(strip),
+        }
         self.taken += 1;
         Ok(self.advance(false))
     }
@@ -142,7 +149,7 @@ impl Regridder {
         let lattice = Lattice {
             pitch_mm: self.settings.pitch_mm,
         };
-        let Some(newest) = self.strips.back().map(|s| s.x_mm) else {
+        let Some(newest) = self.newest_mm() else {
             return finished;
         };
         let mut next = match self.next {
@@ -153,74 +160,75 @@ impl Regridder {
                 if self.strips.len() <= reach && !all {
                     return finished;
                 }
-                let first = self.strips.front().map_or(newest, |s| s.x_mm);
-                let margin = self.margin_mm(travel, first);
+                let first = self.oldest_mm(travel).unwrap_or(newest);
+                let margin = self.margin_mm(first);
                 let start = lattice.first_at_or_above(along(first) - margin);
                 self.next = Some(start);
                 start
             }
         };
         let last = if all {
-            let margin = self.margin_mm(travel, newest);
+            let margin = self.margin_mm(newest);
             lattice.last_at_or_below(along(newest) + margin)
         } else {
             i64::MAX
         };
         while next <= last {
             let x_along = lattice.line_mm(next);
-            let beyond = self
-                .strips
-                .iter()
-                .rev()
-                .take_while(|s| along(s.x_mm) > x_along)
-                .count();
-            if beyond < reach && !all {
+            let is_beyond = |s: &&Strip| along(s.x_mm) > x_along;
+            if self.strips.iter().filter(is_beyond).count() < reach && !all {
                 break;
             }
             let i = match travel {
                 Travel::Ascending => next,
                 Travel::Descending => -next,
             };
-            finished.extend(self.column(travel, i));
+            let strips = self.strips.make_contiguous();
+            finished.extend(self.worker.column(strips, i, &self.settings));
             next += 1;
             self.next = Some(next);
         }
-        self.release(along, lattice.line_mm(next));
+        let passed = |s: &&Strip| along(s.x_mm) < lattice.line_mm(next);
+        let passed = self.strips.iter().filter(passed).count();
+        self.release(travel, passed);
         finished
     }
 
-    /// Lets go of columns out of the reach of all nodes from this position on.
-    fn release(&mut self, along: impl Fn(f64) -> f64, x_along: f64) {
-        let before = self
-            .strips
-            .iter()
-            .take_while(|s| along(s.x_mm) < x_along)
-            .count();
+    /// Lets go of columns out of the reach of all nodes to come, which have passed so many.
+    fn release(&mut self, travel: Travel, passed: usize) {
         // One more than the reach, so that the newest column never goes without those
         // within its reach: should it be the last, they tell how far the grid goes.
-        let surplus = before.saturating_sub(self.settings.reach_columns + 1);
-        self.strips.drain(..surplus);
-    }
-
-    fn margin_mm(&mut self, travel: Travel, x_mm: f64) -> f64 {
-        let margin = match travel {
-            Travel::Ascending => self
-                .worker
-                .margin_mm(self.strips.iter(), x_mm, &self.settings),
-            Travel::Descending => {
-                self.worker
-                    .margin_mm(self.strips.iter().rev(), x_mm, &self.settings)
-            }
-        };
-        margin.unwrap_or(0.0)
-    }
-
-    fn column(&mut self, travel: Travel, i: i64) -> Option<GridColumn> {
-        match travel {
-            Travel::Ascending => self.worker.column(self.strips.iter(), i, &self.settings),
-            Travel::Descending => self
-                .worker
-                .column(self.strips.iter().rev(), i, &self.settings),
+        let surplus = passed.saturating_sub(self.settings.reach_columns + 1);
+        for _ in 0..surplus {
+            let oldest = match travel {
+                Travel::Ascending => self.strips.pop_front(),
+                Travel::Descending => self.strips.pop_back(),
+            };
+            self.spare.extend(oldest.map(|strip| strip.samples));
         }
+    }
+
+    /// x of the column that came last.
+    fn newest_mm(&self) -> Option<f64> {
+        let newest = match self.travel {
+            Some(Travel::Descending) => self.strips.front(),
+            Some(Travel::Ascending) | None => self.strips.back(),
+        };
+        newest.map(|s| s.x_mm)
+    }
+
+    /// x of the column that has been kept the longest.
+    fn oldest_mm(&self, travel: Travel) -> Option<f64> {
+        let oldest = match travel {
+            Travel::Ascending => self.strips.front(),
+            Travel::Descending => self.strips.back(),
+        };
+        oldest.map(|s| s.x_mm)
+    }
+
+    fn margin_mm(&mut self, x_mm: f64) -> f64 {
+        let strips = self.strips.make_contiguous();
+        let margin = self.worker.margin_mm(strips, x_mm, &self.settings);
+        margin.unwrap_or(0.0)
     }
 }

@@ -7,20 +7,52 @@ use crate::window::Spacing;
 /// Samples near a node, in units of the local spacing.
 #[derive(Debug, Default)]
 pub(crate) struct Surroundings {
+    /// Those last looked at, with their places in the window.
+    near: Vec<(usize, (f64, f64))>,
     points: Vec<(f64, f64)>,
     others: Vec<(f64, f64)>,
 }
 
+/// More than rounding adds to a square.
+const UP: f64 = 1.0 + 1e-9;
+
 impl Surroundings {
-    /// Whether the samples near the node support a value there. `agrees` tells inliers.
-    pub(crate) fn supported(
+    /// Where the node lies among the samples near it, whatever they agree on. The window's samples
+    /// come in ascending distance.
+    pub(crate) fn place_of_all(
         &mut self,
         window: &[Neighbour],
         spacing: Spacing,
         settings: &SupportSettings,
+    ) -> Place {
+        self.place(window, spacing, settings, |_| true, |_| false)
+    }
+
+    /// Looks at the samples near the node.
+    fn look(&mut self, window: &[Neighbour], spacing: Spacing, settings: &SupportSettings) {
+        let radius2 = settings.radius * settings.radius;
+        let greatest_mm = spacing.x_mm.max(spacing.y_mm);
+        let within2 = UP * radius2 * greatest_mm * greatest_mm;
+        self.near.clear();
+        for (place, neighbour) in window.iter().enumerate() {
+            if neighbour.distance2 > within2 {
+                break;
+            }
+            let (u, v) = (neighbour.dx / spacing.x_mm, neighbour.dy / spacing.y_mm);
+            if u * u + v * v <= radius2 {
+                self.near.push((place, (u, v)));
+            }
+        }
+    }
+
+    /// Whether the samples last looked at support a value at the node. `agrees` tells inliers.
+    pub(crate) fn supported(
+        &mut self,
+        window: &[Neighbour],
+        settings: &SupportSettings,
         agrees: impl Fn(&Neighbour) -> bool,
     ) -> bool {
-        match self.place(window, spacing, settings, agrees, |_| true) {
+        match self.among(window, settings, agrees, |_| true) {
             Place::Among => true,
             Place::Beside { distance } => distance <= settings.margin,
             Place::Alone => false,
@@ -37,16 +69,26 @@ impl Surroundings {
         agrees: impl Fn(&Neighbour) -> bool,
         closes: impl Fn(&Neighbour) -> bool,
     ) -> Place {
+        self.look(window, spacing, settings);
+        self.among(window, settings, agrees, closes)
+    }
+
+    /// The same among the samples last looked at.
+    fn among(
+        &mut self,
+        window: &[Neighbour],
+        settings: &SupportSettings,
+        agrees: impl Fn(&Neighbour) -> bool,
+        closes: impl Fn(&Neighbour) -> bool,
+    ) -> Place {
         self.points.clear();
         self.others.clear();
-        for neighbour in window {
-            let (u, v) = (neighbour.dx / spacing.x_mm, neighbour.dy / spacing.y_mm);
-            if u * u + v * v <= settings.radius * settings.radius {
-                if agrees(neighbour) {
-                    self.points.push((u, v));
-                } else if closes(neighbour) {
-                    self.others.push((u, v));
-                }
+        for (place, point) in &self.near {
+            let neighbour = &window[*place];
+            if agrees(neighbour) {
+                self.points.push(*point);
+            } else if closes(neighbour) {
+                self.others.push(*point);
             }
         }
         if self.points.len() < settings.least_samples {

@@ -18,7 +18,7 @@ const WIDENING_LIMIT: f64 = 2.0;
 pub(crate) struct Window<'a> {
     /// In ascending x: up to `reach_columns` on each side of the grid column, and one at
     /// its very x.
-    pub(crate) strips: Vec<&'a Strip>,
+    pub(crate) strips: &'a [Strip],
     /// Typical distance of neighbouring columns, millimetres.
     pub(crate) column_spacing_mm: f64,
     /// Greatest local sample spacing believed, millimetres.
@@ -32,24 +32,19 @@ impl<'a> Window<'a> {
     /// ascending x. `None` where no plane could be found: fewer than two columns, or no
     /// two samples in any of them.
     pub(crate) fn new(
-        strips: impl Iterator<Item = &'a Strip>,
+        strips: &'a [Strip],
         x_mm: f64,
         settings: &RegridSettings,
         scratch: &mut Vec<f64>,
     ) -> Option<Self> {
-        let mut strips: Vec<&Strip> = strips.collect();
-        let left = strips.partition_point(|s| s.x_mm < x_mm);
-        let right = strips.partition_point(|s| s.x_mm <= x_mm);
-        strips.truncate(right.saturating_add(settings.reach_columns));
-        strips.drain(..left.saturating_sub(settings.reach_columns));
-
+        let strips = around(strips, settings.reach_columns, x_mm);
         scratch.clear();
         scratch.extend(strips.windows(2).map(|pair| pair[1].x_mm - pair[0].x_mm));
         // In an order that a mirrored scan shares, so that the sum is the same.
         scratch.sort_unstable_by(f64::total_cmp);
         let column_spacing_mm = typical(scratch)?;
         scratch.clear();
-        for strip in &strips {
+        for strip in strips {
             let heights = strip.samples.windows(2).map(|pair| pair[1].0 - pair[0].0);
             scratch.extend(heights.filter(|gap| *gap > 0.0));
         }
@@ -65,15 +60,6 @@ impl<'a> Window<'a> {
             greatest_sample_spacing_mm: (SPACING_LIMIT * sample_spacing_mm).min(limit_mm),
             reach_y_mm: settings.reach_columns as f64 * column_spacing_mm.max(sample_spacing_mm),
         })
-    }
-
-    /// The strips nearest to this x, up to so many on either side.
-    pub(crate) fn near(&self, number: usize, x_mm: f64) -> impl Iterator<Item = &'a Strip> {
-        let left = self.strips.partition_point(|s| s.x_mm < x_mm);
-        let right = self.strips.partition_point(|s| s.x_mm <= x_mm);
-        let first = left.saturating_sub(number);
-        let end = right.saturating_add(number);
-        self.strips.iter().take(end).skip(first).copied()
     }
 
     /// The unit of support lengths in x and y where samples are this far apart in a column.
@@ -103,6 +89,15 @@ impl<'a> Window<'a> {
             y_mm: spacing.y_mm.max(mean_mm),
         }
     }
+}
+
+/// The strips nearest to this x, up to so many on either side and one at that very x, of strips in
+/// ascending x.
+pub(crate) fn around(strips: &[Strip], number: usize, x_mm: f64) -> &[Strip] {
+    let left = strips.partition_point(|s| s.x_mm < x_mm);
+    let right = strips.partition_point(|s| s.x_mm <= x_mm);
+    let end = right.saturating_add(number).min(strips.len());
+    &strips[left.saturating_sub(number)..end]
 }
 
 /// Local spacing of samples, millimetres.

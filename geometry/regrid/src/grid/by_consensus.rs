@@ -43,7 +43,7 @@ impl GridWorker {
             self.consensus
                 .surfaces(&self.samples, &conditions, draws, |wide, windows| {
                     let number = windows * at.neighbours;
-                    let wider = self.search.wider(at.window, node.x_mm, node.y_mm, number);
+                    let wider = self.search.wider(at.window, node.y_mm, number);
                     wide.extend_from_slice(wider);
                 });
         self.before = surfaces.first().map(|surface| (node.j, surface.plane));
@@ -91,7 +91,7 @@ impl GridWorker {
             let mut side = || {
                 self.silhouette.side(&around, surface, |wide, windows| {
                     let number = windows * at.neighbours;
-                    let wider = self.search.wider(at.window, node.x_mm, node.y_mm, number);
+                    let wider = self.search.wider(at.window, node.y_mm, number);
                     wide.extend_from_slice(wider);
                 })
             };

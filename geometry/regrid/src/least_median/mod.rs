@@ -1,27 +1,30 @@
 //! The plane of the least median of squared residuals (equation 2), by planes side by side.
 //!
-//! Planes are drawn and solved in lanes. A pass in single precision counts for many of them how
-//! many samples lie farther off than the best median known, less what rounding may do: whatever
-//! it throws out is not the best. Only what is left is looked at in double precision, the
-//! likeliest first, whose median then throws out nearly all others. The limit of the first pass
-//! is guessed from the node before; where the guess throws out everything, it is raised.
+//! Planes are drawn and solved in lanes, in single precision, with a bound of what rounding may
+//! do. A pass over many of them counts how many samples may be nearer than the best median known:
+//! where those are too few, the plane is not the best. Only what is left is solved and looked at
+//! in double precision, the likeliest first, whose median then throws out nearly all others. The
+//! limit of the first pass is guessed from the node before; where the guess was too low, there is
+//! another pass.
 //!
 //! The answer is that of trying each plane in double precision in the order of the draws, bit
 //! for bit: the guesses, the number of lanes and the instructions of the processor decide the
 //! time alone.
 
+mod lanes;
 mod median;
 mod planes;
 mod rough;
 mod sift;
 mod window;
 
-use pulp::{Arch, Simd, WithSimd};
-
 use crate::draws::Draws;
 use crate::neighbours::Neighbour;
-use crate::plane::{Fit, Plane, tolerance};
-use planes::Planes;
+use crate::plane::{Fit, LEAST_SINE, Plane, tolerance};
+use lanes::{Lanes, WithLanes};
+use median::{Known, median};
+use planes::{DRAWN, Planes};
+use rough::Bounds;
 use window::Window;
 
 pub use window::GREATEST_WINDOW;
@@ -29,10 +32,10 @@ pub use window::GREATEST_WINDOW;
 /// Collinear triples are drawn again, up to this many draws for each plane wanted.
 const DRAWS_PER_PLANE: usize = 8;
 /// The limit for a node is guessed as this many times the least median of squares of the node
-/// before: more spares passes whose guess was too low, less throws out more.
-const HINT: f64 = 3.0;
-/// A guess that was too low is raised by this factor, and then given up.
-const RAISE: f64 = 16.0;
+/// before: more spares passes after a guess that was too low, less throws out more.
+const HINT: f64 = 2.0;
+/// Fewer planes than this are tried one by one.
+const FEW: usize = 4;
 
 /// Finds planes; keeps its buffers from window to window.
 #[derive(Debug, Default)]
@@ -68,8 +71,8 @@ impl LeastMedian {
         planes: usize,
         seed: u64,
     ) -> Option<([f64; 3], f64)> {
-        self.window.fill(samples.iter().copied())?;
-        let (plane, median) = find(self, planes, &mut Draws::new(seed, 0, 0))?;
+        let samples = samples.iter().copied();
+        let (plane, median) = find(self, samples, planes, &mut Draws::new(seed, 0, 0))?;
         Some(([plane.a, plane.b, plane.c], median))
     }
 
@@ -80,8 +83,8 @@ impl LeastMedian {
         planes: usize,
         draws: &mut Draws,
     ) -> Option<Fit> {
-        self.window.fill(window.iter().map(|n| [n.dx, n.dy, n.z]))?;
-        let (plane, median) = find(self, planes, draws)?;
+        let samples = window.iter().map(|n| [n.dx, n.dy, n.z]);
+        let (plane, median) = find(self, samples, planes, draws)?;
         Some(Fit {
             plane,
             tolerance: tolerance(median, window.len()),
@@ -90,65 +93,127 @@ impl LeastMedian {
 }
 
 /// With the widest lanes of this processor.
-fn find(finder: &mut LeastMedian, wanted: usize, draws: &mut Draws) -> Option<(Plane, f64)> {
-    Arch::new().dispatch(Find {
+fn find(
+    finder: &mut LeastMedian,
+    samples: impl ExactSizeIterator<Item = [f64; 3]>,
+    wanted: usize,
+    draws: &mut Draws,
+) -> Option<(Plane, f64)> {
+    lanes::dispatch(Find {
         finder,
+        samples,
         wanted,
         draws,
     })
 }
 
 /// The search for one window.
-struct Find<'a> {
+struct Find<'a, I> {
     finder: &'a mut LeastMedian,
+    /// (x, y, z) in the order in which they are numbered.
+    samples: I,
     /// Planes to try.
     wanted: usize,
     draws: &'a mut Draws,
 }
 
-impl WithSimd for Find<'_> {
+impl<I: ExactSizeIterator<Item = [f64; 3]>> WithLanes for Find<'_, I> {
     type Output = Option<(Plane, f64)>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let Self {
-            finder,
-            wanted,
-            draws,
-        } = self;
+    fn with_lanes<L: Lanes>(self, lanes: L) -> Self::Output {
         let LeastMedian {
             window,
             planes,
             hint,
-        } = finder;
-        let extent = window.lay_out(simd);
-        let (mut tried, mut left) = (0, wanted.saturating_mul(DRAWS_PER_PLANE));
-        let mut best: Option<Plane> = None;
-        let mut least = hint.unwrap_or(f64::INFINITY);
-        while tried < wanted && left > 0 {
-            planes.clear();
-            while !planes.is_full() && tried < wanted && left > 0 {
-                let drawn = planes.room().min(wanted - tried).min(left);
-                tried += planes.draw(simd, window, drawn, draws);
-                left -= drawn;
+        } = self.finder;
+        let extent = window.fill(lanes, self.samples)?;
+        let mut search = Search {
+            window,
+            draws: self.draws,
+            wanted: self.wanted,
+            left: self.wanted.saturating_mul(DRAWS_PER_PLANE),
+            best: None,
+            least: hint.unwrap_or(f64::INFINITY),
+        };
+        if extent.is_moderate() {
+            let bounds = Bounds::new(&extent);
+            while search.missing() >= FEW {
+                search.try_many(lanes, planes, &bounds);
             }
-            if planes.is_empty() {
-                continue;
-            }
-            planes.roughen(&extent);
-            let mut found = sift::best(simd, window, planes, &mut least);
-            // Should the guess have thrown out everything, it is raised, and then given up.
-            for raised in [RAISE * least, f64::INFINITY] {
-                if found.is_none() && best.is_none() {
-                    least = raised;
-                    found = sift::best(simd, window, planes, &mut least);
-                }
-            }
-            best = found.or(best);
         }
+        while search.missing() > 0 {
+            lanes::with(lanes, TryOne(&mut search));
+        }
+        let Search { best, least, .. } = search;
         // Nothing is below 0, which coarse depths often leave.
         *hint = best.map(|_| HINT * least).filter(|limit| *limit > 0.0);
         Some((best?, least))
+    }
+}
+
+/// [`Search::try_one`], which is not often called, apart from what is.
+struct TryOne<'a, 'b>(&'a mut Search<'b>);
+
+impl WithLanes for TryOne<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_lanes<L: Lanes>(self, lanes: L) {
+        self.0.try_one(lanes);
+    }
+}
+
+/// How far the search has come.
+struct Search<'a> {
+    window: &'a mut Window,
+    draws: &'a mut Draws,
+    /// Planes still to be tried.
+    wanted: usize,
+    /// Draws that are left for them.
+    left: usize,
+    best: Option<Plane>,
+    /// The median of the best, or a guess while there is none.
+    least: f64,
+}
+
+impl Search<'_> {
+    /// So many triples can be drawn without one too many.
+    fn missing(&self) -> usize {
+        self.wanted.min(self.left)
+    }
+
+    /// Tries as many planes as are looked at together.
+    #[inline(always)]
+    fn try_many<L: Lanes>(&mut self, lanes: L, planes: &mut Planes, bounds: &Bounds) {
+        planes.clear();
+        while !planes.is_full() && self.missing() >= FEW {
+            let number = self.missing().min(DRAWN);
+            self.left -= number;
+            self.wanted -= planes.draw(lanes, self.window, bounds, number, self.draws);
+        }
+        let is_guess = self.best.is_none();
+        let found = sift::best(lanes, self.window, planes, &mut self.least, is_guess);
+        self.best = found.or(self.best);
+    }
+
+    /// Tries the plane through one triple, in double precision alone.
+    #[inline(always)]
+    fn try_one<L: Lanes>(&mut self, lanes: L) {
+        self.left -= 1;
+        let triple = self.draws.triple(self.window.len());
+        let [p, q, r] = triple.map(|k| self.window.sample(k as u32));
+        let Some(plane) = Plane::through_points(p, q, r, LEAST_SINE) else {
+            return;
+        };
+        self.wanted -= 1;
+        let known = match self.best {
+            None => Known::Guess(self.least),
+            Some(_) => Known::Limit(self.least),
+        };
+        if let Some(median) = median(lanes, self.window, &plane, known) {
+            (self.best, self.least) = (Some(plane), median);
+        }
     }
 }
 

@@ -1,36 +1,41 @@
-//! Planes through triples of samples, solved side by side.
+//! Planes through triples of samples, solved side by side in single precision.
 
-use pulp::Simd;
-
-use super::rough::RoughPlanes;
-use super::window::{Extent, Window};
+use super::lanes::Lanes;
+use super::rough::{Bounds, level, solve};
+use super::window::{UP, Window};
 use crate::draws::Draws;
 use crate::plane::{LEAST_SINE, Plane};
 
-/// Planes solved side by side.
-const LANES: usize = 8;
-/// Planes held at a time.
+/// Triples drawn side by side.
+pub(super) const DRAWN: usize = 16;
+/// Triples held at a time.
 pub(super) const MOST: usize = 64;
-/// Fewer planes than this are solved one by one.
-const FEW: usize = 4;
+/// Vectors of planes counted side by side, for as many samples to be had by one read.
+const SIDE_BY_SIDE: usize = 2;
 
-/// Planes in the order of the draws.
+/// Triples in the order of the draws, and the planes through them.
 #[derive(Debug)]
 pub(super) struct Planes {
-    pub(super) a: [f64; MOST],
-    pub(super) b: [f64; MOST],
-    pub(super) c: [f64; MOST],
-    pub(super) rough: RoughPlanes,
+    /// Of each corner, which sample it is.
+    triples: [[u32; MOST]; 3],
+    a: [f32; MOST],
+    b: [f32; MOST],
+    c: [f32; MOST],
+    /// How much a residual may differ from the one in double precision. Without end below 0 where
+    /// there is no plane, above where it has to be looked at in double precision.
+    slack: [f32; MOST],
+    /// A multiple of [`DRAWN`].
     len: usize,
 }
 
 impl Default for Planes {
     fn default() -> Self {
         Self {
+            triples: [[0; MOST]; 3],
             a: [0.0; MOST],
             b: [0.0; MOST],
             c: [0.0; MOST],
-            rough: RoughPlanes::default(),
+            slack: [0.0; MOST],
             len: 0,
         }
     }
@@ -41,146 +46,207 @@ impl Planes {
         self.len = 0;
     }
 
-    pub(super) fn len(&self) -> usize {
-        self.len
-    }
-
-    pub(super) fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-
     pub(super) fn is_full(&self) -> bool {
         self.len == MOST
     }
 
-    /// How many can be drawn at once.
-    pub(super) fn room(&self) -> usize {
-        (MOST - self.len).min(LANES)
+    /// The plane of a slot in double precision.
+    #[inline(always)]
+    pub(super) fn plane(&self, window: &Window, slot: usize) -> Option<Plane> {
+        let [p, q, r] = &self.triples;
+        let (p, q, r) = (p[slot], q[slot], r[slot]);
+        let (p, q, r) = (window.sample(p), window.sample(q), window.sample(r));
+        Plane::through_points(p, q, r, LEAST_SINE)
     }
 
+    /// Draws so many triples, [`DRAWN`] at most, and says how many of them span planes.
     #[inline(always)]
-    pub(super) fn plane(&self, index: usize) -> Plane {
-        Plane {
-            a: self.a[index],
-            b: self.b[index],
-            c: self.c[index],
-        }
-    }
-
-    /// Draws so many triples, no more than there is room for, and adds the planes of those that
-    /// are not collinear. Says how many those are.
-    #[inline(always)]
-    pub(super) fn draw<S: Simd>(
+    pub(super) fn draw<L: Lanes>(
         &mut self,
-        simd: S,
+        lanes: L,
         window: &Window,
+        bounds: &Bounds,
         number: usize,
         draws: &mut Draws,
     ) -> usize {
-        let before = self.len;
-        if number < FEW {
-            self.draw_few(window, number, draws);
-        } else {
-            self.draw_lanes(simd, window, number, draws);
+        let start = self.len;
+        let slots = start..start + DRAWN;
+        let drawn = draws.triples::<DRAWN>(number, window.len() as u32);
+        for (triples, drawn) in self.triples.iter_mut().zip(&drawn) {
+            triples[slots.clone()].copy_from_slice(drawn);
         }
-        self.len - before
+        self.len += DRAWN;
+        let [p, q, r] = &drawn;
+        let [p, q, r] = [p, q, r].map(|indices| L::as_simd_u32s(indices).0);
+        let a = L::as_mut_simd_f32s(&mut self.a[slots.clone()]).0;
+        let b = L::as_mut_simd_f32s(&mut self.b[slots.clone()]).0;
+        let c = L::as_mut_simd_f32s(&mut self.c[slots.clone()]).0;
+        let slack = L::as_mut_simd_f32s(&mut self.slack[slots]).0;
+        let none = lanes.splat_f32s(f32::NEG_INFINITY);
+        let (mut good, mut unsure) = (0_u32, 0_u32);
+        let samples = window.rough();
+        for (k, slack) in slack.iter_mut().enumerate() {
+            let p = pick(lanes, samples, p[k]);
+            let q = pick(lanes, samples, q[k]);
+            let r = pick(lanes, samples, r[k]);
+            let solved = solve(lanes, [p, q, r], bounds);
+            (a[k], b[k], c[k]) = (solved.a, solved.b, solved.c);
+            *slack = lanes.select_f32s(solved.good, solved.slack, none);
+            let first = k * L::F32_LANES;
+            good |= lanes.bits_m32s(solved.good) << first;
+            let sure = lanes.or_m32s(solved.good, solved.bad);
+            let all = u32::MAX >> (32 - L::F32_LANES);
+            unsure |= (!lanes.bits_m32s(sure) & all) << first;
+        }
+        let wanted = u32::MAX >> (32 - number);
+        if number < DRAWN {
+            self.slack[start + number..start + DRAWN].fill(f32::NEG_INFINITY);
+        }
+        let mut planes = (good & wanted).count_ones() as usize;
+        if unsure & wanted != 0 {
+            planes += self.decide(window, start, unsure & wanted);
+        }
+        planes
     }
 
-    /// Makes all planes in single precision.
-    #[inline(always)]
-    pub(super) fn roughen(&mut self, extent: &Extent) {
-        let Self {
-            a,
-            b,
-            c,
-            rough,
-            len,
-        } = self;
-        rough.fill([a, b, c], *len, extent);
-    }
-
-    #[inline(always)]
-    fn push(&mut self, plane: Plane, kept: bool) {
-        let k = self.len % MOST;
-        (self.a[k], self.b[k], self.c[k]) = (plane.a, plane.b, plane.c);
-        self.len += usize::from(kept);
-    }
-
-    #[inline(never)]
-    fn draw_few(&mut self, window: &Window, number: usize, draws: &mut Draws) {
-        for _ in 0..number {
-            let [p, q, r] = draws.triple(window.len()).map(|k| {
-                let [x, y, z, _] = window.sample(k as u32);
-                [x, y, z]
-            });
-            if let Some(plane) = Plane::through_points(p, q, r, LEAST_SINE) {
-                self.push(plane, true);
+    /// Decides in double precision which of these slots hold planes. Those are left to be looked
+    /// at in double precision again, whatever single precision says.
+    #[cold]
+    fn decide(&mut self, window: &Window, start: usize, unsure: u32) -> usize {
+        let mut planes = 0;
+        for slot in (start..start + DRAWN).filter(|slot| unsure >> (slot - start) & 1 == 1) {
+            if self.plane(window, slot).is_some() {
+                (self.a[slot], self.b[slot], self.c[slot]) = (0.0, 0.0, 0.0);
+                self.slack[slot] = f32::INFINITY;
+                planes += 1;
             }
         }
+        planes
     }
 
+    /// The planes to which so many samples may be nearer than the limit; all for which that is so
+    /// are among them.
     #[inline(always)]
-    fn draw_lanes<S: Simd>(&mut self, simd: S, window: &Window, number: usize, draws: &mut Draws) {
-        let triples = draws.triples::<LANES>(number, window.len() as u32);
-        let mut points = [[[0.0; LANES]; 3]; 3];
-        for (corner, indices) in points.iter_mut().zip(&triples) {
-            for (lane, index) in indices.iter().enumerate() {
-                let [x, y, z, _] = window.sample(*index);
-                (corner[0][lane], corner[1][lane], corner[2][lane]) = (x, y, z);
+    pub(super) fn sift<L: Lanes>(
+        &self,
+        lanes: L,
+        window: &Window,
+        limit: f32,
+        fewest: u32,
+    ) -> Sifted {
+        let ([x, y, z], len) = (window.rough(), window.len());
+        let vectors = |numbers| L::as_simd_f32s(numbers).0;
+        let (a, b, c) = (vectors(&self.a), vectors(&self.b), vectors(&self.c));
+        let (slack, order) = (vectors(&self.slack), vectors(&ORDER));
+        let (limit, up) = (lanes.splat_f32s(limit), lanes.splat_f32s(UP));
+        let (none, one) = (lanes.splat_f32s(0.0), lanes.splat_f32s(1.0));
+        let most = lanes.splat_f32s(MOST as f32);
+        let fewest = lanes.splat_f32s(fewest as f32);
+        let used = (self.len / L::F32_LANES).min(c.len());
+        let (mut left, mut likeliest) = (0_u64, none);
+        let (x, y, z) = (&x[..len], &y[..len], &z[..len]);
+        for start in (0..used).step_by(SIDE_BY_SIDE) {
+            let mut slopes = [[a[start], b[start]]; SIDE_BY_SIDE];
+            let mut bounds = [[none; 2]; SIDE_BY_SIDE];
+            for k in 0..SIDE_BY_SIDE {
+                let vector = (start + k).min(used - 1);
+                slopes[k] = [a[vector], b[vector]];
+                let width = lanes.mul_f32s(up, lanes.add_f32s(limit, slack[vector]));
+                bounds[k] = [
+                    lanes.sub_f32s(c[vector], width),
+                    lanes.add_f32s(c[vector], width),
+                ];
+            }
+            let mut counts = [none; SIDE_BY_SIDE];
+            for ((x, y), z) in x.iter().zip(y).zip(z) {
+                let sample = [
+                    lanes.splat_f32s(*x),
+                    lanes.splat_f32s(*y),
+                    lanes.splat_f32s(*z),
+                ];
+                for k in 0..SIDE_BY_SIDE {
+                    let level = level(lanes, slopes[k], sample);
+                    let is_within = lanes.is_within(bounds[k], level);
+                    let more = lanes.add_f32s(counts[k], one);
+                    counts[k] = lanes.select_f32s(is_within, more, counts[k]);
+                }
+            }
+            for (k, count) in counts.into_iter().enumerate() {
+                let vector = (start + k).min(used - 1);
+                let enough = lanes.less_than_or_equal_f32s(fewest, count);
+                left |= u64::from(lanes.bits_m32s(enough)) << (vector * L::F32_LANES);
+                let ordered = lanes.mul_add_e_f32s(count, most, order[vector]);
+                likeliest = lanes.max_f32s(likeliest, ordered);
             }
         }
-        let mut solved = [[0.0; LANES]; 3];
-        let mut good = [0.0; LANES];
-        solve(simd, &points, &mut solved, &mut good);
-        let end = self.len + LANES;
-        if number == LANES && end <= MOST && good == [1.0; LANES] {
-            self.a[self.len..end].copy_from_slice(&solved[0]);
-            self.b[self.len..end].copy_from_slice(&solved[1]);
-            self.c[self.len..end].copy_from_slice(&solved[2]);
-            self.len = end;
-            return;
+        let likeliest = MOST - 1 - lanes.reduce_max_f32s(likeliest) as usize % MOST;
+        Sifted { left, likeliest }
+    }
+
+    /// The same for one slot, samples side by side.
+    #[inline(always)]
+    pub(super) fn within_one<L: Lanes>(
+        &self,
+        lanes: L,
+        slot: usize,
+        [x, y, z]: [&[f32]; 3],
+        limit: f32,
+    ) -> u32 {
+        let width = UP * (limit + self.slack[slot]);
+        let (lowest, highest) = (self.c[slot] - width, self.c[slot] + width);
+        let slopes = [self.a[slot], self.b[slot]].map(|slope| lanes.splat_f32s(slope));
+        let bounds = [lowest, highest].map(|bound| lanes.splat_f32s(bound));
+        let vectors = |numbers| L::as_simd_f32s(numbers).0;
+        let (x, y, z) = (vectors(x), vectors(y), vectors(z));
+        let mut within = 0;
+        for ((x, y), z) in x.iter().zip(y).zip(z) {
+            let level = level(lanes, slopes, [*x, *y, *z]);
+            within += lanes.bits_m32s(lanes.is_within(bounds, level)).count_ones();
         }
-        for l in 0..number {
-            let [a, b, c] = [solved[0][l], solved[1][l], solved[2][l]];
-            self.push(Plane { a, b, c }, good[l] > 0.0);
-        }
+        within
+    }
+
+    #[cfg(test)]
+    pub(super) fn has_plane(&self, slot: usize) -> bool {
+        self.slack[slot] > f32::NEG_INFINITY
+    }
+
+    /// A residual in single precision, and its slack.
+    #[cfg(test)]
+    pub(super) fn residual(&self, slot: usize, sample: [f32; 3]) -> (f64, f32) {
+        let slopes = [self.a[slot], self.b[slot]];
+        let level = level(pulp::Scalar::new(), slopes, sample);
+        (f64::from(level) - f64::from(self.c[slot]), self.slack[slot])
     }
 }
 
-/// As [`Plane::through_points`], operation for operation; `good` is 1 where there is a plane.
-#[inline(always)]
-fn solve<S: Simd>(
-    simd: S,
-    points: &[[[f64; LANES]; 3]; 3],
-    solved: &mut [[f64; LANES]; 3],
-    good: &mut [f64; LANES],
-) {
-    let lanes = |numbers| S::as_simd_f64s(numbers).0;
-    let (sub, mul) = (|a, b| simd.sub_f64s(a, b), |a, b| simd.mul_f64s(a, b));
-    let minor = |a, b, c, d| sub(mul(a, b), mul(c, d));
-    let length2 = |x, y| simd.add_f64s(mul(x, x), mul(y, y));
-    let [a, b, c] = solved;
-    let out = [a, b, c, good].map(|numbers| S::as_mut_simd_f64s(numbers).0);
-    let [a, b, c, good] = out;
-    let least = simd.splat_f64s(LEAST_SINE * LEAST_SINE);
-    let (zero, one) = (simd.splat_f64s(0.0), simd.splat_f64s(1.0));
-    for k in 0..good.len() {
-        let [[px, py, pz], q, r] = [0, 1, 2].map(|corner| {
-            let point: &[[f64; LANES]; 3] = &points[corner];
-            [
-                lanes(&point[0])[k],
-                lanes(&point[1])[k],
-                lanes(&point[2])[k],
-            ]
-        });
-        let (qx, qy, qz) = (sub(q[0], px), sub(q[1], py), sub(q[2], pz));
-        let (rx, ry, rz) = (sub(r[0], px), sub(r[1], py), sub(r[2], pz));
-        let cross = minor(qx, ry, rx, qy);
-        let lengths2 = mul(length2(qx, qy), length2(rx, ry));
-        let told = simd.less_than_f64s(mul(least, lengths2), mul(cross, cross));
-        good[k] = simd.select_f64s(told, one, zero);
-        a[k] = simd.div_f64s(minor(qz, ry, rz, qy), cross);
-        b[k] = simd.div_f64s(minor(qx, rz, rx, qz), cross);
-        c[k] = sub(sub(pz, mul(a[k], px)), mul(b[k], py));
+/// What a rough look leaves.
+pub(super) struct Sifted {
+    /// A bit for each slot.
+    pub(super) left: u64,
+    /// The slot with most samples within the limit, the first of equal ones.
+    pub(super) likeliest: usize,
+}
+
+/// Slots from the last to the first, for the greatest of what is counted to be the first of equal
+/// ones.
+const ORDER: [f32; MOST] = {
+    let mut order = [0.0; MOST];
+    let mut k = 0;
+    while k < MOST {
+        order[k] = (MOST - 1 - k) as f32;
+        k += 1;
     }
+    order
+};
+
+/// The samples at these indices. Every call has to become part of what is compiled for these
+/// lanes, which closures handed on do not.
+#[inline(always)]
+fn pick<L: Lanes>(lanes: L, [x, y, z]: [&[f32]; 3], indices: L::u32s) -> [L::f32s; 3] {
+    [
+        lanes.pick(x, indices),
+        lanes.pick(y, indices),
+        lanes.pick(z, indices),
+    ]
 }
