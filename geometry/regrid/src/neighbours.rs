@@ -304,3 +304,6 @@ fn cut(found: &mut Vec<Neighbour>, start: usize, middle: usize, limit: usize) {
     found.truncate(middle + above);
     found.drain(start + below..middle);
 }
+
+#[cfg(test)]
+mod tests;
