@@ -34,11 +34,7 @@ pub fn regrid(
     let mut builder = RangeImageBuilder::new(lattice);
     if let [first, .., last] = strips.as_slice() {
         let mut worker = GridWorker::default();
-        let mut margin = |x_mm: f64| {
-            worker
-                .margin_mm(&strips, x_mm, settings)
-                .unwrap_or(0.0)
-        };
+        let mut margin = |x_mm: f64| worker.margin_mm(&strips, x_mm, settings).unwrap_or(0.0);
         let i_first = lattice.first_at_or_above(first.x_mm - margin(first.x_mm));
         let i_last = lattice.last_at_or_below(last.x_mm + margin(last.x_mm));
         let grid = with_threads(settings.threads, || {
@@ -116,6 +112,9 @@ const STRAYS: f64 = 0.02;
 /// Refuses a grid that will be too large before any of it is computed: one that is too large
 /// even without what the outermost samples add.
 fn check_extent(strips: &[Strip], settings: &RegridSettings) -> Result<(), RegridError> {
+    if check_nodes_of_all(strips, settings).is_ok() {
+        return Ok(());
+    }
     let mut heights: Vec<f64> = Vec::new();
     let mut places: Vec<f64> = Vec::new();
     for strip in strips {
@@ -133,6 +132,22 @@ fn check_extent(strips: &[Strip], settings: &RegridSettings) -> Result<(), Regri
         (Some(columns), Some(rows)) => check_nodes(columns, rows, settings),
         _ => Ok(()),
     }
+}
+
+/// The same with all samples, which is soon told: strips and their samples are in order.
+fn check_nodes_of_all(strips: &[Strip], settings: &RegridSettings) -> Result<(), RegridError> {
+    let (Some(left), Some(right)) = (strips.first(), strips.last()) else {
+        return Ok(());
+    };
+    let heights = |end: fn(&Strip) -> Option<&(f64, f64)>| strips.iter().filter_map(end);
+    let low_mm = heights(|s| s.samples.first()).fold(f64::INFINITY, |low, s| low.min(s.0));
+    let high_mm = heights(|s| s.samples.last()).fold(f64::NEG_INFINITY, |high, s| high.max(s.0));
+    let nodes = |extent_mm: f64| (extent_mm / settings.pitch_mm) as u64;
+    check_nodes(
+        nodes(right.x_mm - left.x_mm),
+        nodes(high_mm - low_mm),
+        settings,
+    )
 }
 
 fn check_nodes(columns: u64, rows: u64, settings: &RegridSettings) -> Result<(), RegridError> {

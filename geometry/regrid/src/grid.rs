@@ -15,11 +15,12 @@ use crate::plane::{Fit, Plane};
 use crate::settings::{Estimator, LEAST_WINDOW, RegridSettings};
 use crate::strip::{Strip, typical};
 use crate::support::{Place, Surroundings};
-use crate::window::{Spacing, Window, around};
+use crate::window::{Gaps, Spacing, Window, around};
 
 /// Computes grid columns; keeps its buffers from one to the next.
 #[derive(Debug, Default)]
 pub(crate) struct GridWorker {
+    gaps: Gaps,
     search: Search,
     median: LeastMedian,
     surroundings: Surroundings,
@@ -30,6 +31,8 @@ pub(crate) struct GridWorker {
     /// What is left of a node's window.
     samples: Vec<Neighbour>,
     lengths: Vec<f64>,
+    /// Rows of the grid column before, for which there is room from the outset in the next one.
+    rows: usize,
 }
 
 impl GridWorker {
@@ -41,7 +44,7 @@ impl GridWorker {
         x_mm: f64,
         settings: &RegridSettings,
     ) -> Option<f64> {
-        let window = Window::new(strips, x_mm, settings, &mut self.lengths)?;
+        let window = Window::new(strips, x_mm, settings, &mut self.gaps)?;
         Some(settings.support.margin * window.greatest_spacing().x_mm)
     }
 
@@ -60,12 +63,15 @@ impl GridWorker {
         if x_mm < settings.roi.x_mm.0 || x_mm > settings.roi.x_mm.1 {
             return None;
         }
-        let window = Window::new(strips, x_mm, settings, &mut self.lengths)?;
+        let window = Window::new(strips, x_mm, settings, &mut self.gaps)?;
         let greatest = window.greatest_spacing();
         let near_x_mm = settings.support.radius * greatest.x_mm;
         let near_y_mm = settings.support.radius * greatest.y_mm;
         let noise = match settings.estimator {
-            Estimator::Consensus => noise(around(window.strips, NOISE_COLUMNS, x_mm).iter(), &mut self.lengths),
+            Estimator::Consensus => noise(
+                around(window.strips, NOISE_COLUMNS, x_mm).iter(),
+                &mut self.lengths,
+            ),
             Estimator::LeastMedian | Estimator::ExhaustiveLeastMedian | Estimator::LeastSquares => {
                 None
             }
@@ -73,8 +79,8 @@ impl GridWorker {
         let mut column = GridColumn {
             i,
             j_first: 0,
-            z_mm: Vec::new(),
-            quality: Vec::new(),
+            z_mm: Vec::with_capacity(self.rows),
+            quality: Vec::with_capacity(self.rows),
         };
         self.before = None;
         self.search.begin(&window, x_mm);
@@ -96,17 +102,13 @@ impl GridWorker {
                 }
                 Near::Nothing => break,
             }
-            let node = Node {
-                y_mm,
-                i,
-                j,
-                noise,
-            };
+            let node = Node { y_mm, i, j, noise };
             if let Some(value) = self.node(&window, node, settings) {
                 append(&mut column, j, value);
             }
             next = Some(j + 1);
         }
+        self.rows = column.z_mm.len();
         (!column.z_mm.is_empty()).then_some(column)
     }
 

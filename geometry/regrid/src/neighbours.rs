@@ -53,7 +53,7 @@ impl Neighbour {
 /// searches that find too few, less spares samples that are not needed.
 const ROOM: f64 = 1.2;
 /// The same after a search that found too few.
-const MORE: f64 = 1.5;
+const MORE: f64 = 1.35;
 /// All samples whose squared distance is below this share of the radius' square have been found,
 /// whatever rounding did.
 const SURE: f64 = 1.0 - 1e-9;
@@ -304,3 +304,6 @@ fn cut(found: &mut Vec<Neighbour>, start: usize, middle: usize, limit: usize) {
     found.truncate(middle + above);
     found.drain(start + below..middle);
 }
+
+#[cfg(test)]
+mod tests;

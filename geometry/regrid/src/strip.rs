@@ -71,15 +71,16 @@ impl Strip {
     }
 }
 
-/// The lower median, by selection; `None` of nothing. No number may be negative: their bits are in
-/// the same order then, and sooner compared.
+/// The lower median, by selection; `None` of nothing. No number may be negative.
 pub(crate) fn lower_median(values: &mut [f64]) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let middle = (values.len() - 1) / 2;
+    at_rank(values, values.len().checked_sub(1)? / 2)
+}
+
+/// The number than which so many are less, if there is one. No number may be negative: their bits
+/// are in the same order then, and sooner compared.
+pub(crate) fn at_rank(values: &mut [f64], rank: usize) -> Option<f64> {
     let by_bits = |a: &f64, b: &f64| a.to_bits().cmp(&b.to_bits());
-    Some(*values.select_nth_unstable_by(middle, by_bits).1)
+    (rank < values.len()).then(|| *values.select_nth_unstable_by(rank, by_bits).1)
 }
 
 /// Distances count up to this many times their median in [`typical`].

@@ -1,7 +1,7 @@
 //! The columns that the nodes of one grid column may draw on.
 
 use crate::settings::RegridSettings;
-use crate::strip::{Strip, lower_median, typical};
+use crate::strip::{Strip, at_rank, typical};
 
 /// Within a window the local sample spacing is believed up to this many times the median
 /// one, which bounds the area a node has to look at.
@@ -35,25 +35,17 @@ impl<'a> Window<'a> {
         strips: &'a [Strip],
         x_mm: f64,
         settings: &RegridSettings,
-        scratch: &mut Vec<f64>,
+        gaps: &mut Gaps,
     ) -> Option<Self> {
         let strips = around(strips, settings.reach_columns, x_mm);
-        scratch.clear();
-        scratch.extend(strips.windows(2).map(|pair| pair[1].x_mm - pair[0].x_mm));
-        // In an order that a mirrored scan shares, so that the sum is the same.
-        scratch.sort_unstable_by(f64::total_cmp);
-        let column_spacing_mm = typical(scratch)?;
-        scratch.clear();
-        for strip in strips {
-            let heights = strip.samples.windows(2).map(|pair| pair[1].0 - pair[0].0);
-            scratch.extend(heights.filter(|gap| *gap > 0.0));
-        }
+        let column_spacing_mm = gaps.column_spacing(strips)?;
+        let sample_spacing_mm = gaps.sample_spacing(strips)?;
         let pitch_mm = settings.pitch_mm;
         let suited_mm = (pitch_mm * pitch_mm / column_spacing_mm)
             .max(pitch_mm)
             .max(column_spacing_mm);
         let limit_mm = PITCH_LIMIT * suited_mm;
-        let sample_spacing_mm = lower_median(scratch)?.min(limit_mm);
+        let sample_spacing_mm = sample_spacing_mm.min(limit_mm);
         Some(Self {
             strips,
             column_spacing_mm,
@@ -91,6 +83,58 @@ impl<'a> Window<'a> {
     }
 }
 
+/// Finds distances of neighbours; what is found for one window makes the next one faster.
+#[derive(Debug, Default)]
+pub(crate) struct Gaps {
+    lengths: Vec<f64>,
+    /// The median sample spacing of the window before.
+    before_mm: f64,
+}
+
+/// The median sample spacing is looked for within this share of that of the window before.
+const NEAR: f64 = 1.0 / 64.0;
+
+impl Gaps {
+    /// The typical distance of neighbouring columns.
+    fn column_spacing(&mut self, strips: &[Strip]) -> Option<f64> {
+        let gaps = strips.windows(2).map(|pair| pair[1].x_mm - pair[0].x_mm);
+        self.lengths.clear();
+        self.lengths.extend(gaps);
+        // In an order that a mirrored scan shares, so that the sum is the same.
+        self.lengths.sort_unstable_by(f64::total_cmp);
+        typical(&mut self.lengths)
+    }
+
+    /// The median distance of neighbours along columns, of those that differ in y.
+    fn sample_spacing(&mut self, strips: &[Strip]) -> Option<f64> {
+        let near = [1.0 - NEAR, 1.0 + NEAR].map(|share| share * self.before_mm);
+        let median = match self.median_within(strips, near) {
+            Some(median) => median,
+            None => self.median_within(strips, [0.0, f64::INFINITY])?,
+        };
+        self.before_mm = median;
+        Some(median)
+    }
+
+    /// The same if it is within these limits.
+    fn median_within(&mut self, strips: &[Strip], [low_mm, high_mm]: [f64; 2]) -> Option<f64> {
+        self.lengths.clear();
+        let (mut all, mut below) = (0_usize, 0);
+        for strip in strips {
+            let gaps = strip.samples.windows(2).map(|pair| pair[1].0 - pair[0].0);
+            for gap in gaps.filter(|gap| *gap > 0.0) {
+                all += 1;
+                below += usize::from(gap < low_mm);
+                if (low_mm..=high_mm).contains(&gap) {
+                    self.lengths.push(gap);
+                }
+            }
+        }
+        let rank = (all.checked_sub(1)? / 2).checked_sub(below)?;
+        at_rank(&mut self.lengths, rank)
+    }
+}
+
 /// The strips nearest to this x, up to so many on either side and one at that very x, of strips in
 /// ascending x.
 pub(crate) fn around(strips: &[Strip], number: usize, x_mm: f64) -> &[Strip] {
@@ -109,4 +153,58 @@ pub(crate) struct Spacing {
     pub(crate) x_mm: f64,
     /// Unit of support lengths in y.
     pub(crate) y_mm: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_spacing_is_that_of_all_whatever_the_window_before() {
+        let strip = |x_mm: f64, shares: &[f64]| {
+            let mut y = 0.0;
+            let heights = shares.iter().map(|gap| {
+                y += gap;
+                (y, 1.0)
+            });
+            Strip {
+                x_mm,
+                samples: heights.collect(),
+            }
+        };
+        let strips = [
+            strip(0.0, &[0.0, 1.0, 1.01, 0.0, 1.02]),
+            strip(1.0, &[]),
+            strip(2.0, &[5.0, 0.99, 3.0, 0.0]),
+        ];
+        // 0.99, 1.0, 1.01, 1.02 and 3.0 apart, but for rounding.
+        for before_mm in [0.0, 0.5, 0.99, 1.01, 1.02, 3.0, 1e9] {
+            let mut gaps = Gaps {
+                before_mm,
+                ..Gaps::default()
+            };
+            let found = gaps.sample_spacing(&strips).unwrap();
+            assert!((found - 1.01).abs() < 1e-12, "{before_mm} {found}");
+            assert_eq!(gaps.sample_spacing(&strips[1..2]), None);
+        }
+    }
+
+    #[test]
+    fn strips_around_are_those_on_either_side_and_the_one_between() {
+        let strips: Vec<Strip> = (0..9)
+            .map(|k| Strip {
+                x_mm: f64::from(k),
+                samples: Vec::new(),
+            })
+            .collect();
+        let around = |number, x_mm| -> Vec<f64> {
+            let around = around(&strips, number, x_mm);
+            around.iter().map(|s| s.x_mm).collect()
+        };
+        assert_eq!(around(2, 4.0), [2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(around(2, 4.5), [3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(around(2, -7.0), [0.0, 1.0]);
+        assert_eq!(around(1, 8.0), [7.0, 8.0]);
+        assert_eq!(around(usize::MAX, 3.0).len(), 9);
+    }
 }

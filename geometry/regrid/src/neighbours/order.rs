@@ -138,7 +138,14 @@ mod tests {
     #[test]
     fn the_nearest_are_those_of_the_whole_order_with_ties_at_the_end_and_within() {
         let mut sorter = Sorter::default();
-        for (spread, all) in [(3_i32, 90), (7, 90), (50, 90), (9, 128), (9, 129), (40, 1500)] {
+        for (spread, all) in [
+            (3_i32, 90),
+            (7, 90),
+            (50, 90),
+            (9, 128),
+            (9, 129),
+            (40, 1500),
+        ] {
             // Distances on a grid, of which many are alike.
             let found: Vec<Neighbour> = (0..all)
                 .map(|k| {
