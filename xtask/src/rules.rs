@@ -107,6 +107,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "cad-exchange",
             "pipeline",
             "range-image",
+            "reconstruct",
             "regrid",
             "segment",
         ],
@@ -224,7 +225,7 @@ const EVERYTHING: [&str; 15] = [
     "storage",
 ];
 
-const STUDIES: [&str; 17] = [
+const STUDIES: [&str; 18] = [
     "cad-exchange",
     "deliverables",
     "nurbs",
@@ -235,6 +236,7 @@ const STUDIES: [&str; 17] = [
     "relief-api",
     "relief-tests",
     "relief-throughput",
+    "reliefd",
     "scan-files",
     "scan-record",
     "scanner-driver",
