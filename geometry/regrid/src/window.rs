@@ -92,7 +92,7 @@ pub(crate) struct Gaps {
 }
 
 /// The median sample spacing is looked for within this share of that of the window before.
-const NEAR: f64 = 1.0 / 64.0;
+const NEAR: f64 = 1.0 / 128.0;
 
 impl Gaps {
     /// The typical distance of neighbouring columns.
@@ -121,11 +121,12 @@ impl Gaps {
         self.lengths.clear();
         let (mut all, mut below) = (0_usize, 0);
         for strip in strips {
-            let gaps = strip.samples.windows(2).map(|pair| pair[1].0 - pair[0].0);
-            for gap in gaps.filter(|gap| *gap > 0.0) {
-                all += 1;
-                below += usize::from(gap < low_mm);
-                if (low_mm..=high_mm).contains(&gap) {
+            let above = strip.samples.get(1..).unwrap_or_default();
+            for ((low, _), (high, _)) in strip.samples.iter().zip(above) {
+                let gap = high - low;
+                all += usize::from(gap > 0.0);
+                below += usize::from(gap > 0.0 && gap < low_mm);
+                if gap > 0.0 && gap >= low_mm && gap <= high_mm {
                     self.lengths.push(gap);
                 }
             }
