@@ -275,18 +275,18 @@ fn quality(
     plane: &Plane,
     agrees: impl Fn(&Neighbour) -> bool,
 ) -> NodeQuality {
-    let (mut inliers, mut squares) = (0_u16, 0.0);
+    let (mut inliers, mut squares) = (0_u32, 0.0);
     for n in window {
         let residual = plane.residual(n);
         let is_inlier = agrees(n);
-        inliers = inliers.saturating_add(u16::from(is_inlier));
+        inliers += u32::from(is_inlier);
         squares += if is_inlier { residual * residual } else { 0.0 };
     }
     let nearest = window.iter().find(|n| agrees(n));
     let nearest2 = nearest.map_or(f64::INFINITY, |n| n.distance2);
     let freedom = f64::from(inliers) - 3.0;
     NodeQuality {
-        inliers,
+        inliers: u16::try_from(inliers).unwrap_or(u16::MAX),
         samples: u16::try_from(window.len()).unwrap_or(u16::MAX),
         scale_mm: (squares / freedom.max(1.0)).sqrt() as f32,
         nearest_mm: nearest2.sqrt() as f32,

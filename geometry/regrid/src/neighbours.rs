@@ -107,6 +107,8 @@ pub(crate) struct Search {
     sorter: Sorter,
     /// Square of the radius to begin with. Only speed depends on it.
     radius2: f64,
+    /// Samples that it is for.
+    number: usize,
 }
 
 impl Search {
@@ -178,6 +180,7 @@ impl Search {
         number: usize,
     ) -> &[Neighbour] {
         let mut radius2 = self.radius2;
+        self.number = number;
         loop {
             let is_whole = self.gather(window, y_mm, radius2, number.div_ceil(2));
             if is_whole || self.found.len() >= number {
@@ -196,10 +199,10 @@ impl Search {
 
     /// The same for a window that is wider than that of the nodes to come.
     pub(crate) fn wider(&mut self, window: &Window<'_>, y_mm: f64, number: usize) -> &[Neighbour] {
-        let radius2 = self.radius2;
-        self.radius2 = 4.0 * radius2;
+        let usual = (self.radius2, self.number);
+        self.radius2 *= number as f64 / self.number.max(1) as f64;
         self.nearest(window, y_mm, number);
-        self.radius2 = radius2;
+        (self.radius2, self.number) = usual;
         self.sorter.sorted(number)
     }
 

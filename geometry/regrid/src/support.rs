@@ -33,16 +33,18 @@ impl Surroundings {
         let radius2 = settings.radius * settings.radius;
         let greatest_mm = spacing.x_mm.max(spacing.y_mm);
         let within2 = UP * radius2 * greatest_mm * greatest_mm;
-        self.near.clear();
+        // Without branches, for which samples are within is hard to foresee.
+        self.near.resize(window.len(), (0, (0.0, 0.0)));
+        let mut number = 0;
         for (place, neighbour) in window.iter().enumerate() {
             if neighbour.distance2 > within2 {
                 break;
             }
             let (u, v) = (neighbour.dx / spacing.x_mm, neighbour.dy / spacing.y_mm);
-            if u * u + v * v <= radius2 {
-                self.near.push((place, (u, v)));
-            }
+            self.near[number] = (place, (u, v));
+            number += usize::from(u * u + v * v <= radius2);
         }
+        self.near.truncate(number);
     }
 
     /// Whether the samples last looked at support a value at the node. `agrees` tells inliers.

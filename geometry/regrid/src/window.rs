@@ -92,7 +92,7 @@ pub(crate) struct Gaps {
 }
 
 /// The median sample spacing is looked for within this share of that of the window before.
-const NEAR: f64 = 1.0 / 64.0;
+const NEAR: f64 = 1.0 / 128.0;
 
 impl Gaps {
     /// The typical distance of neighbouring columns.
@@ -118,20 +118,27 @@ impl Gaps {
 
     /// The same if it is within these limits.
     fn median_within(&mut self, strips: &[Strip], [low_mm, high_mm]: [f64; 2]) -> Option<f64> {
-        self.lengths.clear();
-        let (mut all, mut below) = (0_usize, 0);
+        let most = strips.iter().map(|s| s.samples.len()).sum();
+        if self.lengths.len() < most {
+            self.lengths.resize(most, 0.0);
+        }
+        // Without branches, for which lengths are within the limits is hard to foresee.
+        let (mut all, mut below, mut within) = (0, 0, 0);
         for strip in strips {
-            let gaps = strip.samples.windows(2).map(|pair| pair[1].0 - pair[0].0);
-            for gap in gaps.filter(|gap| *gap > 0.0) {
-                all += 1;
-                below += usize::from(gap < low_mm);
-                if (low_mm..=high_mm).contains(&gap) {
-                    self.lengths.push(gap);
+            let above = strip.samples.get(1..).unwrap_or_default();
+            for ((low, _), (high, _)) in strip.samples.iter().zip(above) {
+                let gap = high - low;
+                let is_gap = gap > 0.0;
+                all += usize::from(is_gap);
+                below += usize::from(is_gap & (gap < low_mm));
+                if let Some(place) = self.lengths.get_mut(within) {
+                    *place = gap;
                 }
+                within += usize::from(is_gap & (gap >= low_mm) & (gap <= high_mm));
             }
         }
-        let rank = (all.checked_sub(1)? / 2).checked_sub(below)?;
-        at_rank(&mut self.lengths, rank)
+        let rank = (usize::checked_sub(all, 1)? / 2).checked_sub(below)?;
+        at_rank(self.lengths.get_mut(..within)?, rank)
     }
 }
 

@@ -6,25 +6,23 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::Neighbour;
 
-/// Ranks are counted for so many samples side by side.
+/// Every width of lanes divides so many numbers.
 const SIDE_BY_SIDE: usize = 16;
 /// More samples than this are sorted, since counting takes the square of their number.
 const COUNTED: usize = 128;
 /// Last bits of a key, which say where its sample is, so that no two are alike. Those above them
 /// are in the order of the distances, since none is negative.
-const COUNTED_PLACE: i32 = 0x7f;
+const COUNTED_PLACE: u32 = 0x7f;
 /// The same of a key that is sorted.
 const PLACE: u64 = 0x3ff;
-/// Above all keys.
-const NONE: i32 = i32::MAX;
 
 /// Puts samples in their order. Whole samples are moved once only: keys are put in order, of a
 /// distance but for its last bits, and of where its sample is.
 #[derive(Debug, Default)]
 pub(super) struct Sorter {
     keys: Vec<u64>,
-    short_keys: Vec<i32>,
-    ranks: Vec<[u32; SIDE_BY_SIDE]>,
+    short_keys: Vec<f32>,
+    ranks: Vec<u32>,
     sorted: Vec<Neighbour>,
 }
 
@@ -54,19 +52,19 @@ impl Sorter {
             ..
         } = self;
         short_keys.clear();
-        short_keys.extend((0_i32..).zip(found).map(|(place, own)| {
-            let distance2 = (own.distance2 as f32).to_bits().cast_signed();
-            distance2 & !COUNTED_PLACE | place
+        short_keys.extend((0_u32..).zip(found).map(|(place, own)| {
+            let distance2 = (own.distance2 as f32).to_bits();
+            f32::from_bits(distance2 & !COUNTED_PLACE | place)
         }));
-        short_keys.resize(found.len().next_multiple_of(SIDE_BY_SIDE), NONE);
-        ranks.resize(COUNTED / SIDE_BY_SIDE, [0; SIDE_BY_SIDE]);
+        short_keys.resize(found.len().next_multiple_of(SIDE_BY_SIDE), f32::INFINITY);
+        ranks.resize(COUNTED, 0);
         Arch::new().dispatch(CountBelow {
             keys: short_keys,
             number: found.len(),
             ranks,
         });
         sorted.resize(found.len(), Neighbour::default());
-        for (own, rank) in found.iter().zip(ranks.as_flattened()) {
+        for (own, rank) in found.iter().zip(ranks) {
             if let Some(place) = sorted.get_mut(*rank as usize) {
                 *place = *own;
             }
@@ -92,25 +90,25 @@ impl Sorter {
 
 /// Counts for each key how many of the first `number` are below it.
 struct CountBelow<'a> {
-    keys: &'a [i32],
+    keys: &'a [f32],
     number: usize,
-    ranks: &'a mut [[u32; SIDE_BY_SIDE]],
+    ranks: &'a mut [u32],
 }
 
 impl WithSimd for CountBelow<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let (blocks, _) = self.keys.as_chunks::<SIDE_BY_SIDE>();
-        for (own, ranks) in blocks.iter().zip(self.ranks) {
-            let mut below = [0_u32; SIDE_BY_SIDE];
-            for other in self.keys.iter().take(self.number) {
-                for (below, own) in below.iter_mut().zip(own) {
-                    *below += u32::from(other < own);
-                }
-            }
-            *ranks = below;
+    fn with_simd<S: Simd>(self, lanes: S) {
+        let (keys, _) = S::as_simd_f32s(self.keys);
+        let (ranks, _) = S::as_mut_simd_u32s(self.ranks);
+        let others = self.keys.get(..self.number).unwrap_or_default();
+        let [zero, one] = [0, 1].map(|number| lanes.splat_u32s(number));
+        for (own, rank) in keys.iter().zip(ranks) {
+            *rank = others.iter().fold(zero, |below, other| {
+                let is_below = lanes.less_than_f32s(lanes.splat_f32s(*other), *own);
+                lanes.add_u32s(below, lanes.select_u32s(is_below, one, zero))
+            });
         }
     }
 }
