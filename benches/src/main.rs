@@ -20,6 +20,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use clap::Parser;
+use regrid::with_threads;
 use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
 
 /// Counts allocations; two additions for each do not show in any time.
@@ -82,7 +83,8 @@ const BENCHES: [(&str, Bench); 2] = [("mlms", mlms::rows), ("scan", stages::rows
 
 fn run(options: &Options) -> Result<()> {
     if let Some(name) = &options.work {
-        let nodes = work::work(name, options.times)?;
+        // How work is shared out among threads would be counted, too.
+        let nodes = with_threads(1, || work::work(name, options.times))??;
         let told = ALLOCATOR.stats();
         println!("{nodes} {}", told.allocations + told.reallocations);
         return Ok(());
