@@ -26,6 +26,18 @@ struct Ways<'a> {
     shown: SyncSender<Shown>,
 }
 
+impl Ways<'_> {
+    /// Waits until all that is kept is shown: a pause is told behind the columns before it.
+    fn catch_up(&self) {
+        let (sender, shown) = sync_channel(1);
+        if self.shown.send(Shown::Awaited(sender)).is_ok() {
+            self.pulse.rest();
+            // An error is the end of those who show.
+            let _ = shown.recv();
+        }
+    }
+}
+
 /// What a column meets on its way.
 pub(super) struct Keeper<'a> {
     service: &'a Service,
@@ -142,6 +154,7 @@ impl<'a> Keeper<'a> {
                         // Somebody has been asked, and has said that it may go on.
                         self.abort.presence.restore();
                     }
+                    ways.catch_up();
                     self.note_pause(Some(reason), needs_person);
                 }
                 Ok(Fed::Resumed) => {
@@ -212,7 +225,7 @@ impl<'a> Keeper<'a> {
         for (column, kept) in batch.drain(..).zip(before + 1..) {
             self.station.update_active(|scan| scan.columns = kept);
             // Those who show have ended only for a defect, which they have told of.
-            let _ = ways.shown.send(Shown { column, kept });
+            let _ = ways.shown.send(Shown::Column { column, kept });
         }
         ways.pulse.work(self.station.longest_wait);
         Ok(())

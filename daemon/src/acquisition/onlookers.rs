@@ -1,7 +1,7 @@
 //! Showing a scan to whoever looks on: on a thread of its own, so that the journal does not wait
 //! for the range image, nor the range image for the disk.
 
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{Receiver, SyncSender};
 
 use range_image::Calibration;
 use relief_api::Event;
@@ -11,11 +11,16 @@ use super::live::Live;
 use crate::service::Service;
 use crate::station::Station;
 
-/// A column that is safe.
-pub(super) struct Shown {
-    pub(super) column: RawColumn,
-    /// Columns that are safe with it.
-    pub(super) kept: u32,
+/// Something for those who look on.
+pub(super) enum Shown {
+    /// A column that is safe.
+    Column {
+        column: RawColumn,
+        /// Columns that are safe with it.
+        kept: u32,
+    },
+    /// Somebody waits until all before this has been shown: what is told next comes behind it.
+    Awaited(SyncSender<()>),
 }
 
 /// The range image that grows, and those who are told.
@@ -54,18 +59,22 @@ impl<'a> Onlookers<'a> {
             pulse.rest();
             let Ok(shown) = kept.recv() else { return };
             pulse.work(self.station.longest_wait);
-            self.show(&shown);
+            match shown {
+                Shown::Column { column, kept } => self.show(&column, kept),
+                // Who has gone does not wait.
+                Shown::Awaited(waiting) => drop(waiting.send(())),
+            }
         }
     }
 
-    fn show(&mut self, Shown { column, kept }: &Shown) {
+    fn show(&mut self, column: &RawColumn, kept: u32) {
         let live = self.live.push(column.calibrated(&self.calibration));
         if self.service.hub.has_listeners() {
             let scan = self.station.active_scan();
             self.service.hub.tell(Event::Column {
                 scan: self.id.to_owned(),
                 scanner: self.station.name().to_owned(),
-                columns: *kept,
+                columns: kept,
                 columns_planned: scan.map_or(0, |scan| scan.columns_planned),
                 samples: column.samples.len() as u32,
                 x_mm: self.calibration.x_mm(column.table_counts),

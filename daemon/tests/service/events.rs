@@ -1,4 +1,6 @@
 use relief_api::{Event, PlanRequest, Scan, ScanState, StartScan, path};
+use scanner_driver::{Pause, ScannerError};
+use scanner_protocol::Faults;
 
 use crate::fake::{COLUMNS, SAMPLES};
 use crate::rig::{Rig, ended};
@@ -86,6 +88,30 @@ async fn the_stream_tells_the_whole_story_in_order() {
     );
     rig.daemon.shutdown().await;
     while events.next().await.is_some() {}
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_pause_is_told_behind_the_columns_before_it() {
+    let rig = Rig::new().await;
+    let mut events = rig.client.events().await;
+    let pause = Pause {
+        cause: ScannerError::Fault(Faults::INTERLOCK),
+        needs_person: true,
+        columns: COLUMNS - 1,
+    };
+    // All at once, so that the range image is behind with them.
+    rig.scanner.pause_after(pause.columns, pause.clone());
+    let scan = rig.start_scan("paused").await;
+    let paused = |event: &Event| match event {
+        Event::Scan(scan) if scan.state == ScanState::Paused => Some(()),
+        _ => None,
+    };
+    let (story, ()) = events.until(paused).await;
+    let columns = |event: &&Event| matches!(event, Event::Column { .. });
+    assert_eq!(story.iter().filter(columns).count(), pause.columns as usize);
+    let _: Scan = rig.client.ask(&path::scan_resume(&scan.id)).await;
+    ended(&mut events, &scan.id).await;
+    rig.daemon.shutdown().await;
 }
 
 /// Scans whose words are more than the service keeps for readers that are behind (8 MiB) and all
