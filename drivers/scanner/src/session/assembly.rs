@@ -226,6 +226,38 @@ mod tests {
     }
 
     #[test]
+    fn nothing_of_a_column_is_left_for_the_next_one() {
+        let mut assembly = Assembly::default();
+        // A long one whole, one that ends in a contradiction, one that is given up, a short one.
+        for (fragments, told) in [(3, Some(30)), (2, Some(30)), (2, None), (1, None)] {
+            for index in 0..fragments {
+                let part = ColumnFragment {
+                    fragments,
+                    ..fragment(index, index * 10, 10)
+                };
+                assert_eq!(assembly.fragment(&part, 100), Ok(true));
+            }
+            if let Some(samples) = told {
+                let end = ColumnEnd {
+                    scan_id: 1,
+                    column: 0,
+                    table_counts: 7,
+                    fragments,
+                    samples,
+                };
+                assert_eq!(assembly.end(&end, 100), Ok(()));
+                let is_true = samples == fragments * 10;
+                assert_eq!(assembly.finish(0).is_ok(), is_true);
+            } else if fragments > 1 {
+                assembly.clear();
+            }
+        }
+        assert!(assembly.is_complete());
+        let column = assembly.finish(1).unwrap();
+        assert_eq!((column.samples.len(), column.dropouts), (10, 0));
+    }
+
+    #[test]
     fn parts_that_contradict_each_other_are_refused() {
         let check = |change: fn(&mut ColumnFragment)| {
             let mut assembly = Assembly::default();
