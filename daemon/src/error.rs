@@ -182,6 +182,39 @@ pub enum ServiceError {
         /// The webhook.
         name: String,
     },
+    /// The same request is just being done.
+    #[error("a request with this Idempotency-Key is just being done")]
+    RequestUnderWay,
+    /// Another request had this key.
+    #[error("another request with this Idempotency-Key has started the scan {scan}")]
+    KeyUsed {
+        /// The scan that it started.
+        scan: String,
+    },
+    /// The scan is too large for that.
+    #[error("the scan {id} has {samples} samples: more than {most} are not regridded for showing")]
+    TooLarge {
+        /// The scan.
+        id: String,
+        /// Samples it has.
+        samples: u64,
+        /// Most samples.
+        most: u64,
+    },
+    /// So much is shown already.
+    #[error("other range images are just being made")]
+    Regridding,
+    /// The range image cannot be made.
+    #[error("scan {id}: {why}")]
+    NoImage {
+        /// The scan.
+        id: String,
+        /// Why not, and what to do.
+        why: String,
+    },
+    /// The client has gone.
+    #[error("nobody waits for the range image any more")]
+    Unwanted,
     /// The records do not work.
     #[error(transparent)]
     Store(#[from] StoreError),

@@ -4,13 +4,16 @@
 //! to. A line that says `on` is on disk before the scanner is asked, if the disk takes it.
 
 mod log;
+mod names;
+mod on_time;
 
 use std::collections::VecDeque;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
-use relief_api::{LaserEntry, LaserState, ScanState, THE_SCANNER};
+use relief_api::{LaserEntry, LaserState, ScanState};
 use scanner_driver::{DeviceStatus, InterruptedScan, ScanStream, Scanner, ScannerError};
 use scanner_protocol::{Identity, ScanPlan};
 use storage::Disk;
@@ -18,6 +21,9 @@ use storage::Disk;
 use crate::ids::now;
 use crate::service::lock;
 use log::Log;
+pub(crate) use names::end_other_logs;
+use names::file_name;
+use on_time::OnTime;
 
 /// Entries that are kept for showing; the file has all.
 pub(crate) const MOST_SHOWN: usize = 1_000;
@@ -47,6 +53,7 @@ struct Known {
     scanner: String,
     log: Log,
     entries: VecDeque<LaserEntry>,
+    on_time: OnTime,
     /// The scan that is about to begin.
     next_scan: Option<String>,
     /// The scan for whose sake the laser is on.
@@ -85,6 +92,7 @@ impl Laser {
                 scanner: scanner.to_owned(),
                 log,
                 entries,
+                on_time: OnTime::default(),
                 next_scan: None,
                 scan: None,
                 reason: None,
@@ -112,6 +120,11 @@ impl Laser {
     /// The latest entries, oldest first.
     pub(crate) fn entries(&self) -> Vec<LaserEntry> {
         lock(&self.known).entries.iter().cloned().collect()
+    }
+
+    /// How long the laser has been on since the service started.
+    pub(crate) fn on_time(&self) -> Duration {
+        lock(&self.known).on_time.total()
     }
 
     fn state(&self) -> Option<LaserState> {
@@ -269,6 +282,7 @@ impl Known {
             scanner: self.scanner.clone(),
             scan: self.scan.clone(),
         };
+        self.on_time.note(laser == LaserState::On);
         let (scanner, scan) = (&self.scanner, &entry.scan);
         match laser {
             LaserState::On => tracing::info!(scanner, cause, scan, "laser on"),
@@ -285,36 +299,6 @@ impl Known {
         self.entries.push_back(entry);
         if self.entries.len() > MOST_SHOWN {
             self.entries.pop_front();
-        }
-    }
-}
-
-/// The only scanner's log has had this name before scanners had any.
-fn file_name(scanner: &str) -> String {
-    match scanner {
-        THE_SCANNER => "laser.jsonl".to_owned(),
-        name => format!("laser-{name}.jsonl"),
-    }
-}
-
-/// The scanner whose log a file is, if it is one.
-fn scanner_of(file_name: &str) -> Option<&str> {
-    match file_name {
-        "laser.jsonl" => Some(THE_SCANNER),
-        other => other.strip_prefix("laser-")?.strip_suffix(".jsonl"),
-    }
-}
-
-/// Ends the logs of scanners that are configured no more, so that none says for ever that a
-/// laser is on.
-pub(crate) fn end_other_logs(disk: &dyn Disk, state_dir: &Path, configured: &[&str]) {
-    for entry in std::fs::read_dir(state_dir).into_iter().flatten().flatten() {
-        let file = entry.file_name();
-        let scanner = file.to_str().and_then(scanner_of);
-        if let Some(scanner) = scanner.filter(|name| !configured.contains(name))
-            && let Err(error) = Laser::open(disk, state_dir, scanner)
-        {
-            tracing::warn!(scanner, %error, "the log of a laser is left as it is");
         }
     }
 }
@@ -393,6 +377,8 @@ mod tests {
     use std::io::Write;
 
     use storage::LocalDisk;
+
+    use relief_api::THE_SCANNER;
 
     use super::*;
 

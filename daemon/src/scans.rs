@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use relief_api::{
-    Aborted, Event, Scan, ScanPreview, ScanState, ScannerLink, StartScan, WebhookEvent,
+    Aborted, Event, RequestMark, Scan, ScanPreview, ScanState, ScannerLink, StartScan, WebhookEvent,
 };
 use scanner_driver::ScannerError;
 use scanner_protocol::Identity;
@@ -21,7 +21,11 @@ use crate::station::{Reservation, Station, stop_all};
 impl Service {
     /// Starts a scan. Blocks until the scanner has said who it is, so that a scanner that
     /// is not there, or a plan that it cannot do, is refused at once.
-    pub(crate) fn start_scan(self: &Arc<Self>, request: &StartScan) -> Result<Scan, ServiceError> {
+    pub(crate) fn start_scan(
+        self: &Arc<Self>,
+        request: &StartScan,
+        mark: Option<RequestMark>,
+    ) -> Result<Scan, ServiceError> {
         self.check_running()?;
         let name = shown_name(&request.name)?;
         let station = Arc::clone(self.station(&request.scanner)?);
@@ -59,6 +63,7 @@ impl Service {
             jobs: Vec::new(),
             removed_at: None,
             put_back_at: None,
+            request: mark,
         };
         let task = Task::Begin {
             plan,
@@ -247,7 +252,7 @@ impl Service {
     }
 
     /// The scans under way.
-    fn active_scans(&self) -> impl Iterator<Item = Scan> + '_ {
+    pub(crate) fn active_scans(&self) -> impl Iterator<Item = Scan> + '_ {
         self.stations.iter().filter_map(|s| s.active_scan())
     }
 
@@ -275,6 +280,7 @@ impl Service {
         reason: Option<String>,
     ) {
         station.laser.scan_ended(state, reason.as_deref());
+        self.metrics.scan_ended(station.name(), state);
         let scan = station.update_active(|scan| {
             scan.state = state;
             scan.reason = reason;
@@ -313,13 +319,6 @@ impl Service {
         self.store
             .scan(id)?
             .ok_or_else(|| ServiceError::NoSuchScan { id: id.to_owned() })
-    }
-
-    /// All scans, newest first.
-    pub(crate) fn scans(&self) -> Result<Vec<Scan>, ServiceError> {
-        let mut scans = self.of_scans(Some)?;
-        scans.reverse();
-        Ok(scans)
     }
 
     /// Something of each of some scans as they are at this moment, oldest first.
@@ -422,6 +421,7 @@ mod tests {
             jobs: Vec::new(),
             removed_at: None,
             put_back_at: None,
+            request: None,
         };
         service.store.put_scan(&scan).unwrap();
         let header = Header {
@@ -466,7 +466,7 @@ mod tests {
             "{reason}"
         );
         let service = Arc::new(service);
-        let error = service.start_scan(&StartScan::default()).unwrap_err();
+        let error = service.start_scan(&StartScan::default(), None).unwrap_err();
         let ServiceError::Scanner { section, error } = error else {
             panic!("{error}");
         };

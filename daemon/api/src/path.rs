@@ -54,6 +54,16 @@ pub const WEBHOOKS: &str = "/v1/webhooks";
 pub const WEBHOOK_DELIVERIES: &str = "/v1/webhooks/{webhook}/deliveries";
 /// Pattern of a webhook's test.
 pub const WEBHOOK_TEST: &str = "/v1/webhooks/{webhook}/test";
+/// Pattern of a scan's range image.
+pub const SCAN_IMAGE: &str = "/v1/scans/{scan}/image";
+/// Pattern of trying other settings on a scan's range image.
+pub const SCAN_REGRID: &str = "/v1/scans/{scan}/regrid";
+/// Links that hold for a short time.
+pub const TICKETS: &str = "/v1/tickets";
+/// For Prometheus.
+pub const METRICS: &str = "/v1/metrics";
+/// All of this for programs.
+pub const OPENAPI: &str = "/v1/openapi.json";
 /// The event stream.
 pub const EVENTS: &str = "/v1/events";
 
@@ -85,6 +95,18 @@ pub fn scan_rerun(id: &str) -> String {
 #[must_use]
 pub fn scan_journal(id: &str) -> String {
     scan(id) + "/journal"
+}
+
+/// Range image of one scan.
+#[must_use]
+pub fn scan_image(id: &str) -> String {
+    scan(id) + "/image"
+}
+
+/// Trying other settings on the range image of one scan.
+#[must_use]
+pub fn scan_regrid(id: &str) -> String {
+    scan(id) + "/regrid"
 }
 
 /// One scanner.

@@ -222,7 +222,9 @@ impl<'a> Keeper<'a> {
         let before = self.journal.columns() - batch.len() as u32;
         // Where showing takes longer than measuring, the table waits in the end.
         ways.pulse.rest();
+        let metrics = &self.service.metrics;
         for (column, kept) in batch.drain(..).zip(before + 1..) {
+            metrics.column_kept(self.station.name(), column.samples.len(), column.dropouts);
             self.station.update_active(|scan| scan.columns = kept);
             // Those who show have ended only for a defect, which they have told of.
             let _ = ways.shown.send(Shown::Column { column, kept });
