@@ -361,7 +361,7 @@ async fn other_settings_are_tried_on_a_kept_scan_and_change_nothing() {
     assert_eq!(after.jobs, scan.jobs);
     for (body, kind) in [
         (r#"{"settings":{"regrid.pitch_mm":-1}}"#, "wrong-setting"),
-        (r#"{"settings":{"regrid.pitch_mm":0.0001}}"#, "no-image"),
+        (r#"{"settings":{"regrid.pitch_mm":0.001}}"#, "no-image"),
         (r#"{"most_nodes":0}"#, "wrong-query"),
         (r#"{"setting":{}}"#, "wrong-body"),
     ] {
