@@ -66,6 +66,30 @@ pub(super) async fn abort_on(
         .map(Json)
 }
 
+pub(super) async fn pause(
+    State(context): State<Context>,
+    Path(id): Path<String>,
+) -> Result<Json<Scan>, Refusal> {
+    blocking(context, move |service| service.pause_scan(&id))
+        .await
+        .map(Json)
+}
+
+pub(super) async fn pause_any(State(context): State<Context>) -> Result<Json<Scan>, Refusal> {
+    blocking(context, |service| service.pause_any())
+        .await
+        .map(Json)
+}
+
+pub(super) async fn pause_on(
+    State(context): State<Context>,
+    Path(scanner): Path<String>,
+) -> Result<Json<Scan>, Refusal> {
+    blocking(context, move |service| service.pause_on(&scanner))
+        .await
+        .map(Json)
+}
+
 pub(super) async fn resume(
     State(context): State<Context>,
     Path(id): Path<String>,
