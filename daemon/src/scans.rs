@@ -188,6 +188,90 @@ impl Service {
         })
     }
 
+    /// Has the scan of this id stand still until somebody lets it go on. The laser is off when
+    /// this returns, if the scanner can be reached.
+    pub(crate) fn pause_scan(&self, id: &str) -> Result<Scan, ServiceError> {
+        for station in &self.stations {
+            if let Some(scan) = station.active_scan().filter(|scan| scan.id == id) {
+                return self.pause(station, &scan);
+            }
+        }
+        // One that is not there is another mistake.
+        self.scan(id)?;
+        Err(ServiceError::NothingToPause {
+            scan: Some(id.to_owned()),
+        })
+    }
+
+    /// The same of the scan that is under way on this scanner.
+    pub(crate) fn pause_on(&self, scanner: &str) -> Result<Scan, ServiceError> {
+        let station = self.station(scanner)?;
+        match station.active_scan() {
+            Some(scan) => self.pause(station, &scan),
+            None => Err(ServiceError::NothingToPause { scan: None }),
+        }
+    }
+
+    /// The same of the only scan that is under way, those aside that wait for somebody already.
+    pub(crate) fn pause_any(&self) -> Result<Scan, ServiceError> {
+        let (waiting, running): (Vec<_>, Vec<_>) = self
+            .stations
+            .iter()
+            .filter_map(|station| Some((station, station.active_scan()?)))
+            .partition(|(_, scan)| scan.needs_person);
+        let meant = if running.is_empty() { waiting } else { running };
+        match meant.as_slice() {
+            [] => Err(ServiceError::NothingToPause { scan: None }),
+            [(station, scan)] => self.pause(station, scan),
+            several => Err(ServiceError::WhichRunning {
+                scans: several.iter().map(|(_, scan)| named(scan)).collect(),
+            }),
+        }
+    }
+
+    fn pause(&self, station: &Station, scan: &Scan) -> Result<Scan, ServiceError> {
+        let cannot = |why: String| ServiceError::CannotPause {
+            scan: scan.id.clone(),
+            why,
+        };
+        let config = self.config();
+        let mut scanners = config.each_scanner().into_iter();
+        if !scanners.any(|scanner| scanner.name == station.name() && scanner.config.resume) {
+            let section = station.section();
+            return Err(cannot(format!(
+                "it could not go on afterwards, since [{section}] resume is false"
+            )));
+        }
+        if scan.state == ScanState::Starting {
+            return Err(cannot(
+                "it has not begun yet; try again once it does, or abort it".to_owned(),
+            ));
+        }
+        tracing::info!(scan = %scan.id, scanner = station.name(), "asked to pause");
+        match station.pause(&scan.id) {
+            Ok(()) => {}
+            // It has ended in this very moment.
+            Err(ScannerError::NothingToPause) => {
+                return Err(ServiceError::NothingToPause {
+                    scan: Some(scan.id.clone()),
+                });
+            }
+            Err(ScannerError::CannotPause(why)) => return Err(cannot(why)),
+            Err(error @ (ScannerError::Aborted | ScannerError::Closed)) => {
+                return Err(ServiceError::scanner(station, error));
+            }
+            Err(error) => {
+                tracing::warn!(
+                    scanner = station.name(),
+                    %error,
+                    "the scan is paused, but the scanner has not said that its laser is off; it \
+                     turns it off by itself when it hears nothing (dead-man time)"
+                );
+            }
+        }
+        self.scan(&scan.id)
+    }
+
     /// Lets the paused scan of this id go on: somebody has looked. Whether it does go on is
     /// told by events.
     pub(crate) fn resume_scan(&self, id: &str) -> Result<Scan, ServiceError> {
@@ -223,12 +307,9 @@ impl Service {
         match paused.as_slice() {
             [] => Err(ServiceError::NothingToResume { scan: None }),
             [(station, scan)] => self.resume(station, scan),
-            several => {
-                let named = |(_, scan): &(_, Scan)| (scan.id.clone(), scan.scanner.clone());
-                Err(ServiceError::WhichPaused {
-                    scans: several.iter().map(named).collect(),
-                })
-            }
+            several => Err(ServiceError::WhichPaused {
+                scans: several.iter().map(|(_, scan)| named(scan)).collect(),
+            }),
         }
     }
 
@@ -337,6 +418,11 @@ impl Service {
             pick(newest.cloned().unwrap_or(kept))
         })?)
     }
+}
+
+/// A scan, and its scanner.
+fn named(scan: &Scan) -> (String, String) {
+    (scan.id.clone(), scan.scanner.clone())
 }
 
 #[cfg(test)]

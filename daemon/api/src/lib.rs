@@ -11,6 +11,7 @@
 //! | `GET /v1/scanners` | | [`ScannerList`] |
 //! | `GET /v1/scanners/{scanner}` | | [`ScannerSummary`] |
 //! | `POST /v1/scanners/{scanner}/abort` | | the scan that was running there: [`Scan`] |
+//! | `POST /v1/scanners/{scanner}/pause` | | the scan that was running there: [`Scan`] |
 //! | `POST /v1/scanners/{scanner}/resume` | | the scan that was paused there: [`Scan`] |
 //! | `GET /v1/scanners/{scanner}/laser` | | [`LaserLog`], the latest 1000 |
 //! | `GET /v1/laser` | | [`LaserLog`], the latest 1000 of all scanners |
@@ -23,8 +24,10 @@
 //! | `GET /v1/scans/{scan}/image` | [`ImageRequest`] in the query | the range image so far: [`ScanImage`] |
 //! | `POST /v1/scans/{scan}/regrid` | [`Regrid`] | what it would be otherwise, with nothing changed: [`RegridImage`] |
 //! | `GET /v1/scans/{scan}/journal` | | the kept raw columns, a `.scan` file |
+//! | `POST /v1/scans/{scan}/pause` | | [`Scan`] |
 //! | `POST /v1/scans/{scan}/resume` | | [`Scan`] |
 //! | `POST /v1/abort` | | the scans that were running, on every scanner: [`Aborted`] |
+//! | `POST /v1/pause` | | the scan that was running: [`Scan`] |
 //! | `POST /v1/resume` | | the scan that was paused: [`Scan`] |
 //! | `GET /v1/jobs` | [`Part`] in the query | [`JobList`], newest first |
 //! | `GET /v1/jobs/{job}` | | [`Job`] |

@@ -10,6 +10,8 @@ pub const SCAN_PREVIEW: &str = "/v1/scans/preview";
 pub const SCAN: &str = "/v1/scans/{scan}";
 /// Pattern of the abort of one scan.
 pub const SCAN_ABORT: &str = "/v1/scans/{scan}/abort";
+/// Pattern of the pause of one scan.
+pub const SCAN_PAUSE: &str = "/v1/scans/{scan}/pause";
 /// Pattern of letting one paused scan go on.
 pub const SCAN_RESUME: &str = "/v1/scans/{scan}/resume";
 /// Pattern of a scan's rerun.
@@ -22,12 +24,16 @@ pub const SCANNERS: &str = "/v1/scanners";
 pub const SCANNER: &str = "/v1/scanners/{scanner}";
 /// Pattern of the abort of a scanner's scan.
 pub const SCANNER_ABORT: &str = "/v1/scanners/{scanner}/abort";
+/// Pattern of the pause of a scanner's scan.
+pub const SCANNER_PAUSE: &str = "/v1/scanners/{scanner}/pause";
 /// Pattern of letting a scanner's paused scan go on.
 pub const SCANNER_RESUME: &str = "/v1/scanners/{scanner}/resume";
 /// Pattern of the log of a scanner's laser.
 pub const SCANNER_LASER: &str = "/v1/scanners/{scanner}/laser";
 /// Aborts whatever scan is running, on every scanner.
 pub const ABORT: &str = "/v1/abort";
+/// Pauses the running scan; refused where several run.
+pub const PAUSE: &str = "/v1/pause";
 /// Lets the paused scan go on; refused where several are paused.
 pub const RESUME: &str = "/v1/resume";
 /// The jobs.
@@ -79,6 +85,12 @@ pub fn scan_abort(id: &str) -> String {
     scan(id) + "/abort"
 }
 
+/// Pause of one scan.
+#[must_use]
+pub fn scan_pause(id: &str) -> String {
+    scan(id) + "/pause"
+}
+
 /// Letting one paused scan go on.
 #[must_use]
 pub fn scan_resume(id: &str) -> String {
@@ -119,6 +131,12 @@ pub fn scanner(name: &str) -> String {
 #[must_use]
 pub fn scanner_abort(name: &str) -> String {
     scanner(name) + "/abort"
+}
+
+/// Pause of a scanner's scan.
+#[must_use]
+pub fn scanner_pause(name: &str) -> String {
+    scanner(name) + "/pause"
 }
 
 /// Letting a scanner's paused scan go on.

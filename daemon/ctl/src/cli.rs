@@ -7,7 +7,7 @@ use clap::{Parser, Subcommand};
 
 use crate::command::{
     abort, change, compare, convert, demo, doctor, features, fetch, fill, jobs, laser, manual,
-    rerun, resume, scan, scans, skin, status, surface, token, toolpath, watch, webhooks,
+    pause, rerun, resume, scan, scans, skin, status, surface, token, toolpath, watch, webhooks,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
@@ -41,6 +41,7 @@ pub(crate) enum Command {
     Toolpath(toolpath::Args),
     Scan(scan::Args),
     Abort(abort::Args),
+    Pause(pause::Args),
     Resume(resume::Args),
     Status(status::Args),
     Scans(scans::Args),

@@ -56,6 +56,7 @@ fn the_schemas_are_schemas() {
         "demo",
         "scan",
         "abort",
+        "pause",
         "resume",
         "status",
         "scans",

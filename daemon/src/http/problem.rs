@@ -120,6 +120,17 @@ impl From<ServiceError> for Refusal {
                         .into(),
                 ),
             ),
+            ServiceError::NothingToPause { .. } => (S::CONFLICT, "nothing-to-pause", None),
+            ServiceError::CannotPause { .. } => (S::CONFLICT, "cannot-pause", None),
+            ServiceError::WhichRunning { .. } => (
+                S::CONFLICT,
+                "which-scan",
+                Some(
+                    "name the scanner that is to stop (--scanner) or its scan; `relief abort` ends \
+                     all of them"
+                        .into(),
+                ),
+            ),
             ServiceError::NoSuchJob { .. } => (
                 S::NOT_FOUND,
                 "no-such-job",

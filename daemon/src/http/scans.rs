@@ -129,6 +129,39 @@ pub(super) async fn abort_on(
         .map(Json)
 }
 
+/// Has the scan stand still between two columns, with the laser off, until it is resumed.
+#[utoipa::path(post, path = path::SCAN_PAUSE, tag = "scans", operation_id = "pause_scan", params(("scan" = String, Path, description = "Id of the scan")),
+    responses((status = 200, body = Scan), (status = 404, response = Problems), (status = 409, response = Problems), (status = 502, response = Problems), (status = 503, response = Problems), (status = 504, response = Problems)))]
+pub(super) async fn pause(
+    State(context): State<Context>,
+    Path(id): Path<String>,
+) -> Result<Json<Scan>, Refusal> {
+    blocking(context, move |service| service.pause_scan(&id))
+        .await
+        .map(Json)
+}
+
+/// Pauses the only scan that is running.
+#[utoipa::path(post, path = path::PAUSE, tag = "scans", operation_id = "pause_any_scan",
+    responses((status = 200, body = Scan), (status = 409, response = Problems), (status = 502, response = Problems), (status = 503, response = Problems), (status = 504, response = Problems)))]
+pub(super) async fn pause_any(State(context): State<Context>) -> Result<Json<Scan>, Refusal> {
+    blocking(context, |service| service.pause_any())
+        .await
+        .map(Json)
+}
+
+/// Pauses a scanner's scan.
+#[utoipa::path(post, path = path::SCANNER_PAUSE, tag = "scanners", operation_id = "pause_scan_on", params(("scanner" = String, Path, description = "Name of the scanner")),
+    responses((status = 200, body = Scan), (status = 404, response = Problems), (status = 409, response = Problems), (status = 502, response = Problems), (status = 503, response = Problems), (status = 504, response = Problems)))]
+pub(super) async fn pause_on(
+    State(context): State<Context>,
+    Path(scanner): Path<String>,
+) -> Result<Json<Scan>, Refusal> {
+    blocking(context, move |service| service.pause_on(&scanner))
+        .await
+        .map(Json)
+}
+
 /// Lets a paused scan go on: a person has looked.
 #[utoipa::path(post, path = path::SCAN_RESUME, tag = "scans", operation_id = "resume_scan", params(("scan" = String, Path, description = "Id of the scan")),
     responses((status = 200, body = Scan), (status = 404, response = Problems), (status = 409, response = Problems), (status = 502, response = Problems), (status = 503, response = Problems), (status = 504, response = Problems)))]

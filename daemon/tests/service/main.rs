@@ -19,6 +19,7 @@ mod hostile;
 mod jobs;
 mod laser;
 mod old_state;
+mod pause;
 mod power;
 mod preview;
 mod refusals;

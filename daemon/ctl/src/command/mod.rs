@@ -17,6 +17,7 @@ pub(crate) mod manual;
 mod named;
 mod pages;
 mod part;
+pub(crate) mod pause;
 mod places;
 mod regularize;
 pub(crate) mod rerun;
@@ -53,6 +54,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Skin(args) => block_on(skin::run(args, json)),
         Command::Scan(args) => block_on(scan::run(args, json)),
         Command::Abort(args) => block_on(abort::run(args, json)),
+        Command::Pause(args) => block_on(pause::run(args, json)),
         Command::Resume(args) => block_on(resume::run(args, json)),
         Command::Status(args) => block_on(status::run(args, json)),
         Command::Scans(args) => block_on(scans::run(args, json)),
