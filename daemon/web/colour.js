@@ -2,12 +2,12 @@
 /** Colour scales, and the colours of things that are told apart. Pure: no page, no canvas. */
 
 /**
- * Anchors of a perceptually uniform scale from dark violet over teal to yellow; between them
- * colours are interpolated, which 17 anchors make invisible.
+ * Anchors of a perceptually uniform scale from dark violet over teal to yellow (viridis, by Smith and
+ * van der Walt, who gave it away); between them colours are interpolated, which nobody sees.
  */
 const HEIGHT = [
-  0x440154, 0x481567, 0x482677, 0x453781, 0x404788, 0x39568c, 0x33638d, 0x2d708e, 0x287d8e,
-  0x238a8d, 0x1f968b, 0x20a387, 0x29af7f, 0x55c667, 0x95d840, 0xdce319, 0xfde725,
+  0x440154, 0x481567, 0x482677, 0x453781, 0x404788, 0x39568c, 0x33638d, 0x2d708e, 0x287d8e, 0x238a8d,
+  0x1f968b, 0x20a387, 0x29af7f, 0x3cbb75, 0x55c667, 0x73d055, 0x95d840, 0xb8de29, 0xdce319, 0xfde725,
 ];
 
 /** From blue (behind) over near white to red (towards the camera), as in `residuals.png`. */

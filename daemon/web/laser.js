@@ -41,7 +41,7 @@ function segment(scanner) {
   const fault = h('p', { class: 'fault' });
   const symbol = h('span', { class: 'symbol' });
   const abort = h('button', { class: 'abort', type: 'button', onclick: () => askAbort(name, abort) }, icon('stop'), h('span', null, t('scan.abort')));
-  const element = h('div', { class: 'segment', role: 'group', 'aria-label': t('laser.of', { scanner: name }) },
+  const element = h('div', { class: 'segment', role: 'group', 'aria-label': name ? t('laser.of', { scanner: name }) : t('laser.title') },
     symbol, h('div', { class: 'words' }, h('p', null, title, who), why, fault), abort);
   element.update = (/** @type {any} */ scanner) => {
     const laser = laserOf(scanner);
@@ -52,14 +52,17 @@ function segment(scanner) {
     text(title, t(`laser.${laser}`));
     text(who, app.model.scanners.size > 1 ? name : '');
     const scan = scanner.scan;
-    if (!app.model.connected) text(why, t('laser.last', { state: t(`laser.${scanner.laser?.laser ?? 'unknown'}`) }));
+    if (!app.model.connected) text(why, !scanner.laser ? t('laser.not-yet') : t('laser.last', { state: t(`laser.${scanner.laser.laser}`) }));
     else text(why, scanner.laser?.cause ?? '');
     english(why);
-    const problem = scanner.problem ?? (scan?.state === 'paused' && scan.needs_person ? scan.reason : undefined);
+    const waits = scan?.state === 'paused' && scan.needs_person;
+    const problem = scanner.problem ?? (waits ? scan.reason : undefined);
     const faults = faultsIn(problem).map((name) => word('fault', name));
-    attribute(element, 'data-fault', problem ? 'true' : null);
-    text(fault, problem ? (faults.length > 0 ? `${faults.join(', ')}: ${problem}` : problem) : '');
-    abort.hidden = !underWay(scan) || !app.model.connected;
+    attribute(element, 'data-fault', scanner.problem || faults.length > 0 ? 'true' : waits ? 'waits' : null);
+    const named = faults.length > 0 ? faults.join(', ') : waits ? t('laser.waits') : '';
+    text(fault, problem ? [named, problem].filter(Boolean).join(': ') : '');
+    // On a lost line, too: the request may get through where the events do not.
+    abort.hidden = !underWay(scan);
     const key = `${laser} ${problem ?? ''}`;
     if (told.get(name) !== undefined && told.get(name) !== key) {
       announce(`${name}: ${t(`laser.${laser}`)}. ${problem ?? ''}`, laser !== 'off' || Boolean(problem));
@@ -87,10 +90,11 @@ export async function askAbort(scanner, button) {
 export function laserBar() {
   const bar = h('section', { class: 'laser', 'aria-label': t('laser.title') });
   const update = () => {
-    const scanners = [...app.model.scanners.values()];
+    // Before the first word of the service nothing is known, and that is said.
+    const scanners = app.model.scanners.size > 0 ? [...app.model.scanners.values()] : [{ name: '' }];
     keyed(bar, scanners, (scanner) => scanner.name, segment);
     const on = scanners.some((scanner) => laserOf(scanner) === 'on');
-    document.title = on ? `\u26a0 ${t('laser.on')} \u2013 Relief` : !app.model.connected && scanners.length > 0
+    document.title = on ? `\u26a0 ${t('laser.on')} \u2013 Relief` : !app.model.connected && app.model.scanners.size > 0
       ? `${t('connection.lost')} \u2013 Relief` : 'Relief';
   };
   on('change', update);

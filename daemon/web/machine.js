@@ -187,7 +187,7 @@ function scanPanel(which) {
     resume.hidden = scan?.state !== 'paused' || !active;
     abort.hidden = !active;
     start.disabled = !able;
-    for (const element of [resume, abort]) if (element.getAttribute('aria-busy') !== 'true') element.disabled = !able;
+    if (resume.getAttribute('aria-busy') !== 'true') resume.disabled = !able;
     if (pause.getAttribute('aria-busy') !== 'true') pause.disabled = !able || scan?.state !== 'scanning';
     link.hidden = !scanner;
     if (scanner) {

@@ -17,11 +17,27 @@ export class Orbit {
     this.fieldDeg = 28;
   }
 
-  /** Looks at a ball from where it stands. @param {Vector} centre @param {number} radius */
-  fit(centre, radius) {
-    this.centre = [...centre];
-    this.radius = Math.max(radius, 1e-6);
-    this.distance = (this.radius * 1.08) / Math.sin((this.fieldDeg * Math.PI) / 360);
+  /**
+   * Looks at vertices from where it stands, so that all of them are seen and fill the picture.
+   * @param {Float32Array[]} positions @param {number} aspect width over height
+   */
+  fit(positions, aspect) {
+    const { low, high } = box(positions);
+    this.centre = [0, 1, 2].map((k) => (low[k] + high[k]) / 2);
+    this.radius = Math.max(Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]) / 2, 1e-6);
+    // In the middle of what is seen, which is not the middle of the box.
+    const { x, y, z } = this.axes;
+    const seen = box(positions, (from) => [dot(from, x), dot(from, y), dot(from, z)]);
+    const [right, up] = [0, 1].map((k) => (seen.low[k] + seen.high[k]) / 2);
+    const depth = dot(this.centre, z);
+    for (let k = 0; k < 3; k += 1) this.centre[k] = x[k] * right + y[k] * up + z[k] * depth;
+    const [fx, fy] = this.focal(aspect);
+    this.distance = this.radius * 1e-3;
+    box(positions, (from) => {
+      const beside = Math.max(Math.abs(dot(from, x) - right) * fx, Math.abs(dot(from, y) - up) * fy);
+      this.distance = Math.max(this.distance, dot(from, z) - depth + beside / 0.92);
+      return from;
+    });
   }
 
   /** @param {number} turnDeg @param {number} tiltDeg */
@@ -141,18 +157,22 @@ export function meets(ray, position, indices) {
   return nearest;
 }
 
-/** A ball around positions. @param {Float32Array[]} positions @returns {{centre: Vector, radius: number}} */
-export function ball(positions) {
-  const low = [Infinity, Infinity, Infinity];
-  const high = [-Infinity, -Infinity, -Infinity];
+/**
+ * The box around vertices, each of which may be seen in another frame.
+ * @param {Float32Array[]} positions @param {(from: Vector) => Vector} [seen]
+ * @returns {{low: Vector, high: Vector}}
+ */
+export function box(positions, seen = (from) => from) {
+  /** @type {Vector} */ const low = [Infinity, Infinity, Infinity];
+  /** @type {Vector} */ const high = [-Infinity, -Infinity, -Infinity];
   for (const position of positions) {
-    for (let k = 0; k < position.length; k += 1) {
-      low[k % 3] = Math.min(low[k % 3], position[k]);
-      high[k % 3] = Math.max(high[k % 3], position[k]);
+    for (let k = 0; k + 2 < position.length; k += 3) {
+      const at = seen([position[k], position[k + 1], position[k + 2]]);
+      for (let r = 0; r < 3; r += 1) {
+        low[r] = Math.min(low[r], at[r]);
+        high[r] = Math.max(high[r], at[r]);
+      }
     }
   }
-  if (!(high[0] >= low[0])) return { centre: [0, 0, 0], radius: 1 };
-  /** @type {Vector} */
-  const centre = [0, 1, 2].map((k) => (low[k] + high[k]) / 2);
-  return { centre, radius: Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]) / 2 || 1 };
+  return high[0] >= low[0] ? { low, high } : { low: [-1, -1, -1], high: [1, 1, 1] };
 }

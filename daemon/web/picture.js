@@ -10,6 +10,9 @@ import { fixed } from './format.js';
 
 const MARGIN = { left: 46, right: 10, top: 10, bottom: 30 };
 
+/** How much larger than usual letters are: canvases follow the page. */
+export const letters = () => parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
+
 let count = 0;
 
 export class RangePicture {
@@ -214,10 +217,11 @@ export class RangePicture {
     const xMax = Math.max(bounds.xMax, this.planMm?.[1] ?? -Infinity);
     // In tens, so that the picture does not jump with each column.
     const [yMin, yMax] = this.planMm ? [Math.floor(bounds.yMin / 10) * 10, Math.ceil(bounds.yMax / 10) * 10] : [bounds.yMin, bounds.yMax];
-    const inner = { w: width - MARGIN.left - MARGIN.right, h: height - MARGIN.top - MARGIN.bottom };
+    const em = letters();
+    const inner = { w: width - (MARGIN.left + MARGIN.right) * em, h: height - (MARGIN.top + MARGIN.bottom) * em };
     const perMm = Math.min(inner.w / (xMax - xMin), inner.h / (yMax - yMin));
-    const x0 = MARGIN.left + (inner.w - (xMax - xMin) * perMm) / 2 - xMin * perMm;
-    const y0 = MARGIN.top + (inner.h + (yMax - yMin) * perMm) / 2 + yMin * perMm;
+    const x0 = MARGIN.left * em + (inner.w - (xMax - xMin) * perMm) / 2 - xMin * perMm;
+    const y0 = MARGIN.top * em + (inner.h + (yMax - yMin) * perMm) / 2 + yMin * perMm;
     this.shown = { x0, y0, perMm };
     const sx = (/** @type {number} */ x) => x0 + x * perMm;
     const sy = (/** @type {number} */ y) => y0 - y * perMm;
@@ -296,16 +300,17 @@ export function axes(g, box, sx, sy, ink, line) {
   g.lineWidth = 1;
   g.strokeRect(Math.round(left) + 0.5, Math.round(top) + 0.5, Math.round(right - left) - 1, Math.round(bottom - top) - 1);
   g.fillStyle = ink;
-  g.font = '11px system-ui, sans-serif';
+  const em = letters();
+  g.font = `${11.5 * em}px system-ui, sans-serif`;
   g.textAlign = 'center';
   g.textBaseline = 'top';
-  for (const x of ticks(box.xMin, box.xMax, (right - left) / 70)) {
+  for (const x of ticks(box.xMin, box.xMax, (right - left) / (70 * em))) {
     g.fillRect(Math.round(sx(x)), bottom, 1, 4);
-    g.fillText(fixed(x, x % 1 === 0 ? 0 : 1), sx(x), bottom + 6);
+    g.fillText(fixed(x, x % 1 === 0 ? 0 : 1), sx(x), bottom + 6 * em);
   }
   g.textAlign = 'right';
   g.textBaseline = 'middle';
-  for (const y of ticks(box.yMin, box.yMax, (bottom - top) / 50)) {
+  for (const y of ticks(box.yMin, box.yMax, (bottom - top) / (45 * em))) {
     g.fillRect(left - 4, Math.round(sy(y)), 4, 1);
     g.fillText(fixed(y, y % 1 === 0 ? 0 : 1), left - 7, sy(y));
   }

@@ -113,6 +113,9 @@ function page(scan, kept, open, state) {
     ]);
     if (state.gone) return;
     after.show(Lattice.of(image));
+    // The figures of the scan as it was come from the same place, once, so that they compare.
+    if (base?.noise_mm === undefined) base = await post(`/v1/scans/${at(scan.id)}/regrid`, { settings: {}, most_nodes: MOST_NODES }).catch(() => base);
+    if (state.gone) return;
     fill(compared, comparison(base, image));
     fill(numbers, told instanceof Error ? trouble(told) : [h('h3', null, t('try.next-scan')), previewFacts(told)]);
   });
@@ -130,11 +133,11 @@ function comparison(base, image) {
   const row = (/** @type {string} */ key, /** @type {string} */ before, /** @type {string} */ after) => h('tr', null, h('th', { scope: 'row' }, t(key)), h('td', { class: 'figure number' }, before), h('td', { class: 'figure number' }, after));
   const none = fixed(null, 0);
   return h('section', { class: 'panel', 'aria-label': t('try.compared') }, h('h2', null, t('try.compared')), h('table', null,
-    h('thead', null, h('tr', null, h('th', { scope: 'col' }, t('try.figure')), h('th', { scope: 'col' }, t('try.before')), h('th', { scope: 'col' }, t('try.after')))),
+    h('thead', null, h('tr', null, h('th', { scope: 'col' }, t('try.figure')), h('th', { scope: 'col', class: 'number' }, t('try.before')), h('th', { scope: 'col', class: 'number' }, t('try.after')))),
     h('tbody', null,
       row('summary.pitch', base ? `${fixed(base.pitch_mm, 3)} mm` : none, `${fixed(image.pitch_mm, 3)} mm`),
       row('summary.nodes', base ? nodes(base).toLocaleString() : none, nodes(image).toLocaleString()),
       row('summary.noise', base?.noise_mm === undefined ? none : `${fixed(base.noise_mm, 4)} mm`, `${fixed(image.noise_mm, 4)} mm`),
       row('summary.inliers', base?.inlier_share === undefined ? none : `${fixed(100 * base.inlier_share, 1)} %`, image.inlier_share === null || image.inlier_share === undefined ? none : `${fixed(100 * image.inlier_share, 1)} %`),
-      row('try.seconds', none, seconds(image.seconds)))));
+      row('try.seconds', base?.seconds === undefined ? none : seconds(base.seconds), seconds(image.seconds)))));
 }

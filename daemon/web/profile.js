@@ -4,7 +4,7 @@
 import { on, t } from './app.js';
 import { attribute, h, text } from './dom.js';
 import { fixed } from './format.js';
-import { axes } from './picture.js';
+import { axes, letters } from './picture.js';
 
 /** @typedef {import('./lattice.js').Lattice} Lattice */
 
@@ -60,13 +60,14 @@ export class Profile {
     const room = Math.max(0.05, (most - least) * 0.06);
     [least, most] = [least - room, most + room];
     const { yMin, yMax } = lattice.bounds;
-    const [left, right, top, bottom] = [46, width - 10, 8, height - 24];
+    const em = letters();
+    const [left, right, top, bottom] = [46 * em, width - 10 * em, 8 * em, height - 24 * em];
     const sy = (/** @type {number} */ y) => left + ((y - yMin) / (yMax - yMin)) * (right - left);
     const sz = (/** @type {number} */ z) => bottom - ((z - least) / (most - least)) * (bottom - top);
     const style = getComputedStyle(this.frame);
     axes(g, { xMin: yMin, xMax: yMax, yMin: least, yMax: most }, sy, sz, style.getPropertyValue('--picture-ink'), style.getPropertyValue('--picture-line'));
     g.strokeStyle = style.getPropertyValue('--accent');
-    g.lineWidth = 1.6;
+    g.lineWidth = 1.6 * em;
     g.lineJoin = 'round';
     g.beginPath();
     let drawn = false;

@@ -21,8 +21,8 @@ const PICTURES = ['range.png', 'regions.png', 'residuals.png', 'inliers.png'];
 
 /** @param {string} result name of the folder in the spool */
 export function openResult(result) {
-  const content = h('div', null, h('p', { class: 'dim' }, t('list.asking')));
-  const element = h('div', { class: 'view' }, content);
+  const content = h('div', { class: 'view' }, h('p', { class: 'dim' }, t('list.asking')));
+  const element = content;
   /** @type {{close: () => void}[]} */
   const open = [];
   const state = { gone: false };

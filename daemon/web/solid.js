@@ -5,7 +5,7 @@ import { on, t, word } from './app.js';
 import { KINDS, kindColour, regionColour, deviationColour } from './colour.js';
 import { fill, h, icon } from './dom.js';
 import { fixed } from './format.js';
-import { Orbit, STANDARD_VIEWS, ball, meets } from './orbit.js';
+import { Orbit, STANDARD_VIEWS, meets } from './orbit.js';
 import { EDGES, Scene, edgeColour, facesOf } from './scene.js';
 
 /** @typedef {import('./scene.js').Face} Face */
@@ -21,7 +21,11 @@ export class Solid {
     this.faces = facesOf(glb);
     this.camera = new Orbit();
     this.selected = -1;
-    this.options = { faces: true, edges: true, points: false, by: /** @type {'kind' | 'region'} */ ('kind') };
+    // Where all faces are of one kind, only regions tell them apart.
+    const kinds = new Set(this.faces.map(({ kind }) => kind));
+    this.options = { faces: true, edges: true, points: false, by: /** @type {'kind' | 'region'} */ (kinds.size > 1 ? 'kind' : 'region') };
+    /** The next picture is to show all of it; how, the size of the picture decides. */
+    this.fitted = true;
     this.hasPoints = glb.primitives.some(({ mode }) => mode === 0);
     this.pending = false;
     this.canvas = h('canvas', { role: 'img', 'aria-label': t('solid.alt', { count: this.faces.length }) });
@@ -55,8 +59,7 @@ export class Solid {
   }
 
   fit() {
-    const { centre, radius } = ball(this.glb.primitives.filter(({ mode }) => mode === 4).map(({ attributes }) => attributes.POSITION));
-    this.camera.fit(centre, radius);
+    this.fitted = true;
     this.draw();
   }
 
@@ -76,7 +79,7 @@ export class Solid {
       });
       return name === 'points' && !this.hasPoints ? null : h('span', { class: 'tick' }, input, h('label', { for: `solid-${name}` }, t(`solid.${name}`)));
     };
-    const by = h('select', { 'aria-label': t('solid.by') }, ['kind', 'region'].map((one) => h('option', { value: one }, t(`solid.by-${one}`))));
+    const by = h('select', { 'aria-label': t('solid.by') }, ['kind', 'region'].map((one) => h('option', { value: one, selected: one === this.options.by }, t(`solid.by-${one}`))));
     by.addEventListener('change', () => {
       this.options.by = by.value;
       this.tell();
@@ -174,6 +177,8 @@ export class Solid {
       const [width, height] = [this.frame.clientWidth, this.frame.clientHeight].map((size) => Math.round(size * ratio));
       if (width === 0 || height === 0) return;
       if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
+      if (this.fitted) this.camera.fit(this.faces.map(({ position }) => position), width / height);
+      this.fitted = false;
       const style = getComputedStyle(this.frame);
       this.scene.draw(this.camera, {
         ...this.options, selected: this.selected, background: style.getPropertyValue('--stage').trim(), outline: style.getPropertyValue('--stage-ink').trim(),

@@ -78,7 +78,7 @@ export function regionCard(report, region) {
 
 /** @param {any} report */
 export function regionTable(report) {
-  const column = (/** @type {string} */ key) => h('th', { scope: 'col' }, t(key));
+  const column = (/** @type {string} */ key, number = false) => h('th', { scope: 'col', class: number ? 'number' : null }, t(key));
   const rows = report.regions.list.map((/** @type {any} */ region) => {
     const swatch = h('span', { class: 'swatch', 'aria-hidden': 'true' });
     swatch.style.background = kindColour(region.kind);
@@ -87,5 +87,5 @@ export function regionTable(report) {
       h('td', { class: 'figure number' }, fixed(region.area_mm2, 1)), h('td', { class: 'figure number' }, fixed(region.rms_mm, 4)), h('td', { class: 'figure number' }, fixed(region.max_mm, 4)), h('td', { class: 'figure number' }, region.nodes.toLocaleString()));
   });
   return h('div', { class: 'scroll', tabindex: '0', role: 'group', 'aria-label': t('result.regions') }, h('table', null, h('thead', null, h('tr', null,
-    column('region.label'), column('region.kind'), column('region.parameters'), column('region.area-unit'), column('region.rms-unit'), column('region.max-unit'), column('region.nodes'))), h('tbody', null, rows)));
+    column('region.label'), column('region.kind'), column('region.parameters'), column('region.area-unit', true), column('region.rms-unit', true), column('region.max-unit', true), column('region.nodes', true))), h('tbody', null, rows)));
 }
