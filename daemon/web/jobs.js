@@ -20,8 +20,7 @@ export function openJobs() {
   const paged = pagedList({ path: '/v1/jobs', kind: 'job', title: t('nav.jobs'), empty: t('jobs.empty'), row: () => jobRow((job) => paged.put(job)) });
   const off = on('event', (event) => {
     if (event.kind !== 'progress') return;
-    const element = [...paged.list.children].find((/** @type {any} */ row) => row.key === String(event.job));
-    /** @type {any} */ (element)?.advance(event);
+    paged.rowOf(event.job)?.advance(event);
   });
   return {
     element: paged.element,
@@ -77,6 +76,7 @@ function jobRow(changed) {
   };
   let shown = '';
   element.update = (/** @type {any} */ given) => {
+    if (given === job) return;
     const key = JSON.stringify(given);
     if (key === shown) return;
     shown = key;

@@ -29,8 +29,7 @@ async function begin() {
   const saved = localStorage.getItem('relief.language') ?? '';
   const language = LANGUAGES.includes(saved) ? saved : choose(navigator.languages);
   document.documentElement.lang = language;
-  const english = strings('en');
-  app.words = new Words(language, language === 'en' ? await english : await strings(language), await english);
+  app.words = new Words(language, await strings(language));
 
   const views = {
     machine: openMachine, scans: openScans, jobs: openJobs, result: openResult, preview: openPreview, room: openRoom,

@@ -12,7 +12,6 @@ const PAGE = 50;
  * @param {{
  *   path: string, kind: 'scan' | 'job', title: string, empty: string,
  *   row: () => HTMLElement & {update: (item: any) => void},
- *   refresh?: (list: HTMLElement) => void, before?: Node | null,
  * }} options
  */
 export function pagedList({ path, kind, title, empty, row, before = null }) {
@@ -30,11 +29,28 @@ export function pagedList({ path, kind, title, empty, row, before = null }) {
 
   /** Newest first: numbers by size, names by the time that they begin with. @param {any} a @param {any} b */
   const order = (a, b) => (typeof a.id === 'number' ? b.id - a.id : a.id < b.id ? 1 : -1);
+  /** Rows by id. @type {Map<string, any>} */
+  const rows = new Map();
+  const made = (/** @type {any} */ item) => {
+    const element = row();
+    rows.set(String(item.id), element);
+    return element;
+  };
   const show = () => {
     const sorted = [...items.values()].sort(order);
-    keyed(list, sorted, (item) => String(item.id), row);
+    keyed(list, sorted, (item) => String(item.id), made);
     more.hidden = next === undefined;
     text(count, sorted.length === 0 ? '' : t(next === undefined ? 'list.all' : 'list.some', { count: sorted.length }));
+  };
+  let pending = false;
+  /** Many events at once are shown once. */
+  const showSoon = () => {
+    if (pending) return;
+    pending = true;
+    requestAnimationFrame(() => {
+      pending = false;
+      show();
+    });
   };
   /** @param {{limit: number, before?: string | number}} page */
   const fetchPage = async ({ limit, before }) => {
@@ -62,14 +78,15 @@ export function pagedList({ path, kind, title, empty, row, before = null }) {
       const { kind: _, ...item } = event;
       items.set(String(item.id), item);
       fill(said);
-      show();
+      showSoon();
     }),
     on('again', begin),
   ];
   begin();
   return {
     element,
-    list,
+    /** @param {string | number} id @returns {any} its row, if it is shown */
+    rowOf: (id) => rows.get(String(id)),
     /** @param {any} item */
     put: (item) => {
       items.set(String(item.id), item);

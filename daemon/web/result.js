@@ -165,5 +165,5 @@ function files(result, entry, manifest) {
   return h('ul', { class: 'files' }, entry.files.map((/** @type {any} */ file) => h('li', null,
     fileLink(spoolPath(result, file.name), file.name, file.name),
     h('span', { class: 'figure' }, bytes(file.bytes)),
-    sums.has(file.name) ? h('code', { class: 'sum', 'aria-label': `SHA-256 ${sums.get(file.name)}` }, sums.get(file.name)) : h('span', { class: 'dim' }, file.name === 'manifest.json' ? t('result.manifest') : ''))));
+    sums.has(file.name) ? h('span', { class: 'sum' }, 'SHA-256 ', h('code', null, sums.get(file.name))) : h('span', { class: 'dim' }, file.name === 'manifest.json' ? t('result.manifest') : ''))));
 }

@@ -16,8 +16,7 @@ export function openScans() {
   const paged = pagedList({ path: '/v1/scans', kind: 'scan', title: t('nav.scans'), empty: t('scans.empty'), row: scanRow });
   // Columns are told of without the scan; the rows of those under way follow them.
   const off = on('live', (event) => {
-    const element = [...paged.list.children].find((/** @type {any} */ row) => row.key === event.scan);
-    /** @type {any} */ (element)?.advance(event.columns, event.columns_planned);
+    paged.rowOf(event.scan)?.advance(event.columns, event.columns_planned);
   });
   return {
     element: paged.element,
@@ -45,7 +44,11 @@ function scanRow() {
     bar.update(planned > 0 ? taken / planned : 0, columns.textContent ?? '');
   };
   let shown = '';
+  /** @type {any} */
+  let latest = null;
   element.update = (/** @type {any} */ scan) => {
+    if (scan === latest) return;
+    latest = scan;
     const key = JSON.stringify(scan);
     if (key === shown) return;
     shown = key;

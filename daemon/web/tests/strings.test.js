@@ -49,11 +49,17 @@ test('nothing is put into the page but as text, and nothing comes from elsewhere
 });
 
 test('modules stay short, and the page small', () => {
-  let total = 0;
-  for (const name of [...sources, 'index.html', 'style.css', 'views.css', 'icon.svg', 'strings/en.json', 'strings/ko.json']) {
+  let code = 0;
+  for (const name of [...sources, 'index.html', 'style.css', 'views.css', 'icon.svg']) {
     const text = read(name);
-    total += Buffer.byteLength(text);
-    if (!name.endsWith('.json')) assert.ok(text.split('\n').length <= 360, name);
+    code += Buffer.byteLength(text);
+    assert.ok(text.split('\n').length <= 360, name);
   }
-  assert.ok(total < 220_000, `${total} bytes`);
+  // One language is fetched.
+  for (const language of ['en', 'ko']) assert.ok(code + Buffer.byteLength(read(`strings/${language}.json`)) < 250_000, `${code} bytes`);
+});
+
+test('all modules are asked for at once, and none that is not there', () => {
+  const named = [...read('index.html').matchAll(/\/assets\/(\w+\.js)/g)].map(([, name]) => name);
+  assert.deepEqual([...new Set(named)].sort(), sources.toSorted());
 });
