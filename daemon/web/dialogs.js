@@ -45,7 +45,7 @@ export function confirm({ title, text, action, danger = false, symbol = 'warning
 
 /** The words of an error, its hint included. @param {unknown} error @returns {HTMLElement} */
 export function trouble(error) {
-  if (!(error instanceof ApiError)) return h('p', { class: 'trouble' }, icon('warning'), h('span', null, String(error)));
+  if (!(error instanceof ApiError)) return h('p', { class: 'trouble' }, icon('warning'), h('span', null, error instanceof Error ? error.message : String(error)));
   if (error.status === 0) return h('p', { class: 'trouble' }, icon('warning'), h('span', null, t('error.no-answer')));
   const hint = error.hint ? h('span', { class: 'hint' }, error.hint) : null;
   const words = english(h('span', null, error.message, hint));

@@ -40,7 +40,7 @@ function jobRow(changed) {
   const stages = h('ol', { class: 'stages', 'aria-label': t('jobs.stages') });
   const bar = progress(t('jobs.progress'));
   const actions = h('div', { class: 'actions' });
-  const element = h('li', { class: 'row' }, h('div', { class: 'main' }, h('div', { class: 'head' }, title, state), about, error),
+  const element = h('li', { class: 'row job' }, h('div', { class: 'main' }, h('div', { class: 'head' }, title, state), about, error),
     h('div', { class: 'amount' }, stages, bar), actions);
   /** @type {any} */
   let job = null;
@@ -48,7 +48,7 @@ function jobRow(changed) {
   let done = {};
 
   const show = (/** @type {{stage: string, fraction: number} | undefined} */ now) => {
-    const names = [...new Set([...STAGES.filter((name) => name in done || (job.state === 'running' && ALWAYS.includes(name))), ...Object.keys(done)])];
+    const names = [...new Set([...STAGES.filter((name) => name in done || (job.state === 'running' && ALWAYS.includes(name))), ...Object.keys(done), ...(now ? [now.stage] : [])])].sort((a, b) => STAGES.indexOf(a) - STAGES.indexOf(b));
     fill(stages, names.map((name) => {
       const active = job.state === 'running' && now?.stage === name && !(name in done);
       const words = name in done ? seconds(done[name]) : active ? `${Math.round(100 * now.fraction)} %` : t('jobs.to-come');

@@ -114,7 +114,7 @@ function webhook(hook, again) {
 /** Newest first; the service tells them oldest first. @param {any[]} entries */
 function laserLog(entries) {
   if (entries.length === 0) return h('p', { class: 'dim' }, t('room.no-log'));
-  const several = app.model.scanners.size > 1;
+  const several = new Set(entries.map((entry) => entry.scanner ?? '')).size > 1;
   const rows = entries.slice(-200).reverse().map((entry) => h('tr', { 'data-laser': entry.laser },
     h('td', { class: 'figure' }, when(entry.at, app.words.language)), several ? h('td', null, entry.scanner ?? '') : null,
     h('td', null, h('span', { class: 'lamp' }, icon({ on: 'beam', off: 'off' }[entry.laser] ?? 'unknown'), h('span', null, t(`laser.${entry.laser}`)))),
