@@ -43,7 +43,8 @@ function along(anchors, share) {
   const a = unpack(anchors[below]);
   const b = unpack(anchors[below + 1]);
   const t = at - below;
-  return [0, 1, 2].map((k) => Math.round(a[k] + (b[k] - a[k]) * t));
+  const mixed = [0, 1, 2].map((k) => Math.round(a[k] + (b[k] - a[k]) * t));
+  return /** @type {Rgb} */ (mixed);
 }
 
 /** @param {number} share @returns {Rgb} */
@@ -76,7 +77,7 @@ export const regionColour = (label) => PALETTE[(((label - 1) % PALETTE.length) +
 
 /** @param {string} text such as `#4c86c6` @returns {Rgb} red, green and blue, 0 to 1 */
 export function fraction(text) {
-  return unpack(parseInt(text.slice(1), 16)).map((part) => part / 255);
+  return /** @type {Rgb} */ (unpack(parseInt(text.slice(1), 16)).map((part) => part / 255));
 }
 
 /**

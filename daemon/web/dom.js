@@ -98,7 +98,7 @@ export function keyed(parent, items, key, make) {
       element.key = name;
     }
     element.update?.(item);
-    if (element === place) place = place.nextElementSibling;
+    if (place && element === place) place = place.nextElementSibling;
     else parent.insertBefore(element, place);
   }
   for (const element of there.values()) element.remove();

@@ -15,6 +15,9 @@
  * @typedef {{primitives: Primitive[], extras: Json}} Glb
  */
 
+/** Millimetres of glTF's unit, the metre. */
+const MM = 1000;
+
 const MAGIC = 0x46546c67;
 const JSON_CHUNK = 0x4e4f534a;
 const BINARY_CHUNK = 0x004e4942;
@@ -37,7 +40,6 @@ export function readGlb(buffer) {
   /** @type {Primitive[]} */
   const primitives = [];
   const extras = document.asset?.extras ?? {};
-  const metres = unitOf(extras) === 'm';
   for (const { node, matrix } of placed(document)) {
     if (node.mesh === undefined) continue;
     const mesh = document.meshes?.[node.mesh];
@@ -50,7 +52,7 @@ export function readGlb(buffer) {
       }
       const position = attributes.POSITION;
       if (!position) continue;
-      move(position, matrix, metres ? 1000 : 1);
+      move(position, matrix, MM);
       const count = position.length / 3;
       const indices = primitive.indices === undefined
         ? Uint32Array.from({ length: count }, (_, k) => k)
@@ -63,12 +65,6 @@ export function readGlb(buffer) {
     }
   }
   return { primitives, extras };
-}
-
-/** The file says that it is in millimetres, or holds glTF's own unit. @param {Json} extras */
-function unitOf(extras) {
-  const unit = extras.unit ?? extras.units ?? extras.length_unit;
-  return typeof unit === 'string' && /^(mm|milli)/i.test(unit) ? 'mm' : 'm';
 }
 
 /** @param {ArrayBuffer} buffer */

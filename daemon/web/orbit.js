@@ -23,7 +23,7 @@ export class Orbit {
    */
   fit(positions, aspect) {
     const { low, high } = box(positions);
-    this.centre = [0, 1, 2].map((k) => (low[k] + high[k]) / 2);
+    this.centre = /** @type {Vector} */ ([0, 1, 2].map((k) => (low[k] + high[k]) / 2));
     this.radius = Math.max(Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]) / 2, 1e-6);
     // In the middle of what is seen, which is not the middle of the box.
     const { x, y, z } = this.axes;
@@ -69,7 +69,7 @@ export class Orbit {
   /** Where the camera is. @returns {Vector} */
   get eye() {
     const { z } = this.axes;
-    return [0, 1, 2].map((k) => this.centre[k] + z[k] * this.distance);
+    return /** @type {Vector} */ ([0, 1, 2].map((k) => this.centre[k] + z[k] * this.distance));
   }
 
   /** From the part frame to the canvas's frame, by columns. @param {number} aspect width over height */
@@ -103,9 +103,8 @@ export class Orbit {
   ray(u, v, aspect) {
     const { x, y, z } = this.axes;
     const [fx, fy] = this.focal(aspect);
-    /** @type {Vector} */
     const to = [0, 1, 2].map((k) => (x[k] * u) / fx + (y[k] * v) / fy - z[k]);
-    return { from: this.eye, to };
+    return { from: this.eye, to: /** @type {Vector} */ (to) };
   }
 }
 

@@ -12,9 +12,9 @@ const PAGE = 50;
  * @param {{
  *   path: string, kind: 'scan' | 'job', title: string, empty: string,
  *   row: () => HTMLElement & {update: (item: any) => void},
- * }} options
+ * }} options `row` makes an empty one
  */
-export function pagedList({ path, kind, title, empty, row, before = null }) {
+export function pagedList({ path, kind, title, empty, row }) {
   const key = `${kind}s`;
   /** @type {Map<string, any>} */
   const items = new Map();
@@ -25,7 +25,7 @@ export function pagedList({ path, kind, title, empty, row, before = null }) {
   const more = h('button', { type: 'button', class: 'more', onclick: () => during(more, load) }, t('list.more'));
   more.hidden = true;
   const count = h('p', { class: 'dim count', role: 'status' });
-  const element = h('div', { class: 'view list-view' }, h('div', { class: 'head' }, h('h1', null, title), count), before, said, list, more);
+  const element = h('div', { class: 'view list-view' }, h('div', { class: 'head' }, h('h1', null, title), count), said, list, more);
 
   /** Newest first: numbers by size, names by the time that they begin with. @param {any} a @param {any} b */
   const order = (a, b) => (typeof a.id === 'number' ? b.id - a.id : a.id < b.id ? 1 : -1);

@@ -2,9 +2,9 @@
 /** The profile of a column: z over y, as a curve with gaps where nothing was measured. */
 
 import { on, t } from './app.js';
+import { axes, letters } from './axes.js';
 import { attribute, h, text } from './dom.js';
 import { fixed } from './format.js';
-import { axes, letters } from './picture.js';
 
 /** @typedef {import('./lattice.js').Lattice} Lattice */
 

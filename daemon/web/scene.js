@@ -55,15 +55,16 @@ export const EDGES = { measured: '#2f7fd0', intersected: '#8a8f94', assumed: '#d
 export const edgeColour = (kind) => EDGES[/** @type {keyof EDGES} */ (kind)] ?? EDGES.intersected;
 
 /**
- * The largest deviation that has a colour of its own: 99 of 100 nodes lie within.
+ * The largest deviation that has a colour of its own: as the file says, or what 99 of 100 nodes lie within.
  * @param {Glb} glb
  */
 export function deviationLimit(glb) {
   /** @type {number[]} */
   const sizes = [];
-  for (const { attributes } of glb.primitives) {
+  for (const { attributes, extras } of glb.primitives) {
     const deviation = attributes._DEVIATION;
     if (!deviation) continue;
+    if (Number(extras.limit_mm) > 0) return Number(extras.limit_mm);
     const step = Math.max(1, Math.floor(deviation.length / 50000));
     for (let k = 0; k < deviation.length; k += step) sizes.push(Math.abs(deviation[k]));
   }

@@ -24,6 +24,10 @@ export class Solid {
     // Where all faces are of one kind, only regions tell them apart.
     const kinds = new Set(this.faces.map(({ kind }) => kind));
     this.options = { faces: true, edges: true, points: false, by: /** @type {'kind' | 'region'} */ (kinds.size > 1 ? 'kind' : 'region') };
+    const left = glb.primitives.filter(({ mode }) => mode === 4);
+    /** What is to fill the picture: the faces, or what there is without any. */
+    this.seen = (left.length > 0 ? left : glb.primitives).map(({ attributes }) => attributes.POSITION);
+    if (left.length === 0) this.options.points = true;
     /** The next picture is to show all of it; how, the size of the picture decides. */
     this.fitted = true;
     this.hasPoints = glb.primitives.some(({ mode }) => mode === 0);
@@ -33,7 +37,8 @@ export class Solid {
       class: 'frame solid', role: 'application', tabindex: '0', 'aria-label': t('solid.title'), 'aria-describedby': 'solid-help', 'aria-roledescription': t('solid.kind'),
     }, this.canvas);
     this.legend = h('div', { class: 'legend' });
-    this.element = h('div', { class: 'picture' }, this.frame, h('p', { id: 'solid-help', class: 'help' }, t('solid.help')), this.tools(), this.legend);
+    const why = glb.extras.faces_left_out;
+    this.element = h('div', { class: 'picture' }, why ? h('p', { class: 'remark', lang: 'en' }, String(why)) : null, this.frame, h('p', { id: 'solid-help', class: 'help' }, t('solid.help')), this.tools(), this.legend);
     const gl = this.canvas.getContext('webgl2', { antialias: true, preserveDrawingBuffer: false });
     /** @type {Scene | null} */
     this.scene = gl ? new Scene(gl, glb) : null;
@@ -177,7 +182,7 @@ export class Solid {
       const [width, height] = [this.frame.clientWidth, this.frame.clientHeight].map((size) => Math.round(size * ratio));
       if (width === 0 || height === 0) return;
       if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
-      if (this.fitted) this.camera.fit(this.faces.map(({ position }) => position), width / height);
+      if (this.fitted) this.camera.fit(this.seen, width / height);
       this.fitted = false;
       const style = getComputedStyle(this.frame);
       this.scene.draw(this.camera, {
