@@ -13,6 +13,8 @@ const listeners = new Map();
 export const app = {
   model: new Model(),
   words: new Words('en', {}),
+  /** What the view is called. */
+  viewName: '',
   /** Settings that the preview hands to the next scan. @type {Record<string, unknown>} */
   nextSettings: {},
 };
@@ -49,8 +51,15 @@ let asking;
 export function askStatus(afterMs = 120) {
   clearTimeout(asking);
   asking = setTimeout(async () => {
+    const { changes } = app.model;
     try {
-      app.model.takeStatus(await get('/v1/status'));
+      const status = await get('/v1/status');
+      if (changes !== app.model.changes) {
+        // Something was told meanwhile that this answer may not know of yet.
+        askStatus(200);
+        return;
+      }
+      app.model.takeStatus(status);
       app.model.lastWordMs = Date.now();
       tell('change');
     } catch {

@@ -71,15 +71,16 @@ export function note(what) {
  * Does something that a button asks for: the button is off meanwhile, and trouble is told.
  * @template T
  * @param {HTMLButtonElement | null} button @param {() => Promise<T>} work
+ * @param {(error: unknown) => void} [told] where trouble is shown; notes lie behind a dialog
  * @returns {Promise<T | undefined>}
  */
-export async function during(button, work) {
+export async function during(button, work, told = note) {
   button?.setAttribute('aria-busy', 'true');
   if (button) button.disabled = true;
   try {
     return await work();
   } catch (error) {
-    note(error);
+    told(error);
     return undefined;
   } finally {
     if (button) button.disabled = false;

@@ -94,8 +94,8 @@ export function laserBar() {
     const scanners = app.model.scanners.size > 0 ? [...app.model.scanners.values()] : [{ name: '' }];
     keyed(bar, scanners, (scanner) => scanner.name, segment);
     const on = scanners.some((scanner) => laserOf(scanner) === 'on');
-    document.title = on ? `\u26a0 ${t('laser.on')} \u2013 Relief` : !app.model.connected && app.model.scanners.size > 0
-      ? `${t('connection.lost')} \u2013 Relief` : 'Relief';
+    const lost = !app.model.connected && app.model.scanners.size > 0;
+    document.title = [on ? `\u26a0 ${t('laser.on')}` : lost ? t('connection.lost') : '', app.viewName, 'Relief'].filter(Boolean).join(' \u2013 ');
   };
   on('change', update);
   on('connection', update);

@@ -52,7 +52,7 @@ export function openMachine(name) {
     const live = app.model.live.get(which());
     const scan = app.model.lastScan.get(which());
     picture.nothing(t(!app.model.status ? 'machine.asking' : underWay(scan) ? 'machine.no-column' : 'machine.no-scan'));
-    picture.show(live?.lattice ?? null, { planMm: live?.planMm ?? null, xMm: underWay(scan) && live ? live.xMm : null });
+    picture.show(live?.lattice ?? null, { planMm: underWay(scan) && live ? live.planMm : null, xMm: underWay(scan) && live ? live.xMm : null });
     follow();
     side.update();
     job.update();
@@ -84,10 +84,13 @@ export function openMachine(name) {
     }
     if (live.asked) return;
     live.asked = true;
-    // From the first column on nothing is missing.
-    if (live.known.length > 0 && live.known[0][0] <= 1) return;
-    if (live.columns === 0) return;
     try {
+      if (!app.model.lastScan.has(name)) {
+        // It ended while nobody listened.
+        app.model.takeScan(await get(`/v1/scans/${at(live.scan)}`));
+        tell('change');
+      }
+      if (live.whole || live.columns === 0) return;
       live.under(await get(`/v1/scans/${at(live.scan)}/image?most_nodes=${MOST_NODES}`));
       tell('change');
     } catch (error) {
@@ -96,8 +99,22 @@ export function openMachine(name) {
     }
   };
 
-  const offs = [on('change', update), on('connection', update), on('tick', () => side.update()), on('again', load)];
+  /** The latest jobs, which began before the page came. */
+  const loadJobs = async () => {
+    try {
+      for (const job of (await get('/v1/jobs?limit=20')).jobs.slice(0, 20)) app.model.takeJob(job);
+      tell('change');
+    } catch {
+      // The list of jobs says what is wrong, where it is asked for.
+    }
+  };
+  const again = () => {
+    load();
+    loadJobs();
+  };
+  const offs = [on('change', update), on('connection', update), on('tick', () => side.update()), on('again', again)];
   update();
+  loadJobs();
   return {
     element,
     close: () => {

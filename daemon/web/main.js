@@ -78,7 +78,7 @@ function listen() {
       if (kind === 'job' && before !== event.state && event.state !== 'queued') say('job', event);
       if (again || kind === 'lagged') {
         if (kind === 'lagged') askStatus();
-        for (const live of model.live.values()) live.asked = false;
+        model.missed();
         tell('again');
       }
       changed();

@@ -29,6 +29,8 @@ export class Live {
     this.rate = new Rate();
     /** An image was asked for, since the page came later than the first column. */
     this.asked = false;
+    /** Every column since the first was heard, so that no image needs to be asked for. */
+    this.whole = false;
   }
 
   /** @param {any} event @param {number} nowMs */
@@ -37,6 +39,7 @@ export class Live {
       // Under another pitch what was there means something else.
       this.lattice = new Lattice(event.pitch_mm);
     }
+    if (this.known.length === 0 && event.columns <= 1) this.whole = true;
     for (const column of event.live ?? []) this.lattice.put(column);
     this.columns = event.columns;
     this.planned = event.columns_planned;
@@ -77,6 +80,8 @@ export class Live {
 
 export class Model {
   constructor() {
+    /** Counts what events have told of scans and scanners: an answer to an earlier question is old. */
+    this.changes = 0;
     /** @type {any} */
     this.status = null;
     /** Scanners by name. @type {Map<string, any>} */
@@ -146,6 +151,11 @@ export class Model {
     }
   }
 
+  /** Events were missed: what is kept of scans under way has gaps. */
+  missed() {
+    for (const live of this.live.values()) Object.assign(live, { asked: false, whole: false });
+  }
+
   /** @param {any} job */
   takeJob(job) {
     this.jobs.set(job.id, job);
@@ -157,6 +167,7 @@ export class Model {
    * @returns {string} its kind
    */
   take(event, nowMs) {
+    if (event.kind === 'scan' || event.kind === 'scanner' || event.kind === 'status') this.changes += 1;
     switch (event.kind) {
       case 'status': {
         const { kind, ...status } = event;

@@ -3,7 +3,7 @@
 
 import { ApiError, at, get, post } from './api.js';
 import { app, t } from './app.js';
-import { during, trouble } from './dialogs.js';
+import { announce, during, trouble } from './dialogs.js';
 import { fill, h, icon } from './dom.js';
 import { fixed, seconds } from './format.js';
 import { Lattice } from './lattice.js';
@@ -64,8 +64,8 @@ function page(scan, kept, open, state) {
     openStart(app.model.named(scan.scanner));
   } }, icon('play'), h('span', null, t('try.use')));
   const rerun = h('button', { type: 'button', onclick: () => openRerun(scan, fields.value() ?? {}) }, icon('run'), h('span', null, t('try.rerun')));
-  const numbers = h('div', { class: 'outcome', 'aria-live': 'polite' });
-  const compared = h('div', { 'aria-live': 'polite' });
+  const numbers = h('div', { class: 'outcome' });
+  const compared = h('div');
   const form = h('form', { class: 'panel', novalidate: true, 'aria-label': t('try.settings') },
     h('h2', null, t('try.settings')), h('div', { class: 'field' }, h('label', { for: 'try-scan' }, t('try.scan')), which), fields.element,
     h('div', { class: 'buttons' }, show), numbers, h('div', { class: 'buttons' }, use, rerun));
@@ -117,6 +117,7 @@ function page(scan, kept, open, state) {
     if (base?.noise_mm === undefined) base = await post(`/v1/scans/${at(scan.id)}/regrid`, { settings: {}, most_nodes: MOST_NODES }).catch(() => base);
     if (state.gone) return;
     fill(compared, comparison(base, image));
+    announce(t('try.done'));
     fill(numbers, told instanceof Error ? trouble(told) : [h('h3', null, t('try.next-scan')), previewFacts(told)]);
   });
   form.addEventListener('submit', (/** @type {Event} */ event) => {

@@ -3,7 +3,7 @@
 
 import { ApiError, at, get, request, spoolPath } from './api.js';
 import { app, t, word } from './app.js';
-import { trouble } from './dialogs.js';
+import { announce, trouble } from './dialogs.js';
 import { fill, h, icon } from './dom.js';
 import { deviationImage } from './facts.js';
 import { bytes, when } from './format.js';
@@ -67,6 +67,7 @@ function page(result, entry, report, manifest, open, state) {
     scan.id ? h('a', { class: 'button', href: routeTo('preview', scan.id) }, t('scans.preview')) : null, scan.id ? rerun : null));
   const chosen = h('div', { class: 'chosen' });
   const viewer = viewers(result, names, report, open, state, (region) => {
+    if (region !== null) announce(`${t('result.region', { label: region.label })}: ${word('kind', region.kind)}`);
     fill(chosen, region === null ? h('p', { class: 'dim' }, t('result.pick')) : regionCard(report, region));
   });
   fill(chosen, h('p', { class: 'dim' }, t('result.pick')));

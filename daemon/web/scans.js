@@ -3,7 +3,7 @@
 
 import { at, post } from './api.js';
 import { app, english, on, t, tell } from './app.js';
-import { dialog, during, note } from './dialogs.js';
+import { dialog, during, note, trouble } from './dialogs.js';
 import { attribute, fill, h, icon, text } from './dom.js';
 import { when } from './format.js';
 import { chip, fileLink, progress } from './parts.js';
@@ -80,15 +80,17 @@ export function openRerun(scan, given = {}) {
   const name = field(t('start.name'), { maxlength: 100, placeholder: scan.name });
   const settings = settingFields({ ...(scan.settings ?? {}), ...given });
   const go = h('button', { type: 'submit', class: 'primary' }, icon('run'), h('span', null, t('rerun.action')));
+  const outcome = h('div', { class: 'outcome', 'aria-live': 'polite' });
+  const refuse = (/** @type {unknown} */ error) => fill(outcome, trouble(error));
   const form = h('form', { novalidate: true },
-    h('p', null, t('rerun.text', { name: scan.name })), name.element, settings.element,
+    h('p', null, t('rerun.text', { name: scan.name })), name.element, settings.element, outcome,
     h('div', { class: 'buttons' }, h('button', { type: 'button', onclick: () => element.close() }, t('dialog.back')), go));
   const element = dialog(t('rerun.title'), form);
   form.addEventListener('submit', async (/** @type {Event} */ event) => {
     event.preventDefault();
     const chosen = settings.value();
     if (!chosen) {
-      note(t('settings.wrong-line'));
+      refuse(t('settings.wrong-line'));
       return;
     }
     await during(go, async () => {
@@ -98,7 +100,7 @@ export function openRerun(scan, given = {}) {
       note(t('rerun.queued', { id: job.id }));
       tell('event', { kind: 'job', ...job });
       location.hash = routeTo('jobs');
-    });
+    }, refuse);
   });
   element.showModal();
 }

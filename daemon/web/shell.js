@@ -38,9 +38,11 @@ export function shell(views, speak) {
     const shown = route.view === 'result' ? 'jobs' : route.view;
     for (const [k, link] of links.entries()) attribute(link, 'aria-current', NAVIGATION[k] === shown ? 'page' : null);
     view?.close?.();
+    app.viewName = t(`nav.${route.view}`);
     view = views[route.view](route.argument);
     fill(main, view.element);
     scrollTo(0, 0);
+    tell('change');
     // Whoever has asked for a view goes on reading there, and not behind a link that is far above.
     if (!first) main.focus({ preventScroll: true });
     first = false;

@@ -69,6 +69,6 @@ export class SseParser {
  * @param {number} attempt from 0 @param {number} chance 0 to 1
  */
 export function backoffMs(attempt, chance) {
-  const most = Math.min(15000, 500 * 2 ** Math.min(attempt, 10));
+  const most = Math.min(5000, 500 * 2 ** Math.min(attempt, 10));
   return Math.round(most * (0.5 + 0.5 * chance));
 }

@@ -33,7 +33,14 @@ export function openStart(scanner) {
   const which = h('select', { id: 'start-scanner' }, names.map((one) => h('option', { value: one, selected: one === scanner }, one)));
   const plan = planFields();
   const settings = settingFields(app.nextSettings);
-  const outcome = h('div', { class: 'outcome', 'aria-live': 'polite' });
+  const outcome = h('div', { class: 'outcome' });
+  // Only trouble is said unasked: figures change with every letter.
+  const said = h('p', { class: 'hidden', 'aria-live': 'assertive' });
+  const refuse = (/** @type {unknown} */ error) => {
+    const words = trouble(error);
+    fill(outcome, words);
+    fill(said, words.textContent);
+  };
   const go = h('button', { class: 'primary', type: 'submit' }, icon('play'), h('span', null, t('start.action')));
   const details = (/** @type {string} */ key, /** @type {Element} */ content, open = false) => h('details', { open }, h('summary', null, t(key)), content);
   const form = h('form', { novalidate: true },
@@ -42,7 +49,7 @@ export function openStart(scanner) {
       name.element, part.element, operator.element, note.element),
     details('start.plan', plan.element),
     details('start.settings', settings.element, Object.keys(app.nextSettings).length > 0),
-    outcome,
+    outcome, said,
     h('div', { class: 'buttons' }, h('button', { type: 'button', onclick: () => element.close() }, t('dialog.back')), go));
   const element = dialog(t('start.title'), form);
 
@@ -68,14 +75,14 @@ export function openStart(scanner) {
     const mine = asked;
     const request = wish();
     if (!request) {
-      fill(outcome, trouble(t('settings.wrong-line')));
+      refuse(t('settings.wrong-line'));
       return;
     }
     try {
       const told = await post('/v1/scans/preview', request);
       if (mine === asked) fill(outcome, previewFacts(told));
     } catch (error) {
-      if (mine === asked) fill(outcome, trouble(error));
+      if (mine === asked) refuse(error);
     }
   };
   /** @type {number | undefined} */
@@ -91,7 +98,7 @@ export function openStart(scanner) {
     event.preventDefault();
     const request = wish();
     if (!request) {
-      fill(outcome, trouble(t('settings.wrong-line')));
+      refuse(t('settings.wrong-line'));
       return;
     }
     const scannerName = String(request.scanner ?? names[0] ?? '');
@@ -111,7 +118,7 @@ export function openStart(scanner) {
       element.close();
       tell('change');
       location.hash = routeTo('machine', scannerName);
-    });
+    }, refuse);
   });
   element.showModal();
   name.input.focus();

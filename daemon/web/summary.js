@@ -62,7 +62,7 @@ export function regionCard(report, region) {
   const swatch = h('span', { class: 'swatch', 'aria-hidden': 'true' });
   swatch.style.background = kindColour(region.kind);
   const worst = report?.deviations?.worst?.filter((/** @type {any} */ one) => one.region === region.label)[0];
-  return h('div', { class: 'card', role: 'status' }, h('h3', null, swatch, `${t('result.region', { label: region.label })}: ${word('kind', region.kind)}`),
+  return h('div', { class: 'card' }, h('h3', null, swatch, `${t('result.region', { label: region.label })}: ${word('kind', region.kind)}`),
     facts([
       [t('region.seen'), shape?.hollow === true ? t('region.hollow') : shape?.hollow === false ? t('region.outside') : null],
       ...parameters(region).map(({ key, text }) => /** @type {[string, string]} */ ([t(`parameter.${key}`), text])),

@@ -193,6 +193,9 @@ test('events change what is known, and a status is the whole of it', () => {
   const live = model.live.get('left');
   assert.equal(live.lattice.nodes, 15);
   assert.deepEqual(live.planMm, [-5, -0.5]);
+  assert.ok(live.whole);
+  model.missed();
+  assert.ok(!live.whole && !live.asked);
   assert.equal(live.rate.perSecond, 10);
   assert.equal(model.scanners.get('left').scan.columns, 5);
   model.take({ kind: 'scanner', name: 'left', link: 'trouble', endpoint: 'left', problem: 'interlock open' }, 600);
