@@ -49,7 +49,7 @@ test('an image with a step takes later columns of the fine lattice', () => {
 
 test('more nodes than are kept become fewer, each where it was', () => {
   const lattice = new Lattice(1, 1, 500);
-  for (let i = -20; i < 60; i += 1) lattice.put(column(i, -9, 40));
+  for (let i = -21; i < 59; i += 1) lattice.put(column(i, -9, 40));
   assert.ok(lattice.columns * lattice.rows <= 500 && lattice.step > 1);
   let seen = 0;
   for (let c = 0; c < lattice.columns; c += 1) {
@@ -208,6 +208,16 @@ test('events change what is known, and a status is the whole of it', () => {
   assert.equal(model.lastScan.get('left').state, 'complete');
   model.take({ kind: 'status', version: '1', scanners: [scanner('right')] }, 900);
   assert.deepEqual([...model.scanners.keys()], ['right']);
+});
+
+test('a scan that ended while nobody listened is not taken for one under way', () => {
+  const model = new Model();
+  const status = { kind: 'status', version: '1', scanners: [{ name: 'left', scan: scan('scanning', { columns: 4 }) }] };
+  model.take(status, 0);
+  assert.ok(underWay(model.lastScan.get('left')));
+  model.take({ ...status, scanners: [{ name: 'left' }] }, 100);
+  assert.equal(model.lastScan.has('left'), false);
+  assert.equal(model.live.get('left').scan, 's1');
 });
 
 test('an image that comes late lies under the columns that came before it', () => {
