@@ -33,6 +33,8 @@ export class Lattice {
     this.rows = 0;
     this.z = new Int32Array(0);
     this.nodes = 0;
+    /** Counts changes, so that whoever has drawn it knows whether it is the same still. */
+    this.version = 0;
     this.leastUm = Infinity;
     this.mostUm = -Infinity;
   }
@@ -68,6 +70,7 @@ export class Lattice {
   put(column, every = 1) {
     if (column.z_um.length === 0 || remainder(column.i - this.iRest, this.step) !== 0) return;
     const i = (column.i - this.iRest) / this.step;
+    this.version += 1;
     const stride = Math.max(1, Math.round(this.step / every));
     // The first of its nodes that the kept lattice has.
     let skip = 0;

@@ -39,6 +39,8 @@ export class RangePicture {
     /** @type {[number, number] | null} */
     this.fixedRange = null;
     this.pending = false;
+    /** What the pixels show, and how long it took to paint them. @type {any} */
+    this.painted = null;
     this.pixels = document.createElement('canvas');
     this.build();
     this.observer = new ResizeObserver(() => this.draw());
@@ -50,6 +52,7 @@ export class RangePicture {
     this.observer.disconnect();
     this.offTheme();
     clearTimeout(this.speaking);
+    clearTimeout(this.later);
   }
 
   build() {
@@ -168,7 +171,12 @@ export class RangePicture {
   /** Limits of the colours, millimetres. @returns {[number, number] | null} */
   colourRange() {
     if (this.fixedRange) return this.fixedRange;
-    const range = this.lattice?.range(this.deviation ? 0.005 : 0.002);
+    const lattice = this.lattice;
+    if (!lattice) return null;
+    if (this.known?.lattice !== lattice || this.known.version !== lattice.version) {
+      this.known = { lattice, version: lattice.version, range: lattice.range(this.deviation ? 0.005 : 0.002) };
+    }
+    const { range } = this.known;
     if (!range) return null;
     let [least, most] = [range[0] * this.factor, range[1] * this.factor];
     if (this.deviation) {
@@ -223,10 +231,9 @@ export class RangePicture {
     this.shown = { x0, y0, perMm };
     const sx = (/** @type {number} */ x) => x0 + x * perMm;
     const sy = (/** @type {number} */ y) => y0 - y * perMm;
-    const range = this.colourRange() ?? [0, 1];
-    this.paintPixels(range);
+    const { range, box } = this.paintPixels();
     g.imageSmoothingEnabled = false;
-    g.drawImage(this.pixels, sx(bounds.xMin), sy(bounds.yMax), (bounds.xMax - bounds.xMin) * perMm, (bounds.yMax - bounds.yMin) * perMm);
+    g.drawImage(this.pixels, sx(box.xMin), sy(box.yMax), (box.xMax - box.xMin) * perMm, (box.yMax - box.yMin) * perMm);
     const style = getComputedStyle(this.frame);
     const [ink, line] = [style.getPropertyValue('--picture-ink'), style.getPropertyValue('--picture-line')];
     axes(g, { xMin, xMax, yMin, yMax }, sx, sy, ink, line);
@@ -240,15 +247,35 @@ export class RangePicture {
     this.paintBar(range, style);
   }
 
-  /** @param {[number, number]} range */
-  paintPixels(range) {
+  /**
+   * Paints the pixels where they are of before. A large image that grows is painted as often as leaves the
+   * page three quarters of its time.
+   * @returns {{range: [number, number], box: Lattice['bounds']}} what they show
+   */
+  paintPixels() {
     const lattice = /** @type {Lattice} */ (this.lattice);
+    const before = this.painted;
+    const now = performance.now();
+    if (before?.lattice === lattice && before.fixedRange === this.fixedRange) {
+      if (before.version === lattice.version) return before;
+      const wait = before.at + 3 * before.cost - now;
+      if (wait > 0) {
+        clearTimeout(this.later);
+        this.later = setTimeout(() => this.draw(), wait);
+        return before;
+      }
+    }
+    const range = this.colourRange() ?? [0, 1];
     Object.assign(this.pixels, { width: lattice.columns, height: lattice.rows });
     const g = this.pixels.getContext('2d');
-    if (!g) return;
-    const image = g.createImageData(lattice.columns, lattice.rows);
-    lattice.paint(new Uint32Array(image.data.buffer), this.colours, range[0] / this.factor, range[1] / this.factor);
-    g.putImageData(image, 0, 0);
+    if (g) {
+      const image = g.createImageData(lattice.columns, lattice.rows);
+      lattice.paint(new Uint32Array(image.data.buffer), this.colours, range[0] / this.factor, range[1] / this.factor);
+      g.putImageData(image, 0, 0);
+    }
+    const at = performance.now();
+    this.painted = { lattice, version: lattice.version, fixedRange: this.fixedRange, range, box: lattice.bounds, at, cost: at - now };
+    return this.painted;
   }
 
   /** @param {[number, number]} range @param {CSSStyleDeclaration} style */

@@ -20,9 +20,12 @@ export class Profile {
     this.i = null;
     /** @type {number | null} */
     this.yMm = null;
-    this.observer = new ResizeObserver(() => this.paint());
+    /** What is drawn. */
+    this.shown = '';
+    this.pending = false;
+    this.observer = new ResizeObserver(() => this.draw());
     this.observer.observe(this.frame);
-    this.offTheme = on('theme', () => this.paint());
+    this.offTheme = on('theme', () => this.draw());
   }
 
   close() {
@@ -32,8 +35,19 @@ export class Profile {
 
   /** @param {Lattice | null} lattice @param {number | null} i @param {number | null} yMm */
   show(lattice, i, yMm) {
-    Object.assign(this, { lattice, i, yMm });
-    this.paint();
+    const key = `${i} ${yMm} ${lattice?.version}`;
+    if (lattice === this.lattice && key === this.shown) return;
+    Object.assign(this, { lattice, i, yMm, shown: key });
+    this.draw();
+  }
+
+  draw() {
+    if (this.pending) return;
+    this.pending = true;
+    requestAnimationFrame(() => {
+      this.pending = false;
+      this.paint();
+    });
   }
 
   paint() {

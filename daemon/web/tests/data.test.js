@@ -161,6 +161,10 @@ test('a ray through a place of the picture meets what is drawn there', () => {
       const ray = camera.ray(u / w, v / w, aspect);
       const far = meets(ray, positions[0], Uint32Array.from([0, 1, 2]));
       [x, y, z].forEach((part, k) => assert.ok(Math.abs(ray.from[k] + far * ray.to[k] - part) < 1e-3));
+      for (const [dx, dy] of [[45, 0], [-45, 0], [0, 40], [0, -40], [-25, 12], [25, 12]]) {
+        const [a, b, , c] = project(x + dx, y + dy, z);
+        assert.equal(meets(camera.ray(a / c, b / c, aspect), positions[0], Uint32Array.from([0, 1, 2])), Infinity, `beside it by ${dx}, ${dy}`);
+      }
       assert.equal(meets({ from: ray.from, to: ray.to.map((part) => -part) }, positions[0], Uint32Array.from([0, 1, 2])), Infinity);
     }
   }
