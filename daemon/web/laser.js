@@ -59,6 +59,7 @@ function segment(scanner) {
     const problem = scanner.problem ?? (waits ? scan.reason : undefined);
     const faults = faultsIn(problem).map((name) => word('fault', name));
     attribute(element, 'data-fault', scanner.problem || faults.length > 0 ? 'true' : waits ? 'waits' : null);
+    why.hidden = Boolean(problem) && why.textContent === problem;
     const named = faults.length > 0 ? faults.join(', ') : waits ? t('laser.waits') : '';
     text(fault, problem ? [named, problem].filter(Boolean).join(': ') : '');
     // On a lost line, too: the request may get through where the events do not.

@@ -200,12 +200,14 @@ function scanPanel(which) {
     table.update(active && same?.xMm !== null && same?.xMm !== undefined ? `x ${fixed(same.xMm, 2)} mm` : fixed(null, 0));
     const able = app.model.connected && Boolean(scanner);
     start.hidden = active;
-    pause.hidden = !active || scan?.state === 'paused';
+    // One that would go on by itself can be made to wait for a person, too.
+    const pausable = scan?.state === 'scanning' || (scan?.state === 'paused' && !scan.needs_person);
+    pause.hidden = !active || (scan?.state === 'paused' && !pausable);
     resume.hidden = scan?.state !== 'paused' || !active;
     abort.hidden = !active;
     start.disabled = !able;
     if (resume.getAttribute('aria-busy') !== 'true') resume.disabled = !able;
-    if (pause.getAttribute('aria-busy') !== 'true') pause.disabled = !able || scan?.state !== 'scanning';
+    if (pause.getAttribute('aria-busy') !== 'true') pause.disabled = !able || !pausable;
     link.hidden = !scanner;
     if (scanner) {
       linkChip.update(app.model.connected ? scanner.link : 'unknown');
