@@ -450,7 +450,8 @@ fn the_demo_leaves_the_deliverables_and_nothing_else() {
             "report.html",
             "report.json",
             "report.pdf",
-            "residuals.png"
+            "residuals.png",
+            "view.glb"
         ]
     );
     assert_eq!(fs::read_dir(&temporary).unwrap().count(), 0);
