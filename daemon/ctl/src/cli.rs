@@ -6,8 +6,8 @@ use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    abort, change, compare, convert, demo, doctor, features, fetch, fill, jobs, laser, manual,
-    rerun, resume, scan, scans, skin, status, surface, token, toolpath, watch, webhooks,
+    abort, change, compare, config, convert, demo, doctor, features, fetch, fill, jobs, laser,
+    manual, rerun, resume, scan, scans, skin, status, surface, token, toolpath, watch, webhooks,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
@@ -53,6 +53,7 @@ pub(crate) enum Command {
     Laser(laser::Args),
     Token(token::Args),
     Webhooks(webhooks::Args),
+    Config(config::Args),
     Doctor(doctor::Args),
     Manual(manual::Args),
 }
