@@ -3,6 +3,7 @@
 pub(crate) mod abort;
 pub(crate) mod change;
 pub(crate) mod compare;
+pub(crate) mod config;
 pub(crate) mod convert;
 pub(crate) mod demo;
 pub(crate) mod doctor;
@@ -69,6 +70,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Laser(args) => block_on(laser::run(args, json)),
         Command::Token(args) => block_on(token::run(args, json)),
         Command::Webhooks(args) => block_on(webhooks::run(args, json)),
+        Command::Config(args) => config::run(args, json),
         Command::Manual(args) => manual::run(&args, json),
     }
 }
