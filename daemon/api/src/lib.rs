@@ -54,6 +54,7 @@ mod image;
 mod job;
 mod laser;
 mod list;
+mod object;
 pub mod path;
 mod preview;
 mod problem;

@@ -46,7 +46,10 @@ pub struct StartScan {
     #[serde(skip_serializing_if = "String::is_empty")]
     pub scanner: String,
     /// What to measure, where it differs from the configured plan.
-    #[serde(skip_serializing_if = "PlanRequest::is_empty")]
+    #[serde(
+        skip_serializing_if = "PlanRequest::is_empty",
+        deserialize_with = "crate::object::only"
+    )]
     pub plan: PlanRequest,
     /// How to process, where it differs from the configuration.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -305,6 +308,11 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(error.contains("unknown field `operater`"), "{error}");
+        let list = r#"{"plan":[null,null]}"#;
+        let error = serde_json::from_str::<StartScan>(list).unwrap_err();
+        assert!(error.to_string().contains("expected an object"), "{error}");
+        let plan: StartScan = serde_json::from_str(r#"{"plan":{"pitch_mm":0.5}}"#).unwrap();
+        assert_eq!(plan.plan.pitch_mm, Some(0.5));
         let request: StartScan = serde_json::from_str("{}").unwrap();
         assert_eq!(request, StartScan::default());
         assert_eq!(serde_json::to_string(&request).unwrap(), "{}");

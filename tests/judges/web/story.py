@@ -297,7 +297,8 @@ class Story:
         """How soon something is seen, and how much is sent for it."""
         with self.open() as opened:
             page = opened.page
-            page.wait_for_timeout(2000)
+            expect(page.get_by_role("button", name="Start scan")).to_be_enabled()
+            page.wait_for_function("performance.getEntriesByName('first-contentful-paint')[0]")
             paint_ms, sent = page.evaluate(
                 """() => [
                     performance.getEntriesByName('first-contentful-paint')[0].startTime,
