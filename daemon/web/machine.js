@@ -247,7 +247,7 @@ function jobPanel(which) {
       const words = now ? `${word('stage', now.stage)} ${Math.round(100 * now.fraction)} %` : '';
       bar.update(now?.fraction ?? 0, words);
       return h('div', { class: 'job-now' }, h('div', { class: 'head' },
-        job.state === 'done' ? h('a', { href: routeTo('result', job.result) }, t('jobs.open', { name: job.name })) : h('span', null, job.name), state),
+        job.state === 'done' ? h('a', { href: routeTo('result', job.result), 'aria-label': t('jobs.open', { name: job.name }) }, job.name) : h('span', null, job.name), state),
       job.state === 'running' ? [bar, h('p', { class: 'dim small' }, words || t('jobs.begins'))] : null,
       job.error ? english(h('p', { class: 'dim small' }, job.error)) : null);
     }), h('a', { class: 'more', href: routeTo('jobs') }, t('machine.all-jobs')));
