@@ -9,6 +9,7 @@ import { clock, fixed } from './format.js';
 import { askAbort } from './laser.js';
 import { Live, underWay } from './model.js';
 import { chip, progress, reading, tablist } from './parts.js';
+import { patient } from './patience.js';
 import { RangePicture } from './picture.js';
 import { Profile } from './profile.js';
 import { routeTo } from './route.js';
@@ -91,7 +92,8 @@ export function openMachine(name) {
         tell('change');
       }
       if (live.whole || live.columns === 0) return;
-      live.under(await get(`/v1/scans/${at(live.scan)}/image?most_nodes=${MOST_NODES}`));
+      const path = `/v1/scans/${at(live.scan)}/image?most_nodes=${MOST_NODES}`;
+      live.under(await patient(() => get(path), () => element.isConnected));
       tell('change');
     } catch (error) {
       // Columns that were removed, or a service that has no images, leave the picture empty.
