@@ -10,14 +10,13 @@ use std::time::Duration;
 use axum::Router;
 use scanner_driver::{Scanner, ScannerError};
 use storage::{Disk, LocalDisk, create_dir_all};
-use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
 use crate::acquisition::watch;
 use crate::config::{Config, HttpConfig, Reloaded};
 use crate::error::ServiceError;
 use crate::events::Hub;
-use crate::http::{Context, ListenError, on_loopback, on_socket, serve};
+use crate::http::{ListenError, on_loopback, on_socket, serve};
 use crate::jobs::work;
 use crate::laser::LaserLogError;
 use crate::service::{Kept, Service, remove_if_there};
@@ -181,7 +180,7 @@ impl Daemon {
         let stations = make_all(&config, scanners, &hub, &*disk)?;
         let offered = inherited.or_bind(&config.service).await?;
         let workers = config.queue.workers;
-        let limits = config.http;
+        let limits = Arc::new(config.http.clone());
         let kept = Kept {
             disk,
             store,
@@ -197,11 +196,6 @@ impl Daemon {
         service.measure_free();
 
         let stop = CancellationToken::new();
-        let context = Context {
-            service: Arc::clone(&service),
-            stop: stop.clone(),
-            listeners: Arc::new(Semaphore::new(limits.listeners)),
-        };
         let mut daemon = Self {
             service,
             stop,
@@ -214,9 +208,13 @@ impl Daemon {
         daemon.start_threads(workers).map_err(StartError::Thread)?;
         // Nothing can fail any more that would end the service, and nobody can ask for a scan yet.
         daemon.service.take_up_scans(cut_short);
-        daemon.serve(offered.unix, on_socket(&context), limits);
+        daemon.serve(
+            offered.unix,
+            on_socket(&daemon.service, &daemon.stop),
+            Arc::clone(&limits),
+        );
         if let Some(tcp) = offered.tcp {
-            daemon.serve(tcp, on_loopback(&context), limits);
+            daemon.serve(tcp, on_loopback(&daemon.service, &daemon.stop), limits);
         }
         tracing::info!(socket = %daemon.socket.display(), "reliefd {} is ready", env!("CARGO_PKG_VERSION"));
         Ok(daemon)
@@ -248,7 +246,7 @@ impl Daemon {
         webhooks::begin_all(&self.service)
     }
 
-    fn serve<L>(&mut self, listener: L, app: Router, limits: HttpConfig)
+    fn serve<L>(&mut self, listener: L, app: Router, limits: Arc<HttpConfig>)
     where
         L: axum::serve::Listener,
         L::Addr: std::fmt::Debug,

@@ -113,11 +113,31 @@ pub enum ServiceError {
         scan: Option<String>,
     },
     /// It could be any of them.
-    #[error(
-        "several scans are paused: {}",
-        .scans.iter().map(|(id, scanner)| format!("{id} on {scanner}")).collect::<Vec<_>>().join(", ")
-    )]
+    #[error("several scans are paused: {}", each(.scans))]
     WhichPaused {
+        /// Each scan, and its scanner.
+        scans: Vec<(String, String)>,
+    },
+    /// No scan runs that could be paused.
+    #[error("{}", match .scan {
+        Some(scan) => format!("the scan {scan} is not running"),
+        None => "no scan is running".to_owned(),
+    })]
+    NothingToPause {
+        /// The scan that was meant.
+        scan: Option<String>,
+    },
+    /// It could not go on afterwards, or has not begun.
+    #[error("the scan {scan} cannot be paused: {why}")]
+    CannotPause {
+        /// The scan.
+        scan: String,
+        /// Why not.
+        why: String,
+    },
+    /// It could be any of them.
+    #[error("several scans are running: {}", each(.scans))]
+    WhichRunning {
         /// Each scan, and its scanner.
         scans: Vec<(String, String)>,
     },
@@ -182,6 +202,39 @@ pub enum ServiceError {
         /// The webhook.
         name: String,
     },
+    /// The same request is just being done.
+    #[error("a request with this Idempotency-Key is just being done")]
+    RequestUnderWay,
+    /// Another request had this key.
+    #[error("another request with this Idempotency-Key has started the scan {scan}")]
+    KeyUsed {
+        /// The scan that it started.
+        scan: String,
+    },
+    /// The scan is too large for that.
+    #[error("the scan {id} has {samples} samples: more than {most} are not regridded for showing")]
+    TooLarge {
+        /// The scan.
+        id: String,
+        /// Samples it has.
+        samples: u64,
+        /// Most samples.
+        most: u64,
+    },
+    /// So much is shown already.
+    #[error("other range images are just being made")]
+    Regridding,
+    /// The range image cannot be made.
+    #[error("scan {id}: {why}")]
+    NoImage {
+        /// The scan.
+        id: String,
+        /// Why not, and what to do.
+        why: String,
+    },
+    /// The client has gone.
+    #[error("nobody waits for the range image any more")]
+    Unwanted,
     /// The records do not work.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -224,6 +277,14 @@ fn the_scanner(name: &str) -> String {
 
 fn are(list: &[String]) -> &'static str {
     if list.len() == 1 { "is" } else { "are" }
+}
+
+/// Scans with their scanners, in words.
+fn each(scans: &[(String, String)]) -> String {
+    let named = scans
+        .iter()
+        .map(|(id, scanner)| format!("{id} on {scanner}"));
+    named.collect::<Vec<_>>().join(", ")
 }
 
 /// A size for people.

@@ -1,7 +1,10 @@
 //! Telling subscribers what happens, without ever waiting for one.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::fmt;
+use std::str::FromStr;
 use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 use relief_api::Event;
 use tokio::sync::watch;
@@ -11,6 +14,11 @@ use crate::service::lock;
 /// Bytes a subscriber may be behind before it loses the oldest events: some ten seconds
 /// of a fast scan of long columns. All subscribers share these bytes.
 const BACKLOG_BYTES: usize = 8 << 20;
+/// Bytes of events that all have heard and that are kept all the same, for those who come back
+/// after their connection was lost.
+const REMEMBERED_BYTES: usize = 2 << 20;
+/// How long events are kept for somebody to come back to when nobody listens any more.
+const REMEMBERED_FOR: Duration = Duration::from_secs(60);
 /// What an event takes beside its text.
 const OVERHEAD_BYTES: usize = 128;
 /// Events that there is room for while there is none.
@@ -37,9 +45,37 @@ impl Told {
     }
 }
 
-/// What has been told lately and somebody has still to hear.
+/// A place in what is told: which event is heard next. Of another run of the service it means
+/// nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct EventId {
+    run: u64,
+    next: u64,
+}
+
+impl fmt::Display for EventId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:x}-{}", self.run, self.next)
+    }
+}
+
+impl FromStr for EventId {
+    type Err = ();
+
+    fn from_str(text: &str) -> Result<Self, ()> {
+        let (run, next) = text.split_once('-').ok_or(())?;
+        Ok(Self {
+            run: u64::from_str_radix(run, 16).map_err(drop)?,
+            next: next.parse().map_err(drop)?,
+        })
+    }
+}
+
+/// What has been told lately and somebody has still to hear, or may come back for.
 #[derive(Debug, Default)]
 struct Backlog {
+    /// Names this run of the service.
+    run: u64,
     events: VecDeque<Arc<Told>>,
     bytes: usize,
     /// Number of the first of these events, counted from the start of the service.
@@ -48,6 +84,17 @@ struct Backlog {
     places: BTreeMap<u64, u64>,
     /// The name of the next subscriber in `places`.
     newcomer: u64,
+    /// When the last subscriber went, if none is left.
+    left_alone: Option<Instant>,
+    limits: Limits,
+}
+
+/// How much is kept, and for how long.
+#[derive(Debug, Clone, Copy, Default)]
+struct Limits {
+    backlog_bytes: usize,
+    remembered_bytes: usize,
+    remembered_for: Duration,
 }
 
 impl Backlog {
@@ -56,7 +103,8 @@ impl Backlog {
         self.first + self.events.len() as u64
     }
 
-    fn push(&mut self, told: Told, limit_bytes: usize) {
+    fn push(&mut self, told: Told) {
+        let limit_bytes = self.limits.backlog_bytes;
         self.bytes += told.bytes();
         self.events.push_back(Arc::new(told));
         // The newest stays, whatever its size.
@@ -72,17 +120,43 @@ impl Backlog {
         }
     }
 
-    /// Lets go what all have heard; what nobody listens to is heard by all.
+    /// Lets go what all have heard but for the latest; what nobody listens to is heard by all.
     fn trim(&mut self) {
         let next = self.next();
         let heard = self.places.values().min().copied().unwrap_or(next);
-        while self.first < heard.min(next) {
+        while self.first < heard.min(next) && self.bytes > self.limits.remembered_bytes {
             self.pop();
         }
         if self.events.is_empty() {
             // Not to hold for good the room that one burst has taken.
             self.events.shrink_to(EMPTY_CAPACITY);
         }
+    }
+
+    /// Nobody listens, and nobody is waited for any more.
+    fn is_forgotten(&self) -> bool {
+        let alone = self
+            .left_alone
+            .is_none_or(|since| since.elapsed() >= self.limits.remembered_for);
+        self.places.is_empty() && alone
+    }
+
+    /// Once nobody is waited for: from now on events go by that are not even made, so that places
+    /// of before mean nothing any more.
+    fn forget(&mut self) {
+        self.first = self.next() + 1;
+        self.events = VecDeque::new();
+        self.bytes = 0;
+        self.left_alone = None;
+    }
+
+    /// A place from which this event is heard next.
+    fn enter(&mut self, next: u64) -> u64 {
+        let name = self.newcomer;
+        self.newcomer += 1;
+        self.places.insert(name, next);
+        self.left_alone = None;
+        name
     }
 
     fn get(&self, number: u64) -> Option<Arc<Told>> {
@@ -97,21 +171,29 @@ pub(crate) struct Hub {
     backlog: Arc<Mutex<Backlog>>,
     /// Number of the next event; a change of it wakes the subscribers.
     wake: watch::Sender<u64>,
-    limit_bytes: usize,
 }
 
 impl Default for Hub {
     fn default() -> Self {
-        Self::with_limit(BACKLOG_BYTES)
+        Self::with_limits(Limits {
+            backlog_bytes: BACKLOG_BYTES,
+            remembered_bytes: REMEMBERED_BYTES,
+            remembered_for: REMEMBERED_FOR,
+        })
     }
 }
 
 impl Hub {
-    fn with_limit(limit_bytes: usize) -> Self {
+    fn with_limits(limits: Limits) -> Self {
+        // Two runs in one millisecond would need more luck than a clock that is set back.
+        let run = jiff::Timestamp::now().as_millisecond().unsigned_abs();
         Self {
-            backlog: Arc::default(),
+            backlog: Arc::new(Mutex::new(Backlog {
+                run,
+                limits,
+                ..Backlog::default()
+            })),
             wake: watch::Sender::new(0),
-            limit_bytes,
         }
     }
 
@@ -124,18 +206,28 @@ impl Hub {
         let next = {
             let mut backlog = lock(&self.backlog);
             // The last one may just have gone.
-            if backlog.places.is_empty() {
+            if backlog.is_forgotten() {
                 return;
             }
-            backlog.push(told, self.limit_bytes);
+            backlog.push(told);
+            backlog.trim();
             backlog.next()
         };
         self.wake.send_replace(next);
     }
 
-    /// True when it is worth making an event that costs something.
+    /// True when it is worth making an event that costs something: somebody listens, or may
+    /// just have lost the connection.
     pub(crate) fn has_listeners(&self) -> bool {
-        self.wake.receiver_count() > 0
+        if self.wake.receiver_count() > 0 {
+            return true;
+        }
+        let mut backlog = lock(&self.backlog);
+        let forgotten = backlog.is_forgotten();
+        if forgotten && backlog.left_alone.is_some() {
+            backlog.forget();
+        }
+        !forgotten
     }
 
     /// Hears everything told from now on.
@@ -143,14 +235,31 @@ impl Hub {
         // In this order: what is told once there is a place wakes it.
         let wake = self.wake.subscribe();
         let mut backlog = lock(&self.backlog);
-        let (name, next) = (backlog.newcomer, backlog.next());
-        backlog.newcomer += 1;
-        backlog.places.insert(name, next);
+        if backlog.is_forgotten() && backlog.left_alone.is_some() {
+            backlog.forget();
+        }
+        let next = backlog.next();
         Subscriber {
-            name,
+            name: backlog.enter(next),
             backlog: Arc::clone(&self.backlog),
             wake,
         }
+    }
+
+    /// Hears everything told since then; `None` if not all of that is known any more.
+    pub(crate) fn resume(&self, last: EventId) -> Option<Subscriber> {
+        let wake = self.wake.subscribe();
+        let mut backlog = lock(&self.backlog);
+        let known = backlog.first..=backlog.next();
+        // With nobody waited for, events have gone by that were not even made.
+        if backlog.run != last.run || !known.contains(&last.next) || backlog.is_forgotten() {
+            return None;
+        }
+        Some(Subscriber {
+            name: backlog.enter(last.next),
+            backlog: Arc::clone(&self.backlog),
+            wake,
+        })
     }
 }
 
@@ -185,6 +294,15 @@ impl Subscriber {
         }
     }
 
+    /// Where it stands: all before that has been heard.
+    pub(crate) fn heard(&self) -> EventId {
+        let backlog = lock(&self.backlog);
+        EventId {
+            run: backlog.run,
+            next: backlog.places.get(&self.name).copied().unwrap_or_default(),
+        }
+    }
+
     fn look(&mut self) -> Option<Heard> {
         let mut backlog = lock(&self.backlog);
         let next = backlog.places.get(&self.name).copied()?;
@@ -204,93 +322,12 @@ impl Drop for Subscriber {
     fn drop(&mut self) {
         let mut backlog = lock(&self.backlog);
         backlog.places.remove(&self.name);
+        if backlog.places.is_empty() {
+            backlog.left_alone = Some(Instant::now());
+        }
         backlog.trim();
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// An event of about this many bytes.
-    fn event(number: u64, bytes: usize) -> Event {
-        Event::Progress {
-            job: number,
-            scan: "x".repeat(bytes),
-            scanner: String::new(),
-            stage: String::new(),
-            fraction: 0.0,
-            seconds: None,
-        }
-    }
-
-    #[tokio::test]
-    async fn subscribers_hear_everything_told_since_they_came() {
-        let hub = Hub::with_limit(1_000_000);
-        hub.tell(event(1, 10));
-        let mut early = hub.subscribe();
-        hub.tell(event(2, 10));
-        let mut late = hub.subscribe();
-        hub.tell(event(3, 10));
-        let heard = |number| Some(Heard::Event(Arc::new(Told::new(&event(number, 10)))));
-        assert_eq!(early.next().await, heard(2));
-        assert_eq!(early.next().await, heard(3));
-        assert_eq!(late.next().await, heard(3));
-        let (next, ()) = tokio::join!(early.next(), async { hub.tell(event(4, 10)) });
-        assert_eq!(next, heard(4));
-        drop(hub);
-        assert_eq!(late.next().await, heard(4));
-        assert_eq!(late.next().await, None);
-    }
-
-    #[tokio::test]
-    async fn the_backlog_is_bounded_in_bytes_and_losses_are_told() {
-        let hub = Hub::with_limit(100_000);
-        let mut slow = hub.subscribe();
-        for number in 0..1_000 {
-            hub.tell(event(number, 10_000));
-            assert!(lock(&hub.backlog).bytes <= 100_000);
-        }
-        let Some(Heard::Lagged(missed)) = slow.next().await else {
-            panic!("nothing was lost");
-        };
-        assert_eq!(missed, 1_000 - lock(&hub.backlog).events.len() as u64);
-        let first = Told::new(&event(missed, 10_000));
-        assert_eq!(slow.next().await, Some(Heard::Event(Arc::new(first))));
-        // One that is larger than all is still heard.
-        hub.tell(event(1_000, 200_000));
-        assert!(matches!(slow.next().await, Some(Heard::Lagged(_))));
-        let last = Told::new(&event(1_000, 200_000));
-        assert_eq!(slow.next().await, Some(Heard::Event(Arc::new(last))));
-        // Nothing is kept for nobody.
-        hub.tell(event(1_001, 10));
-        assert_ne!(lock(&hub.backlog).bytes, 0);
-        drop(slow);
-        assert_eq!(lock(&hub.backlog).bytes, 0);
-        hub.tell(event(1_001, 10));
-        assert_eq!(lock(&hub.backlog).bytes, 0);
-        let mut late = hub.subscribe();
-        hub.tell(event(1_002, 10));
-        let heard = Told::new(&event(1_002, 10));
-        assert_eq!(late.next().await, Some(Heard::Event(Arc::new(heard))));
-    }
-
-    #[tokio::test]
-    async fn what_all_have_heard_is_let_go() {
-        let hub = Hub::with_limit(1_000_000);
-        let (mut quick, mut slow) = (hub.subscribe(), hub.subscribe());
-        for number in 0..3 {
-            hub.tell(event(number, 10));
-        }
-        let kept = || lock(&hub.backlog).events.len();
-        for _ in 0..3 {
-            quick.next().await.unwrap();
-        }
-        assert_eq!(kept(), 3);
-        for heard in 1..=3 {
-            slow.next().await.unwrap();
-            assert_eq!(kept(), 3 - heard);
-        }
-        assert_eq!(lock(&hub.backlog).bytes, 0);
-    }
-}
+mod tests;

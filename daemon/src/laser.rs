@@ -4,20 +4,27 @@
 //! to. A line that says `on` is on disk before the scanner is asked, if the disk takes it.
 
 mod log;
+mod names;
+mod on_time;
+mod watched;
 
 use std::collections::VecDeque;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+use std::sync::Mutex;
+use std::time::Duration;
 
-use relief_api::{LaserEntry, LaserState, ScanState, THE_SCANNER};
-use scanner_driver::{DeviceStatus, InterruptedScan, ScanStream, Scanner, ScannerError};
-use scanner_protocol::{Identity, ScanPlan};
+use relief_api::{LaserEntry, LaserState, ScanState};
+use scanner_driver::ScannerError;
 use storage::Disk;
 
 use crate::ids::now;
 use crate::service::lock;
 use log::Log;
+pub(crate) use names::end_other_logs;
+use names::file_name;
+use on_time::OnTime;
+pub(crate) use watched::Watched;
 
 /// Entries that are kept for showing; the file has all.
 pub(crate) const MOST_SHOWN: usize = 1_000;
@@ -47,6 +54,7 @@ struct Known {
     scanner: String,
     log: Log,
     entries: VecDeque<LaserEntry>,
+    on_time: OnTime,
     /// The scan that is about to begin.
     next_scan: Option<String>,
     /// The scan for whose sake the laser is on.
@@ -61,6 +69,8 @@ struct Known {
     acts: u64,
     /// The scanner is being told to begin: what it answers meanwhile may be from before it does.
     starting: bool,
+    /// Counts what may have turned it on, so that an answer to an older request to pause is told.
+    lit: u64,
 }
 
 impl Laser {
@@ -85,6 +95,7 @@ impl Laser {
                 scanner: scanner.to_owned(),
                 log,
                 entries,
+                on_time: OnTime::default(),
                 next_scan: None,
                 scan: None,
                 reason: None,
@@ -92,6 +103,7 @@ impl Laser {
                 ended_meanwhile: false,
                 acts: 0,
                 starting: false,
+                lit: 0,
             }),
         };
         if laser.state() == Some(LaserState::On) {
@@ -114,6 +126,11 @@ impl Laser {
         lock(&self.known).entries.iter().cloned().collect()
     }
 
+    /// How long the laser has been on since the service started.
+    pub(crate) fn on_time(&self) -> Duration {
+        lock(&self.known).on_time.total()
+    }
+
     fn state(&self) -> Option<LaserState> {
         self.latest().map(|entry| entry.laser)
     }
@@ -129,15 +146,29 @@ impl Laser {
     }
 
     /// The scan under way stands still: what the laser does is not known until the scanner
-    /// says so, or measures again.
+    /// says so, or measures again. Of a pause on request it may have said so already.
     pub(crate) fn scan_paused(&self, reason: &str) {
-        self.note(LaserState::Unknown, reason);
+        let mut known = lock(&self.known);
+        known.acts += 1;
+        if !known.is(LaserState::Off) {
+            known.note(LaserState::Unknown, reason);
+        }
+    }
+
+    /// The scanner has closed the scan that somebody asked it to pause when this count was taken.
+    fn closed_for_a_pause(&self, lit: u64) {
+        let mut known = lock(&self.known);
+        if known.lit == lit {
+            known.acts += 1;
+            known.note(LaserState::Off, "paused on request");
+        }
     }
 
     /// The scan that stands still was told to go on: its last columns are measured again, and
     /// whether it does go on is seen then.
     fn told_to_go_on(&self) {
         let mut known = lock(&self.known);
+        known.lit += 1;
         if !known.is_on() {
             known.add(LaserState::Unknown, "told to go on");
         }
@@ -145,6 +176,7 @@ impl Laser {
 
     /// The scan measures again.
     pub(crate) fn scan_goes_on(&self) {
+        lock(&self.known).lit += 1;
         self.note(LaserState::On, "the scan goes on");
     }
 
@@ -194,6 +226,7 @@ impl Laser {
         let mut known = lock(&self.known);
         known.acts += 1;
         known.starting = true;
+        known.lit += 1;
         known.ended_meanwhile = false;
         known.scan = known.next_scan.take();
         known.note(LaserState::On, "a scan begins");
@@ -248,10 +281,12 @@ impl Laser {
 }
 
 impl Known {
+    fn is(&self, laser: LaserState) -> bool {
+        self.entries.back().is_some_and(|last| last.laser == laser)
+    }
+
     fn is_on(&self) -> bool {
-        self.entries
-            .back()
-            .is_some_and(|last| last.laser == LaserState::On)
+        self.is(LaserState::On)
     }
 
     /// Notes a state; one that is known already is not noted again.
@@ -269,6 +304,7 @@ impl Known {
             scanner: self.scanner.clone(),
             scan: self.scan.clone(),
         };
+        self.on_time.note(laser == LaserState::On);
         let (scanner, scan) = (&self.scanner, &entry.scan);
         match laser {
             LaserState::On => tracing::info!(scanner, cause, scan, "laser on"),
@@ -289,110 +325,17 @@ impl Known {
     }
 }
 
-/// The only scanner's log has had this name before scanners had any.
-fn file_name(scanner: &str) -> String {
-    match scanner {
-        THE_SCANNER => "laser.jsonl".to_owned(),
-        name => format!("laser-{name}.jsonl"),
-    }
-}
-
-/// The scanner whose log a file is, if it is one.
-fn scanner_of(file_name: &str) -> Option<&str> {
-    match file_name {
-        "laser.jsonl" => Some(THE_SCANNER),
-        other => other.strip_prefix("laser-")?.strip_suffix(".jsonl"),
-    }
-}
-
-/// Ends the logs of scanners that are configured no more, so that none says for ever that a
-/// laser is on.
-pub(crate) fn end_other_logs(disk: &dyn Disk, state_dir: &Path, configured: &[&str]) {
-    for entry in std::fs::read_dir(state_dir).into_iter().flatten().flatten() {
-        let file = entry.file_name();
-        let scanner = file.to_str().and_then(scanner_of);
-        if let Some(scanner) = scanner.filter(|name| !configured.contains(name))
-            && let Err(error) = Laser::open(disk, state_dir, scanner)
-        {
-            tracing::warn!(scanner, %error, "the log of a laser is left as it is");
-        }
-    }
-}
-
-/// A scanner whose laser is watched: every call that may switch it is noted.
-pub(crate) struct Watched {
-    scanner: Arc<dyn Scanner>,
-    laser: Arc<Laser>,
-}
-
-impl Watched {
-    pub(crate) fn new(scanner: Arc<dyn Scanner>, laser: Arc<Laser>) -> Self {
-        Self { scanner, laser }
-    }
-}
-
-impl Scanner for Watched {
-    fn identify(&self) -> Result<Identity, ScannerError> {
-        self.scanner.identify()
-    }
-
-    fn home(&self) -> Result<(), ScannerError> {
-        self.scanner.home()
-    }
-
-    fn status(&self) -> Result<DeviceStatus, ScannerError> {
-        let acts = lock(&self.laser.known).acts;
-        let status = self.scanner.status();
-        let answer = |laser, cause: &str| self.laser.note_answer(acts, laser, cause);
-        match &status {
-            Ok(status) if status.laser_on => {
-                answer(LaserState::On, "the scanner says that it is on");
-            }
-            Ok(_) => answer(LaserState::Off, "the scanner says that it is off"),
-            Err(error) if self.laser.state() == Some(LaserState::On) => {
-                answer(LaserState::Unknown, &error.to_string());
-            }
-            Err(_) => {}
-        }
-        status
-    }
-
-    fn start_scan(&self, plan: &ScanPlan) -> Result<ScanStream, ScannerError> {
-        self.laser.begin();
-        let started = self.scanner.start_scan(plan);
-        self.laser.begun(started.as_ref().err());
-        started
-    }
-
-    fn take_up_scan(&self, scan: InterruptedScan) -> Result<ScanStream, ScannerError> {
-        self.laser.take_up();
-        self.scanner.take_up_scan(scan).inspect_err(|error| {
-            // Not known before either, and still worth a line.
-            lock(&self.laser.known).add(LaserState::Unknown, &error.to_string());
-        })
-    }
-
-    fn resume_scan(&self) -> Result<(), ScannerError> {
-        self.scanner
-            .resume_scan()
-            .inspect(|()| self.laser.told_to_go_on())
-    }
-
-    fn abort(&self) -> Result<(), ScannerError> {
-        // Before: a scan that ends meanwhile takes its reason with it.
-        let reason = self.laser.stopping();
-        let stopped = self.scanner.abort();
-        self.laser.stopped(reason.as_deref(), &stopped);
-        stopped
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::fs::OpenOptions;
     use std::io::Write;
+    use std::sync::Arc;
 
+    use scanner_driver::{DeviceStatus, ScanStream, Scanner};
+    use scanner_protocol::{Identity, ScanPlan};
     use storage::LocalDisk;
+
+    use relief_api::THE_SCANNER;
 
     use super::*;
 
@@ -474,7 +417,7 @@ mod tests {
         assert_eq!(laser.entries()[0].scan.as_deref(), Some("s"));
     }
 
-    /// A scanner that says this to whoever resumes, and whose scan ends before it answers an
+    /// A scanner that says this to whoever pauses or resumes, and whose scan ends before it answers an
     /// abort.
     struct Said(Result<(), ScannerError>, Arc<Laser>);
 
@@ -496,6 +439,10 @@ mod tests {
         }
 
         fn resume_scan(&self) -> Result<(), ScannerError> {
+            self.0.clone()
+        }
+
+        fn pause_scan(&self) -> Result<(), ScannerError> {
             self.0.clone()
         }
 
@@ -530,6 +477,40 @@ mod tests {
         // It may have gone on before that is noted.
         watched(Ok(())).resume_scan().unwrap();
         assert_eq!(states(&laser), [On, Unknown, Unknown, On]);
+    }
+
+    #[test]
+    fn a_laser_is_off_in_a_pause_if_the_scanner_has_said_so() {
+        use LaserState::{Off, On, Unknown};
+        let paused = |said, told_first: bool| {
+            let folder = tempfile::tempdir().unwrap();
+            let laser = Arc::new(Laser::open(&LocalDisk, folder.path(), THE_SCANNER).unwrap());
+            let watched =
+                Watched::new(Arc::new(Said(said, Arc::clone(&laser))), Arc::clone(&laser));
+            laser.begin();
+            if told_first {
+                laser.scan_paused("paused on request");
+            }
+            let _ = watched.pause_scan();
+            if !told_first {
+                laser.scan_paused("paused on request");
+            }
+            laser.scan_goes_on();
+            states(&laser)
+        };
+        assert_eq!(paused(Ok(()), false), [On, Off, On]);
+        assert_eq!(paused(Ok(()), true), [On, Unknown, Off, On]);
+        let unheard = || Err(ScannerError::DeadMan);
+        assert_eq!(paused(unheard(), false), [On, Unknown, On]);
+        // What was told to go on meanwhile may have done so.
+        let folder = tempfile::tempdir().unwrap();
+        let laser = Laser::open(&LocalDisk, folder.path(), THE_SCANNER).unwrap();
+        laser.begin();
+        let lit = lock(&laser.known).lit;
+        laser.scan_paused("paused on request");
+        laser.told_to_go_on();
+        laser.closed_for_a_pause(lit);
+        assert_eq!(states(&laser), [On, Unknown, Unknown]);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use relief_api::{
-    Aborted, Event, Scan, ScanPreview, ScanState, ScannerLink, StartScan, WebhookEvent,
+    Aborted, Event, RequestMark, Scan, ScanPreview, ScanState, ScannerLink, StartScan, WebhookEvent,
 };
 use scanner_driver::ScannerError;
 use scanner_protocol::Identity;
@@ -21,7 +21,11 @@ use crate::station::{Reservation, Station, stop_all};
 impl Service {
     /// Starts a scan. Blocks until the scanner has said who it is, so that a scanner that
     /// is not there, or a plan that it cannot do, is refused at once.
-    pub(crate) fn start_scan(self: &Arc<Self>, request: &StartScan) -> Result<Scan, ServiceError> {
+    pub(crate) fn start_scan(
+        self: &Arc<Self>,
+        request: &StartScan,
+        mark: Option<RequestMark>,
+    ) -> Result<Scan, ServiceError> {
         self.check_running()?;
         let name = shown_name(&request.name)?;
         let station = Arc::clone(self.station(&request.scanner)?);
@@ -59,6 +63,7 @@ impl Service {
             jobs: Vec::new(),
             removed_at: None,
             put_back_at: None,
+            request: mark,
         };
         let task = Task::Begin {
             plan,
@@ -183,6 +188,90 @@ impl Service {
         })
     }
 
+    /// Has the scan of this id stand still until somebody lets it go on. The laser is off when
+    /// this returns, if the scanner can be reached.
+    pub(crate) fn pause_scan(&self, id: &str) -> Result<Scan, ServiceError> {
+        for station in &self.stations {
+            if let Some(scan) = station.active_scan().filter(|scan| scan.id == id) {
+                return self.pause(station, &scan);
+            }
+        }
+        // One that is not there is another mistake.
+        self.scan(id)?;
+        Err(ServiceError::NothingToPause {
+            scan: Some(id.to_owned()),
+        })
+    }
+
+    /// The same of the scan that is under way on this scanner.
+    pub(crate) fn pause_on(&self, scanner: &str) -> Result<Scan, ServiceError> {
+        let station = self.station(scanner)?;
+        match station.active_scan() {
+            Some(scan) => self.pause(station, &scan),
+            None => Err(ServiceError::NothingToPause { scan: None }),
+        }
+    }
+
+    /// The same of the only scan that is under way, those aside that wait for somebody already.
+    pub(crate) fn pause_any(&self) -> Result<Scan, ServiceError> {
+        let (waiting, running): (Vec<_>, Vec<_>) = self
+            .stations
+            .iter()
+            .filter_map(|station| Some((station, station.active_scan()?)))
+            .partition(|(_, scan)| scan.needs_person);
+        let meant = if running.is_empty() { waiting } else { running };
+        match meant.as_slice() {
+            [] => Err(ServiceError::NothingToPause { scan: None }),
+            [(station, scan)] => self.pause(station, scan),
+            several => Err(ServiceError::WhichRunning {
+                scans: several.iter().map(|(_, scan)| named(scan)).collect(),
+            }),
+        }
+    }
+
+    fn pause(&self, station: &Station, scan: &Scan) -> Result<Scan, ServiceError> {
+        let cannot = |why: String| ServiceError::CannotPause {
+            scan: scan.id.clone(),
+            why,
+        };
+        let config = self.config();
+        let mut scanners = config.each_scanner().into_iter();
+        if !scanners.any(|scanner| scanner.name == station.name() && scanner.config.resume) {
+            let section = station.section();
+            return Err(cannot(format!(
+                "it could not go on afterwards, since [{section}] resume is false"
+            )));
+        }
+        if scan.state == ScanState::Starting {
+            return Err(cannot(
+                "it has not begun yet; try again once it does, or abort it".to_owned(),
+            ));
+        }
+        tracing::info!(scan = %scan.id, scanner = station.name(), "asked to pause");
+        match station.pause(&scan.id) {
+            Ok(()) => {}
+            // It has ended in this very moment.
+            Err(ScannerError::NothingToPause) => {
+                return Err(ServiceError::NothingToPause {
+                    scan: Some(scan.id.clone()),
+                });
+            }
+            Err(ScannerError::CannotPause(why)) => return Err(cannot(why)),
+            Err(error @ (ScannerError::Aborted | ScannerError::Closed)) => {
+                return Err(ServiceError::scanner(station, error));
+            }
+            Err(error) => {
+                tracing::warn!(
+                    scanner = station.name(),
+                    %error,
+                    "the scan is paused, but the scanner has not said that its laser is off; it \
+                     turns it off by itself when it hears nothing (dead-man time)"
+                );
+            }
+        }
+        self.scan(&scan.id)
+    }
+
     /// Lets the paused scan of this id go on: somebody has looked. Whether it does go on is
     /// told by events.
     pub(crate) fn resume_scan(&self, id: &str) -> Result<Scan, ServiceError> {
@@ -218,12 +307,9 @@ impl Service {
         match paused.as_slice() {
             [] => Err(ServiceError::NothingToResume { scan: None }),
             [(station, scan)] => self.resume(station, scan),
-            several => {
-                let named = |(_, scan): &(_, Scan)| (scan.id.clone(), scan.scanner.clone());
-                Err(ServiceError::WhichPaused {
-                    scans: several.iter().map(named).collect(),
-                })
-            }
+            several => Err(ServiceError::WhichPaused {
+                scans: several.iter().map(|(_, scan)| named(scan)).collect(),
+            }),
         }
     }
 
@@ -247,7 +333,7 @@ impl Service {
     }
 
     /// The scans under way.
-    fn active_scans(&self) -> impl Iterator<Item = Scan> + '_ {
+    pub(crate) fn active_scans(&self) -> impl Iterator<Item = Scan> + '_ {
         self.stations.iter().filter_map(|s| s.active_scan())
     }
 
@@ -275,6 +361,7 @@ impl Service {
         reason: Option<String>,
     ) {
         station.laser.scan_ended(state, reason.as_deref());
+        self.metrics.scan_ended(station.name(), state);
         let scan = station.update_active(|scan| {
             scan.state = state;
             scan.reason = reason;
@@ -315,13 +402,6 @@ impl Service {
             .ok_or_else(|| ServiceError::NoSuchScan { id: id.to_owned() })
     }
 
-    /// All scans, newest first.
-    pub(crate) fn scans(&self) -> Result<Vec<Scan>, ServiceError> {
-        let mut scans = self.of_scans(Some)?;
-        scans.reverse();
-        Ok(scans)
-    }
-
     /// Something of each of some scans as they are at this moment, oldest first.
     pub(crate) fn of_scans<T>(
         &self,
@@ -338,6 +418,11 @@ impl Service {
             pick(newest.cloned().unwrap_or(kept))
         })?)
     }
+}
+
+/// A scan, and its scanner.
+fn named(scan: &Scan) -> (String, String) {
+    (scan.id.clone(), scan.scanner.clone())
 }
 
 #[cfg(test)]
@@ -422,6 +507,7 @@ mod tests {
             jobs: Vec::new(),
             removed_at: None,
             put_back_at: None,
+            request: None,
         };
         service.store.put_scan(&scan).unwrap();
         let header = Header {
@@ -466,7 +552,7 @@ mod tests {
             "{reason}"
         );
         let service = Arc::new(service);
-        let error = service.start_scan(&StartScan::default()).unwrap_err();
+        let error = service.start_scan(&StartScan::default(), None).unwrap_err();
         let ServiceError::Scanner { section, error } = error else {
             panic!("{error}");
         };

@@ -17,8 +17,10 @@ use crate::ids::{Ids, now};
 use crate::jobs::Queue;
 use crate::laser::MOST_SHOWN;
 use crate::liveness::Liveness;
+use crate::metrics::Metrics;
 use crate::space::{Measured, Promises};
 use crate::spool::Spool;
+use crate::starts::UnderWay;
 use crate::station::Station;
 use crate::store::Store;
 use crate::tokens::Tokens;
@@ -55,6 +57,12 @@ pub(crate) struct Service {
     grids: Mutex<BTreeMap<String, KeptGrid>>,
     /// Scans that are over and whose records the disk refused.
     pub(crate) unkept: Mutex<Vec<Scan>>,
+    /// What is counted.
+    pub(crate) metrics: Metrics,
+    /// Held by whoever regrids for showing.
+    pub(crate) regridding: Mutex<()>,
+    /// Keyed requests that are just being done.
+    pub(crate) starts: UnderWay,
     /// Room on the disks, as of the last look.
     pub(crate) measured: Mutex<Measured>,
     started_at: String,
@@ -100,6 +108,9 @@ impl Service {
             scans_dir,
             grids: Mutex::default(),
             unkept: Mutex::default(),
+            metrics: Metrics::default(),
+            regridding: Mutex::default(),
+            starts: UnderWay::default(),
             measured: Mutex::default(),
             started_at: now(),
             stopping: Mutex::new(false),

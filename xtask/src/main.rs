@@ -17,6 +17,7 @@ mod study;
 mod toolpath;
 mod units;
 mod vm;
+mod web;
 
 use std::ffi::OsString;
 
@@ -63,6 +64,12 @@ enum Chore {
     ///
     /// Needs Python 3; installs the judge's packages into `target/judges`.
     JudgeSolids(solids::Options),
+    /// Let a browser run the story of a scan on the web page, schemathesis ask the API for everything
+    /// that its description allows, and the integrator's examples run.
+    ///
+    /// Needs Python 3, Chromium, Node.js and Prometheus' promtool, which it installs on Debian as
+    /// root; installs the judges' packages into `target/judges/web`.
+    JudgeWeb(web::Options),
     /// Repeat the experiments of Shim & Lee 1995 and write `docs/reproduction.md`.
     ///
     /// For the figures' pictures it needs Python 3, as `judge` does; `--check` and `--print`
@@ -125,6 +132,7 @@ fn main() -> anyhow::Result<()> {
         Chore::JudgeToolpath(options) => toolpath::run(&options),
         Chore::JudgeFill(options) => fillings::run(&options),
         Chore::JudgeSolids(options) => solids::run(&options),
+        Chore::JudgeWeb(options) => web::run(&options),
         Chore::Reproduce(options) => reproduce::run(&options),
         Chore::Fuzz(options) => fuzz::run(&options),
         Chore::Study(study) => study::run(&study),
@@ -207,6 +215,10 @@ fn full() -> anyhow::Result<()> {
         })?;
     }
     solids::run(&solids::Options { parts: 500 })?;
+    web::run(&web::Options {
+        seconds: 300,
+        seed: 1,
+    })?;
     vm::run(&vm::Vm::Usb(vm::Options::default()))?;
     fuzz::run(&fuzz::Options {
         seconds: 600,

@@ -7,7 +7,7 @@ use crate::scan::Scan;
 use crate::status::{ScannerStatus, Status};
 
 /// One server-sent event. Its kind is also the `event:` field of the stream.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Event {
     /// First on every stream, so that nothing is missed between asking and listening.
@@ -101,7 +101,7 @@ impl Event {
 
 /// A finished column of the range image, for showing. Node `k` lies at
 /// `(i, j_first + k)` times the pitch.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct LiveColumn {
     /// Lattice index in x.
     pub i: i64,

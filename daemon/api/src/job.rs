@@ -8,7 +8,7 @@ use crate::scan::SettingOverrides;
 pub type JobId = u64;
 
 /// Where a job stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JobState {
     /// Waits for a worker.
@@ -44,7 +44,7 @@ impl JobState {
 }
 
 /// A job.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct Job {
     /// Its number.
     pub id: JobId,
@@ -94,6 +94,7 @@ pub struct Job {
     pub left_out: Vec<String>,
     /// Settings that differ from the configuration.
     #[serde(default, skip_serializing_if = "SettingOverrides::is_empty")]
+    #[schema(schema_with = crate::scan::settings_schema)]
     pub settings: SettingOverrides,
 }
 
@@ -103,7 +104,7 @@ fn is_zero(count: &u32) -> bool {
 }
 
 /// How long a stage took.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct StageTiming {
     /// The stage.
     pub stage: String,
@@ -112,14 +113,17 @@ pub struct StageTiming {
 }
 
 /// The jobs.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct JobList {
     /// Newest first.
     pub jobs: Vec<Job>,
+    /// There are older ones: `before` of the request for them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub next: Option<JobId>,
 }
 
 /// Asks for a kept scan to be processed again.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rerun {
     /// Names the deliverables; the scan's name if empty.
@@ -127,11 +131,12 @@ pub struct Rerun {
     pub name: String,
     /// Settings that differ from those of the scan.
     #[serde(skip_serializing_if = "SettingOverrides::is_empty")]
+    #[schema(schema_with = crate::scan::settings_schema)]
     pub settings: SettingOverrides,
 }
 
 /// A folder of the spool.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct SpoolEntry {
     /// The folder's name.
     pub result: String,
@@ -142,7 +147,7 @@ pub struct SpoolEntry {
 }
 
 /// A file of the spool.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct SpoolFile {
     /// Its name.
     pub name: String,

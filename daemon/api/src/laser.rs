@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// What is known of the laser.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LaserState {
     /// On, or about to be.
@@ -28,7 +28,7 @@ impl LaserState {
 }
 
 /// A change of the laser's state; a line of the audit log.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct LaserEntry {
     /// When, RFC 3339 in UTC.
     pub at: String,
@@ -45,7 +45,7 @@ pub struct LaserEntry {
 }
 
 /// The latest changes of the laser's state.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct LaserLog {
     /// Oldest first.
     pub entries: Vec<LaserEntry>,

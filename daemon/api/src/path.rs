@@ -10,6 +10,8 @@ pub const SCAN_PREVIEW: &str = "/v1/scans/preview";
 pub const SCAN: &str = "/v1/scans/{scan}";
 /// Pattern of the abort of one scan.
 pub const SCAN_ABORT: &str = "/v1/scans/{scan}/abort";
+/// Pattern of the pause of one scan.
+pub const SCAN_PAUSE: &str = "/v1/scans/{scan}/pause";
 /// Pattern of letting one paused scan go on.
 pub const SCAN_RESUME: &str = "/v1/scans/{scan}/resume";
 /// Pattern of a scan's rerun.
@@ -22,12 +24,16 @@ pub const SCANNERS: &str = "/v1/scanners";
 pub const SCANNER: &str = "/v1/scanners/{scanner}";
 /// Pattern of the abort of a scanner's scan.
 pub const SCANNER_ABORT: &str = "/v1/scanners/{scanner}/abort";
+/// Pattern of the pause of a scanner's scan.
+pub const SCANNER_PAUSE: &str = "/v1/scanners/{scanner}/pause";
 /// Pattern of letting a scanner's paused scan go on.
 pub const SCANNER_RESUME: &str = "/v1/scanners/{scanner}/resume";
 /// Pattern of the log of a scanner's laser.
 pub const SCANNER_LASER: &str = "/v1/scanners/{scanner}/laser";
 /// Aborts whatever scan is running, on every scanner.
 pub const ABORT: &str = "/v1/abort";
+/// Pauses the running scan; refused where several run.
+pub const PAUSE: &str = "/v1/pause";
 /// Lets the paused scan go on; refused where several are paused.
 pub const RESUME: &str = "/v1/resume";
 /// The jobs.
@@ -54,6 +60,16 @@ pub const WEBHOOKS: &str = "/v1/webhooks";
 pub const WEBHOOK_DELIVERIES: &str = "/v1/webhooks/{webhook}/deliveries";
 /// Pattern of a webhook's test.
 pub const WEBHOOK_TEST: &str = "/v1/webhooks/{webhook}/test";
+/// Pattern of a scan's range image.
+pub const SCAN_IMAGE: &str = "/v1/scans/{scan}/image";
+/// Pattern of trying other settings on a scan's range image.
+pub const SCAN_REGRID: &str = "/v1/scans/{scan}/regrid";
+/// Links that hold for a short time.
+pub const TICKETS: &str = "/v1/tickets";
+/// For Prometheus.
+pub const METRICS: &str = "/v1/metrics";
+/// All of this for programs.
+pub const OPENAPI: &str = "/v1/openapi.json";
 /// The event stream.
 pub const EVENTS: &str = "/v1/events";
 
@@ -67,6 +83,12 @@ pub fn scan(id: &str) -> String {
 #[must_use]
 pub fn scan_abort(id: &str) -> String {
     scan(id) + "/abort"
+}
+
+/// Pause of one scan.
+#[must_use]
+pub fn scan_pause(id: &str) -> String {
+    scan(id) + "/pause"
 }
 
 /// Letting one paused scan go on.
@@ -87,6 +109,18 @@ pub fn scan_journal(id: &str) -> String {
     scan(id) + "/journal"
 }
 
+/// Range image of one scan.
+#[must_use]
+pub fn scan_image(id: &str) -> String {
+    scan(id) + "/image"
+}
+
+/// Trying other settings on the range image of one scan.
+#[must_use]
+pub fn scan_regrid(id: &str) -> String {
+    scan(id) + "/regrid"
+}
+
 /// One scanner.
 #[must_use]
 pub fn scanner(name: &str) -> String {
@@ -97,6 +131,12 @@ pub fn scanner(name: &str) -> String {
 #[must_use]
 pub fn scanner_abort(name: &str) -> String {
     scanner(name) + "/abort"
+}
+
+/// Pause of a scanner's scan.
+#[must_use]
+pub fn scanner_pause(name: &str) -> String {
+    scanner(name) + "/pause"
 }
 
 /// Letting a scanner's paused scan go on.

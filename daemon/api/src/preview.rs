@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::scan::SettingOverrides;
 
 /// What a [`crate::StartScan`] would come to, with nothing moved and nothing kept.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct ScanPreview {
     /// Name of the scanner.
     pub scanner: String,
@@ -40,6 +40,7 @@ pub struct ScanPreview {
     /// The least area, seen from the camera, that becomes a face, square millimetres.
     pub least_face_mm2: f64,
     /// The settings that shape the result, those included that follow from the scan.
+    #[schema(schema_with = crate::scan::settings_schema)]
     pub settings: SettingOverrides,
     /// Room that is set aside for the columns, bytes.
     pub journal_bytes: u64,

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// The body of every error, after RFC 9457 (`application/problem+json`).
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct Problem {
     /// Names the kind of problem, stable for programs, such as `scanner-busy`.
     #[serde(rename = "type")]

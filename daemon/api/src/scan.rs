@@ -10,11 +10,24 @@ use crate::job::JobId;
 /// in the configuration file: `regrid.neighbours`, `reconstruct.tolerance_mm`.
 pub type SettingOverrides = BTreeMap<String, serde_json::Value>;
 
+/// Keys of the configuration, and values as they stand there.
+pub(crate) fn settings_schema() -> utoipa::openapi::Object {
+    use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Type};
+    ObjectBuilder::new()
+        .schema_type(Type::Object)
+        .description(Some(
+            "Settings that differ, keyed as in the configuration file: `regrid.neighbours`, \
+             `reconstruct.tolerance_mm`",
+        ))
+        .additional_properties(Some(AdditionalProperties::FreeForm(true)))
+        .build()
+}
+
 /// Most characters in the name of a scan or of a rerun.
 pub const MAX_NAME_CHARS: usize = 100;
 
 /// Asks for a scan.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StartScan {
     /// Names the deliverables; `scan` if empty. At most [`MAX_NAME_CHARS`] characters.
@@ -37,12 +50,13 @@ pub struct StartScan {
     pub plan: PlanRequest,
     /// How to process, where it differs from the configuration.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    #[schema(schema_with = crate::scan::settings_schema)]
     pub settings: SettingOverrides,
 }
 
 /// What to measure. Whatever is left out is taken from the configuration, and what that
 /// leaves out is proposed by the scanner.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PlanRequest {
     /// x of the first column in the part frame, millimetres.
@@ -109,7 +123,7 @@ impl PlanRequest {
 }
 
 /// Where a scan stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ScanState {
     /// The scanner is being prepared: found, homed.
@@ -151,7 +165,7 @@ impl ScanState {
 }
 
 /// A scan.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct Scan {
     /// Sorts by time and is safe as a file name; also the name of its folder in the spool.
     pub id: String,
@@ -194,6 +208,7 @@ pub struct Scan {
     pub columns: u32,
     /// Settings that differ from the configuration.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[schema(schema_with = crate::scan::settings_schema)]
     pub settings: SettingOverrides,
     /// Jobs that process or processed it, oldest first.
     #[serde(default)]
@@ -204,10 +219,22 @@ pub struct Scan {
     /// When columns that had been removed were found again, RFC 3339.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub put_back_at: Option<String>,
+    /// The request that started it, if that had a key of its own (`Idempotency-Key`).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub request: Option<RequestMark>,
+}
+
+/// A request that may be sent again without being done again.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
+pub struct RequestMark {
+    /// The key that the client gave it.
+    pub key: String,
+    /// SHA-256 of what it asked for: the same key with other wishes is a mistake.
+    pub sha256: String,
 }
 
 /// The service ended in the midst of a scan.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct Interruption {
     /// Since when, at the latest, nothing was measured: RFC 3339 in UTC.
     pub since: String,
@@ -218,7 +245,7 @@ pub struct Interruption {
 }
 
 /// The scans that were asked to end: read as a [`Scan`], it is the first of them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct Aborted {
     /// The first of them, in the order of the scanners.
     #[serde(flatten)]
@@ -229,10 +256,13 @@ pub struct Aborted {
 }
 
 /// The scans.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct ScanList {
     /// Newest first.
     pub scans: Vec<Scan>,
+    /// There are older ones: `before` of the request for them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub next: Option<String>,
 }
 
 #[cfg(test)]

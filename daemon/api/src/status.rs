@@ -6,7 +6,7 @@ use crate::laser::LaserEntry;
 use crate::scan::Scan;
 
 /// The service at a glance.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct Status {
     /// Version of the service.
     pub version: String,
@@ -35,7 +35,7 @@ pub struct Status {
 }
 
 /// What is kept, and what is free.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct StorageStatus {
     /// Bytes of the kept scans, as of the last look.
     pub scans_bytes: u64,
@@ -50,7 +50,7 @@ pub struct StorageStatus {
 }
 
 /// How the service stands with its scanner.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ScannerLink {
     /// Not spoken to yet.
@@ -80,7 +80,7 @@ impl ScannerLink {
 pub const THE_SCANNER: &str = "scanner";
 
 /// What is known of a scanner.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct ScannerStatus {
     /// Its name; empty from services that had but one.
     #[serde(default, skip_serializing_if = "String::is_empty")]
@@ -104,7 +104,7 @@ pub struct ScannerStatus {
 }
 
 /// A scanner at a glance.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct ScannerSummary {
     /// What is known of it.
     #[serde(flatten)]
@@ -118,7 +118,7 @@ pub struct ScannerSummary {
 }
 
 /// The scanners.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct ScannerList {
     /// In the order of their names; at least one.
     pub scanners: Vec<ScannerSummary>,

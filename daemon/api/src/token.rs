@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 pub const MAX_TOKEN_NAME_CHARS: usize = 64;
 
 /// A token that holds. What it reads itself is known to its bearer alone.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct Token {
     /// What its bearer is called.
     pub name: String,
@@ -15,14 +15,14 @@ pub struct Token {
 }
 
 /// The tokens that hold.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct TokenList {
     /// Oldest first.
     pub tokens: Vec<Token>,
 }
 
 /// Asks for a token.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct CreateToken {
     /// What its bearer shall be called.
@@ -30,7 +30,7 @@ pub struct CreateToken {
 }
 
 /// A token that was just made: the only time that it is told.
-#[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct NewToken {
     /// What its bearer is called.
     pub name: String,

@@ -7,7 +7,19 @@ use crate::scan::Scan;
 use crate::status::ScannerStatus;
 
 /// What a webhook can be told of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    utoipa::ToSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum WebhookEvent {
     /// A scan is over: complete, aborted, failed or interrupted.
@@ -53,7 +65,7 @@ impl WebhookEvent {
 }
 
 /// What is posted to a webhook.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct WebhookMessage {
     /// What happened.
     #[serde(rename = "type")]
@@ -66,7 +78,7 @@ pub struct WebhookMessage {
 }
 
 /// What a message is about; each event has its own part of it.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct WebhookData {
     /// Name of the scanner, of all but `test`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -86,7 +98,7 @@ pub struct WebhookData {
 }
 
 /// A webhook, as it is configured and as it does. Its secret is never told.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct Webhook {
     /// Its name.
     pub name: String,
@@ -106,14 +118,14 @@ pub struct Webhook {
 }
 
 /// The webhooks.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct WebhookList {
     /// In the order of the configuration.
     pub webhooks: Vec<Webhook>,
 }
 
 /// Where a message stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DeliveryState {
     /// Has not been taken yet, and is tried again.
@@ -140,7 +152,7 @@ impl DeliveryState {
 }
 
 /// A message to a webhook, and what became of it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct Delivery {
     /// Its id, `webhook-id` of every attempt: whoever has got it twice sees it by that. It follows
     /// from what it tells of, and when that happened.
@@ -165,7 +177,7 @@ pub struct Delivery {
 }
 
 /// An attempt to deliver a message.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct DeliveryAttempt {
     /// When it began, RFC 3339 in UTC.
     pub at: String,
@@ -184,7 +196,7 @@ pub struct DeliveryAttempt {
 }
 
 /// The log of a webhook: all messages that wait, and the latest of the others.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct DeliveryList {
     /// Newest first.
     pub deliveries: Vec<Delivery>,

@@ -6,8 +6,9 @@ use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    abort, change, compare, convert, demo, doctor, features, fetch, fill, jobs, laser, manual,
-    rerun, resume, scan, scans, skin, status, surface, token, toolpath, watch, webhooks,
+    abort, change, compare, config, convert, demo, doctor, features, fetch, fill, jobs, laser,
+    manual, pause, rerun, resume, scan, scans, skin, status, surface, token, toolpath, watch,
+    webhooks,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
@@ -41,6 +42,7 @@ pub(crate) enum Command {
     Toolpath(toolpath::Args),
     Scan(scan::Args),
     Abort(abort::Args),
+    Pause(pause::Args),
     Resume(resume::Args),
     Status(status::Args),
     Scans(scans::Args),
@@ -53,6 +55,7 @@ pub(crate) enum Command {
     Laser(laser::Args),
     Token(token::Args),
     Webhooks(webhooks::Args),
+    Config(config::Args),
     Doctor(doctor::Args),
     Manual(manual::Args),
 }

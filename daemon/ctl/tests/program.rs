@@ -307,6 +307,23 @@ fn scattered_dots_are_no_part_and_the_user_learns_why() {
 }
 
 #[test]
+fn a_configuration_is_checked_without_a_service() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    fs::write(at.join("good.toml"), "[scanner]\nport = \"/dev/ttyS7\"\n").unwrap();
+    let output = relief(at, &["config", "check", "good.toml"]);
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{told}");
+    assert_eq!(told, "good.toml: sound\nscanner: /dev/ttyS7\n");
+
+    fs::write(at.join("bad.toml"), "[regrid]\npitch_mm = -1.0\n").unwrap();
+    let output = relief(at, &["config", "check", "bad.toml"]);
+    refused(&output, 1, "bad.toml, line 2, column");
+    let output = relief(at, &["config", "check", "none.toml"]);
+    refused(&output, 1, "cannot read the configuration none.toml");
+}
+
+#[test]
 fn the_doctor_names_every_trouble_and_its_remedy() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
@@ -450,7 +467,8 @@ fn the_demo_leaves_the_deliverables_and_nothing_else() {
             "report.html",
             "report.json",
             "report.pdf",
-            "residuals.png"
+            "residuals.png",
+            "view.glb"
         ]
     );
     assert_eq!(fs::read_dir(&temporary).unwrap().count(), 0);

@@ -56,6 +56,7 @@ fn the_schemas_are_schemas() {
         "demo",
         "scan",
         "abort",
+        "pause",
         "resume",
         "status",
         "scans",
@@ -73,6 +74,7 @@ fn the_schemas_are_schemas() {
         "webhooks",
         "features",
         "features_train",
+        "config_check",
     ] {
         let reference = format!("commands.schema.json#/$defs/{command}");
         assert!(
@@ -201,6 +203,40 @@ fn what_the_demo_tells_with_a_table_left_out() {
         "manifest.schema.json",
         &file(at.join("there/manifest.json")),
     );
+}
+
+#[test]
+fn what_a_check_of_the_configuration_tells() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let check_of = |name: &str, content: &str| {
+        fs::write(at.join(name), content).unwrap();
+        let told = relief(at, &["config", "check", name, "--json"]);
+        let document = document(&told);
+        check("commands.schema.json#/$defs/config_check", &document);
+        (told.status.code(), document)
+    };
+    let two = "[scanners.left]\nport = \"/dev/a\"\n[scanners.right]\nport = \"/dev/b\"\n";
+    let (code, told) = check_of("two.toml", two);
+    assert_eq!((code, &told["sound"]), (Some(0), &json!(true)));
+    assert_eq!(
+        told["scanners"][1],
+        json!({"name": "right", "place": "/dev/b"})
+    );
+    assert_eq!(told.get("error"), None);
+
+    let (code, told) = check_of("wrong.toml", "[regrid]\n\nneighbors = 9\n");
+    assert_eq!((code, &told["sound"]), (Some(1), &json!(false)));
+    assert_eq!(told["error"]["line"], 3);
+    let message = told["error"]["message"].as_str().unwrap();
+    assert!(message.contains("neighbours"), "{message}");
+
+    // Files that it names are looked at as the service would.
+    let secret = "[webhooks.mes]\nurl = \"http://127.0.0.1:1/\"\nsecret_file = \"none\"\n";
+    let (code, told) = check_of("secret.toml", secret);
+    assert_eq!(code, Some(1));
+    let message = told["error"]["message"].as_str().unwrap();
+    assert!(message.contains("none"), "{message}");
 }
 
 #[test]

@@ -68,6 +68,11 @@ impl<'a> Deviations<'a> {
         }
     }
 
+    /// The nodes as outlines have settled them.
+    pub(crate) fn image(&self) -> &'a RangeImage {
+        self.image
+    }
+
     /// That of a node; `None` where it has none.
     pub(crate) fn at(&self, column: usize, row: usize) -> Option<f64> {
         let off = self.off_mm.get(column * self.image.rows() + row).copied();

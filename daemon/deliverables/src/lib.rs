@@ -24,6 +24,7 @@ pub mod report;
 mod shape;
 mod stopwatch;
 mod summary;
+mod view;
 mod write;
 
 pub use comparison::ComparisonReport;
@@ -49,6 +50,7 @@ pub use meshes::{
 pub use page::Page;
 pub use report::{MeshReport, Report, ScanReport};
 pub use stopwatch::Stopwatch;
+pub use view::{VIEW_NAME, ViewError, write_view};
 pub use write::{
     DeliverError, Delivered, Drawings, INLIERS_PICTURE_NAME, Inputs, PAGE_STEM, Pictures,
     RANGE_PICTURE_NAME, REGIONS_PICTURE_NAME, REPORT_NAME, RESIDUALS_PICTURE_NAME, draw_pictures,

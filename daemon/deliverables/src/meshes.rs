@@ -20,7 +20,7 @@ use crate::report::{MeshReport, ScanReport};
 use crate::write::{DeliverError, Inputs};
 
 /// Name and version of this program in files.
-const GENERATOR: &str = concat!("Relief ", env!("CARGO_PKG_VERSION"));
+pub(crate) const GENERATOR: &str = concat!("Relief ", env!("CARGO_PKG_VERSION"));
 
 /// Which files of triangles and of points are written.
 #[derive(Debug, Clone, PartialEq)]

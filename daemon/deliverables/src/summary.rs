@@ -203,7 +203,8 @@ fn crumbs(outcome: &Outcome) -> CrumbsReport {
     }
 }
 
-fn kind(face: &Face) -> &'static str {
+/// What a face is, in words.
+pub(crate) fn kind(face: &Face) -> &'static str {
     match (&face.form, &face.surface) {
         (Some(form), _) => form.as_str(),
         (None, Surface::Patches(_)) => "bicubic patches",

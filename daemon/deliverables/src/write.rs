@@ -22,6 +22,7 @@ use crate::meshes::{MeasuredPoints, write_meshes};
 use crate::picture;
 use crate::report::{Report, ScanReport};
 use crate::stopwatch::Stopwatch;
+use crate::view::{VIEW_NAME, ViewError, write_view};
 
 /// Everything that is told about one processed scan.
 #[derive(Debug, Clone)]
@@ -67,6 +68,15 @@ pub enum DeliverError {
     Json(#[from] serde_json::Error),
 }
 
+impl From<ViewError> for DeliverError {
+    fn from(error: ViewError) -> Self {
+        match error {
+            ViewError::Cancelled(cancelled) => cancelled.into(),
+            ViewError::Write(error) => error.into(),
+        }
+    }
+}
+
 /// What was written.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Delivered {
@@ -93,7 +103,7 @@ pub const RESIDUALS_PICTURE_NAME: &str = "residuals.png";
 /// Name of the picture of the share of inliers around each node.
 pub const INLIERS_PICTURE_NAME: &str = "inliers.png";
 
-/// Whether pictures are drawn, and the model written in a second format.
+/// Whether pictures and the view are drawn, and the model written in a second format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pictures {
     /// As long as the disk has room for them; a warning in the report if it has not.
@@ -108,13 +118,13 @@ const NO_STEP: &str = "the STEP file was left out, since the disk is nearly full
 /// The same of the page.
 const NO_PAGE: &str = "the page was left out, since the disk is nearly full: make room and run the \
      scan again to have it";
-/// The same of pictures.
-const NO_PICTURES: &str = "the pictures were left out, since the disk is nearly full: make room \
-     and run the scan again to have them";
+/// The same of pictures and view.
+const NO_PICTURES: &str = "the pictures and the view in three dimensions were left out, since the \
+     disk is nearly full: make room and run the scan again to have them";
 
 /// Writes `<name>.igs`, `<name>.step`, files of triangles and points, of surfaces
 /// (`<name>.surface.igs`, `<name>.skin.igs`) and an NC program (`<name>.nc`) if they are asked for, the
-/// pictures, `report.json`, the page and `manifest.json` into an existing directory of this disk
+/// pictures, `view.glb`, `report.json`, the page and `manifest.json` into an existing directory of this disk
 /// that nobody else looks at, and syncs them and it. The caller then puts the directory in its
 /// place by one rename.
 ///
@@ -172,7 +182,7 @@ pub fn write(
     watch.check()?;
     watch.stage(Stage::Pictures);
     let drawn = match pictures {
-        Pictures::Drawn => unless_full(pictures_on(disk, directory, inputs))?,
+        Pictures::Drawn => pictures_on(disk, directory, inputs, watch)?,
         Pictures::LeftOut => None,
     };
     let mut report = Report::new(inputs, watch.read());
@@ -274,11 +284,12 @@ pub(crate) fn is_full(error: &io::Error) -> bool {
     )
 }
 
-const PICTURE_NAMES: [&str; 4] = [
+const PICTURE_NAMES: [&str; 5] = [
     RANGE_PICTURE_NAME,
     REGIONS_PICTURE_NAME,
     RESIDUALS_PICTURE_NAME,
     INLIERS_PICTURE_NAME,
+    VIEW_NAME,
 ];
 
 /// `None` for what there was no room for.
@@ -385,14 +396,25 @@ fn keep_pictures(
     written.collect()
 }
 
+/// Pictures, and the view; `None` where there was no room for them.
 fn pictures_on(
     disk: &dyn Disk,
     directory: &Path,
     inputs: &Inputs<'_>,
-) -> io::Result<(Drawings, Vec<ManifestFile>)> {
+    monitor: &dyn Monitor,
+) -> Result<Option<(Drawings, Vec<ManifestFile>)>, DeliverError> {
     let drawings = draw_pictures(inputs)?;
-    let written = keep_pictures(disk, directory, &drawings)?;
-    Ok((drawings, written))
+    let Some(mut written) = unless_full(keep_pictures(disk, directory, &drawings))? else {
+        return Ok(None);
+    };
+    let view = write_synced::<DeliverError>(disk, directory, VIEW_NAME, |sink| {
+        Ok(write_view(inputs, monitor, sink)?)
+    });
+    match view {
+        Err(error) if error.is_for_want_of_room() => return Ok(None),
+        view => written.push(view?),
+    }
+    Ok(Some((drawings, written)))
 }
 
 fn write_json(

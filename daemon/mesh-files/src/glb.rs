@@ -27,10 +27,6 @@ pub(crate) fn write(
     details: &MeshDetails<'_>,
     sink: &mut dyn Write,
 ) -> Result<(), MeshFileError> {
-    let refused = |reason: String| MeshFileError::Format {
-        format: "glTF",
-        reason,
-    };
     let mut file = File::new(details);
     let materials: BTreeMap<[u8; 3], Index<Material>> = mesh
         .faces
@@ -46,14 +42,21 @@ pub(crate) fn write(
         nodes.push(file.face(mesh, face, material));
     }
     let bytes = file.finish(details.name, nodes);
-    // All lengths in the container have 32 bits.
-    if u32::try_from(bytes.binary.len() + bytes.json_hint).is_err() {
+    sink.write_all(&container(&bytes.root, bytes.binary)?)?;
+    Ok(())
+}
+
+/// The file that holds a description and the bytes that it speaks of.
+pub(crate) fn container(root: &Root, binary: Vec<u8>) -> Result<Vec<u8>, MeshFileError> {
+    let refused = |reason: String| MeshFileError::Format {
+        format: "glTF",
+        reason,
+    };
+    let json = root.to_vec().map_err(|error| refused(error.to_string()))?;
+    // All lengths in the container have 32 bits; both pieces are padded.
+    if u32::try_from(binary.len() + json.len() + 64).is_err() {
         return Err(refused("it would be longer than 4 GiB".to_owned()));
     }
-    let json = bytes
-        .root
-        .to_vec()
-        .map_err(|error| refused(error.to_string()))?;
     let glb = Glb {
         header: Header {
             magic: *b"glTF",
@@ -61,19 +64,15 @@ pub(crate) fn write(
             length: 0,
         },
         json: Cow::Owned(json),
-        bin: Some(Cow::Owned(bytes.binary)),
+        bin: Some(Cow::Owned(binary)),
     };
-    let whole = glb.to_vec().map_err(|error| refused(error.to_string()))?;
-    sink.write_all(&whole)?;
-    Ok(())
+    glb.to_vec().map_err(|error| refused(error.to_string()))
 }
 
 /// What the container holds.
 struct Content {
     root: Root,
     binary: Vec<u8>,
-    /// About how long the description can get.
-    json_hint: usize,
 }
 
 struct File {
@@ -105,21 +104,8 @@ impl File {
         }
     }
 
-    /// A dull surface, seen from behind, too, since a sheet has no inside.
     fn material(&mut self, colour: [u8; 3]) -> Index<Material> {
-        let [red, green, blue] = colour.map(linear);
-        let [r, g, b] = colour;
-        self.root.push(Material {
-            name: Some(format!("#{r:02x}{g:02x}{b:02x}")),
-            double_sided: true,
-            pbr_metallic_roughness: PbrMetallicRoughness {
-                base_color_factor: PbrBaseColorFactor([red, green, blue, 1.0]),
-                metallic_factor: StrengthFactor(0.0),
-                roughness_factor: StrengthFactor(0.8),
-                ..PbrMetallicRoughness::default()
-            },
-            ..Material::default()
-        })
+        self.root.push(material(colour))
     }
 
     fn face(
@@ -228,7 +214,6 @@ impl File {
     }
 
     fn finish(mut self, name: &str, nodes: Vec<Index<Node>>) -> Content {
-        let json_hint = 4096 * (nodes.len() + 1);
         let part = self.root.push(Node {
             name: Some(name.to_owned()),
             children: Some(nodes),
@@ -247,8 +232,24 @@ impl File {
         Content {
             root: self.root,
             binary: self.binary,
-            json_hint,
         }
+    }
+}
+
+/// A dull surface, seen from behind, too, since a sheet has no inside.
+pub(crate) fn material(colour: [u8; 3]) -> Material {
+    let [red, green, blue] = colour.map(linear);
+    let [r, g, b] = colour;
+    Material {
+        name: Some(format!("#{r:02x}{g:02x}{b:02x}")),
+        double_sided: true,
+        pbr_metallic_roughness: PbrMetallicRoughness {
+            base_color_factor: PbrBaseColorFactor([red, green, blue, 1.0]),
+            metallic_factor: StrengthFactor(0.0),
+            roughness_factor: StrengthFactor(0.8),
+            ..PbrMetallicRoughness::default()
+        },
+        ..Material::default()
     }
 }
 

@@ -3,7 +3,8 @@
 //!
 //! Triangles come from [`tessellate`], with their faces: PLY, 3MF and glTF carry these by name and
 //! colour. Lengths are millimetres, but metres where a standard asks for them (glTF, E57). The part
-//! frame has y up and z towards the camera, as glTF has.
+//! frame has y up and z towards the camera, as glTF has. A [`Scene`] is glTF to be shown: faces, lines
+//! and points with what a viewer needs to know of them.
 //!
 //! The bytes follow from the arguments alone.
 
@@ -14,6 +15,7 @@ mod ply;
 mod points;
 mod read;
 mod scan;
+mod scene;
 mod stl;
 mod threemf;
 mod triangles;
@@ -27,6 +29,7 @@ pub use format::{MeshFormat, PointFormat, TriangleFormat};
 pub use points::{Point, Points};
 pub use read::{MOST_TRIANGLES, ReadMeshError, Triangles, read_stl, read_triangles};
 pub use scan::ScanDetails;
+pub use scene::{Drawn, Scene, SceneGroup, ScenePrimitive};
 pub use triangles::write_triangles;
 
 /// What stands in a file beside its triangles.

@@ -17,6 +17,8 @@ pub(super) enum Fed {
         reason: String,
         /// Until a person says that it may go on.
         needs_person: bool,
+        /// Somebody wants it to.
+        on_request: bool,
     },
     Resumed,
     End(Result<(), ScannerError>),
@@ -45,6 +47,7 @@ pub(super) fn feed(
                 Fed::Paused {
                     reason: pause.to_string(),
                     needs_person: pause.needs_person,
+                    on_request: pause.cause == ScannerError::PausedOnRequest,
                 }
             }
             Ok(Some(ScanProgress::Resumed)) => {

@@ -144,9 +144,14 @@ impl<'a> Keeper<'a> {
                 Ok(Fed::Paused {
                     reason,
                     needs_person,
+                    on_request,
                 }) => {
                     self.commit(&mut batch, ways)?;
-                    tracing::warn!(scan = self.id, %reason, "scan paused");
+                    if on_request {
+                        tracing::info!(scan = self.id, %reason, "scan paused");
+                    } else {
+                        tracing::warn!(scan = self.id, %reason, "scan paused");
+                    }
                     self.station.laser.scan_paused(&reason);
                     if needs_person {
                         self.abort.presence.withdraw();
@@ -155,14 +160,14 @@ impl<'a> Keeper<'a> {
                         self.abort.presence.restore();
                     }
                     ways.catch_up();
-                    self.note_pause(Some(reason), needs_person);
+                    self.note_pause(Some(reason), needs_person, on_request);
                 }
                 Ok(Fed::Resumed) => {
                     self.commit(&mut batch, ways)?;
                     tracing::info!(scan = self.id, "scan goes on");
                     self.station.laser.scan_goes_on();
                     self.abort.presence.restore();
-                    self.note_pause(None, false);
+                    self.note_pause(None, false, false);
                     // Of a scan that was taken up nobody has asked yet; the scanner has said it.
                     if self.station.status().model.is_none()
                         && let Ok(identity) = self.station.identify()
@@ -183,14 +188,19 @@ impl<'a> Keeper<'a> {
         }
     }
 
-    /// Tells all who look on that the scan stands still, or goes on.
-    fn note_pause(&self, reason: Option<String>, needs_person: bool) {
-        let (state, link) = match reason {
-            Some(_) => (ScanState::Paused, ScannerLink::Trouble),
-            None => (ScanState::Scanning, ScannerLink::Scanning),
+    /// Tells all who look on that the scan stands still, or goes on. A pause on request is no
+    /// trouble, and no webhook is told of it: whoever asked for it knows.
+    fn note_pause(&self, reason: Option<String>, needs_person: bool, on_request: bool) {
+        let state = match reason {
+            Some(_) => ScanState::Paused,
+            None => ScanState::Scanning,
         };
-        self.service
-            .note_scanner(self.station, link, reason.clone());
+        let trouble = reason.clone().filter(|_| !on_request);
+        let link = match trouble {
+            Some(_) => ScannerLink::Trouble,
+            None => ScannerLink::Scanning,
+        };
+        self.service.note_scanner(self.station, link, trouble);
         let scan = self.station.update_active(|scan| {
             scan.state = state;
             scan.reason = reason;
@@ -198,7 +208,7 @@ impl<'a> Keeper<'a> {
         });
         // The record of a pause is for those who look; the columns do not hang on it.
         let kept = scan.map(|scan| {
-            if needs_person {
+            if needs_person && !on_request {
                 self.service.keep_scan_telling(&scan)
             } else {
                 self.service.keep_scan(&scan)
@@ -222,7 +232,9 @@ impl<'a> Keeper<'a> {
         let before = self.journal.columns() - batch.len() as u32;
         // Where showing takes longer than measuring, the table waits in the end.
         ways.pulse.rest();
+        let metrics = &self.service.metrics;
         for (column, kept) in batch.drain(..).zip(before + 1..) {
+            metrics.column_kept(self.station.name(), column.samples.len(), column.dropouts);
             self.station.update_active(|scan| scan.columns = kept);
             // Those who show have ended only for a defect, which they have told of.
             let _ = ways.shown.send(Shown::Column { column, kept });

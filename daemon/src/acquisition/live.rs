@@ -133,7 +133,8 @@ impl Growing {
         Ok(Self {
             regridder: Regridder::new(settings).map_err(|error| error.to_string())?,
             fit: Fit::new(&settings, most_samples),
-            file: GridFile::create(&service.grid_path(scan)).map_err(|error| error.to_string())?,
+            file: GridFile::create(&service.grid_path(scan), settings.pitch_mm)
+                .map_err(|error| error.to_string())?,
             grid: KeptGrid { settings },
         })
     }
@@ -148,6 +149,10 @@ impl Growing {
         let finished = self.regridder.push(column).map_err(|e| e.to_string())?;
         for column in &finished {
             self.file.append(column).map_err(|e| e.to_string())?;
+        }
+        if !finished.is_empty() {
+            // Before anybody is told of them: who has just begun to look on reads the others here.
+            self.file.show().map_err(|e| e.to_string())?;
         }
         Ok(finished)
     }

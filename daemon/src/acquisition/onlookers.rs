@@ -69,6 +69,7 @@ impl<'a> Onlookers<'a> {
 
     fn show(&mut self, column: &RawColumn, kept: u32) {
         let live = self.live.push(column.calibrated(&self.calibration));
+        self.service.metrics.column_shown(self.station.name());
         if self.service.hub.has_listeners() {
             let scan = self.station.active_scan();
             self.service.hub.tell(Event::Column {

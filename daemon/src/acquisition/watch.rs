@@ -40,6 +40,9 @@ fn look(service: &Service, station: &Station) {
     if station.is_scanning() {
         return;
     }
+    if let Ok(status) = &result {
+        service.metrics.line(station.name(), status.line);
+    }
     let (link, problem) = match result {
         Ok(status) if status.faults.is_empty() => (ScannerLink::Ready, None),
         Ok(status) => {

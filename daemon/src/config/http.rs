@@ -7,7 +7,7 @@ use serde::Deserialize;
 use super::value;
 
 /// What clients may ask of the API at most.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct HttpConfig {
     /// Connections at a time, on the socket and on the loopback address each.
@@ -22,6 +22,10 @@ pub struct HttpConfig {
     /// How long a client may leave unread what is sent to it.
     #[serde(deserialize_with = "value::http_milliseconds")]
     pub stall_timeout_ms: u32,
+    /// Names by which a reverse proxy on this machine is known, which passes requests on to the
+    /// loopback address; lower case, without ports.
+    #[serde(deserialize_with = "value::host_names")]
+    pub hosts: Vec<String>,
 }
 
 impl HttpConfig {
@@ -41,10 +45,11 @@ impl HttpConfig {
 impl Default for HttpConfig {
     fn default() -> Self {
         Self {
-            connections: 64,
-            listeners: 16,
+            connections: 256,
+            listeners: 64,
             request_timeout_ms: 10_000,
             stall_timeout_ms: 30_000,
+            hosts: Vec::new(),
         }
     }
 }

@@ -196,6 +196,27 @@ pub(super) fn http_milliseconds<'de, D: Deserializer<'de>>(
     bounded(deserializer, 100, 600_000, " ms")
 }
 
+/// Names of hosts, in lower case.
+pub(super) fn host_names<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Vec<String>, D::Error> {
+    let names = Vec::<String>::deserialize(deserializer)?;
+    let is_name = |name: &str| {
+        let label = |label: &str| {
+            let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'-';
+            !label.is_empty() && label.len() <= 63 && label.bytes().all(plain)
+        };
+        name.len() <= 253 && name.split('.').all(label)
+    };
+    match names.iter().find(|name| !is_name(name)) {
+        Some(wrong) => Err(D::Error::custom(format!(
+            "`{wrong}` is no name of a host: write it as in \"bench.lab.example\", without scheme \
+             and port"
+        ))),
+        None => Ok(names.iter().map(|name| name.to_ascii_lowercase()).collect()),
+    }
+}
+
 /// Name of a group; whether there is one is seen when the socket is made.
 pub(super) fn group<'de, D: Deserializer<'de>>(
     deserializer: D,

@@ -2,17 +2,21 @@
 
 use std::io;
 
-use axum::body::Body;
 use axum::extract::{Path, State};
-use axum::http::header;
-use axum::response::{IntoResponse, Json, Response};
-use relief_api::SpoolEntry;
-use tokio_util::io::ReaderStream;
+use axum::http::HeaderMap;
+use axum::response::{Json, Response};
+use relief_api::{SpoolEntry, path};
 
+use super::download::{Download, DownloadHeaders, download};
+use super::openapi::Problems;
 use super::problem::Refusal;
 use super::{Context, blocking};
 use crate::error::ServiceError;
 
+/// What is in a result's folder.
+#[utoipa::path(get, path = path::SPOOL, tag = "results", operation_id = "get_result",
+    params(("result" = String, Path, description = "Name of the folder: the scan's id, or a rerun's own")),
+    responses((status = 200, body = SpoolEntry), (status = 404, response = Problems)))]
 pub(super) async fn entry(
     State(context): State<Context>,
     Path(result): Path<String>,
@@ -27,8 +31,14 @@ pub(super) async fn entry(
     .map(Json)
 }
 
+/// A file of a result. Ranges and conditional requests are understood.
+#[utoipa::path(get, path = path::SPOOL_FILE, tag = "results", operation_id = "get_result_file",
+    params(("result" = String, Path, description = "Name of the folder"),
+        ("file" = String, Path, description = "Name of the file"), DownloadHeaders),
+    responses(Download, (status = 404, response = Problems), (status = 416, response = Problems)))]
 pub(super) async fn file(
     State(context): State<Context>,
+    headers: HeaderMap,
     Path((result, file)): Path<(String, String)>,
 ) -> Result<Response, Refusal> {
     let name = file.clone();
@@ -41,11 +51,17 @@ pub(super) async fn file(
         }
     })
     .await?;
-    download(file, &name).await
+    download(file, &name, &headers).await
 }
 
+/// The raw columns that are kept of a scan. Ranges and conditional requests are understood.
+#[utoipa::path(get, path = path::SCAN_JOURNAL, tag = "scans", operation_id = "get_scan_journal",
+    params(("scan" = String, Path, description = "Id of the scan"), DownloadHeaders),
+    responses(Download, (status = 404, response = Problems), (status = 409, response = Problems),
+        (status = 416, response = Problems)))]
 pub(super) async fn journal(
     State(context): State<Context>,
+    headers: HeaderMap,
     Path(id): Path<String>,
 ) -> Result<Response, Refusal> {
     // By way of the record, so that only ids that were given out become paths.
@@ -64,41 +80,5 @@ pub(super) async fn journal(
         })
     })
     .await?;
-    download(file, "journal.scan").await
-}
-
-/// Streams a file, which may be larger than memory.
-async fn download(file: std::fs::File, name: &str) -> Result<Response, Refusal> {
-    let file = tokio::fs::File::from_std(file);
-    let metadata = file.metadata().await;
-    let bytes = metadata
-        .map_err(|source| ServiceError::Io {
-            what: name.to_owned(),
-            source,
-        })?
-        .len();
-    // The length is promised before; a journal that grows meanwhile must not exceed it.
-    let reader = tokio::io::AsyncReadExt::take(file, bytes);
-    let headers = [
-        (header::CONTENT_TYPE, content_type(name).to_owned()),
-        (header::CONTENT_LENGTH, bytes.to_string()),
-        (header::X_CONTENT_TYPE_OPTIONS, "nosniff".to_owned()),
-    ];
-    Ok((headers, Body::from_stream(ReaderStream::new(reader))).into_response())
-}
-
-/// Media type by the file's ending; those of the registered types that we write.
-fn content_type(name: &str) -> &'static str {
-    match name.rsplit_once('.').map(|(_, ending)| ending) {
-        Some("igs" | "iges") => "model/iges",
-        Some("stp" | "step") => "model/step",
-        Some("stl") => "model/stl",
-        Some("3mf") => "model/3mf",
-        Some("glb") => "model/gltf-binary",
-        Some("e57") => "model/e57",
-        Some("png") => "image/png",
-        Some("json") => "application/json",
-        Some("txt") => "text/plain; charset=utf-8",
-        _ => "application/octet-stream",
-    }
+    download(file, "journal.scan", &headers).await
 }

@@ -16,13 +16,18 @@ use super::problem::Refusal;
 
 const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
-/// Refuses requests of web pages, and those without a token that holds.
+/// Refuses requests of other sites' pages, and those without a token or ticket that holds.
 pub(crate) async fn bearers_only(
     State(context): State<Context>,
     request: Request,
     next: Next,
 ) -> Response {
-    let admitted = check_place(request.uri(), request.headers()).and_then(|()| {
+    let hosts = context.service.config();
+    let hosts = &hosts.http.hosts;
+    let admitted = check_place(request.uri(), request.headers(), hosts).and_then(|()| {
+        if context.tickets.admit(request.method(), request.uri()) {
+            return Ok("(ticket)".to_owned());
+        }
         let token = token(request.headers())?;
         let bearer = context.service.tokens.bearer(token);
         bearer.ok_or_else(|| unauthorized("the token of the request does not hold"))
@@ -46,23 +51,51 @@ pub(crate) async fn bearers_only(
     }
 }
 
-/// The request speaks to this machine by one of its own names, and for no web page.
-fn check_place(uri: &Uri, headers: &HeaderMap) -> Result<(), Refusal> {
+/// Refuses requests that name another machine: the page itself is for everybody here, and shows
+/// nothing without a token.
+pub(crate) async fn this_machine_only(
+    State(context): State<Context>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let hosts = &context.service.config().http.hosts;
+    match check_host(request.uri(), request.headers(), hosts) {
+        Ok(_) => next.run(request).await,
+        Err(refusal) => refusal.into_response(),
+    }
+}
+
+/// The request speaks to this machine by one of its own names, or those of its proxy. Gives the
+/// name.
+fn check_host<'a>(
+    uri: &Uri,
+    headers: &'a HeaderMap,
+    proxies: &[String],
+) -> Result<&'a str, Refusal> {
     let host = single(headers, header::HOST)?;
     // A request line may name a host of its own, which then is the one that is meant.
     let named = [host, uri.authority().map(|authority| authority.as_str())];
     for name in named.into_iter().flatten() {
-        if !is_local(name) {
+        if !is_local(name) && !is_proxy(name, proxies) {
             return Err(not_local(format!("the request is for the host {name}")));
         }
     }
     let Some(host) = host else {
         return Err(not_local("the request is for the host (none)".into()));
     };
+    Ok(host)
+}
+
+/// The same, and it speaks for no page of another site.
+fn check_place(uri: &Uri, headers: &HeaderMap, proxies: &[String]) -> Result<(), Refusal> {
+    let host = check_host(uri, headers, proxies)?;
     if let Some(origin) = single(headers, header::ORIGIN)? {
-        let own = origin
-            .strip_prefix("http://")
-            .is_some_and(|authority| authority.eq_ignore_ascii_case(host));
+        // Nobody but a proxy has a certificate.
+        let scheme = match origin.strip_prefix("https://") {
+            Some(authority) if is_proxy(host, proxies) => Some(authority),
+            _ => origin.strip_prefix("http://"),
+        };
+        let own = scheme.is_some_and(|authority| authority.eq_ignore_ascii_case(host));
         if !own {
             return Err(not_local(format!(
                 "the request comes from a page of another site, {origin}"
@@ -88,7 +121,7 @@ fn token(headers: &HeaderMap) -> Result<&str, Refusal> {
 }
 
 /// The value of a field that may be there once: of two, others might read the second.
-fn single(headers: &HeaderMap, name: HeaderName) -> Result<Option<&str>, Refusal> {
+pub(super) fn single(headers: &HeaderMap, name: HeaderName) -> Result<Option<&str>, Refusal> {
     let mut values = headers.get_all(&name).iter();
     let value = values.next();
     let unclear = |what| {
@@ -107,12 +140,23 @@ fn single(headers: &HeaderMap, name: HeaderName) -> Result<Option<&str>, Refusal
         .transpose()
 }
 
-/// `localhost`, 127.x.x.x or ::1, with or without a port.
-fn is_local(authority: &str) -> bool {
-    let host = match authority.rsplit_once(':') {
+/// A host without its port.
+fn without_port(authority: &str) -> &str {
+    match authority.rsplit_once(':') {
         Some((host, port)) if port.bytes().all(|b| b.is_ascii_digit()) => host,
         _ => authority,
-    };
+    }
+}
+
+/// One of the configured names, with or without a port.
+fn is_proxy(authority: &str, proxies: &[String]) -> bool {
+    let host = without_port(authority);
+    proxies.iter().any(|name| host.eq_ignore_ascii_case(name))
+}
+
+/// `localhost`, 127.x.x.x or ::1, with or without a port.
+fn is_local(authority: &str) -> bool {
+    let host = without_port(authority);
     let bare = host
         .strip_prefix('[')
         .and_then(|host| host.strip_suffix(']'))
@@ -128,7 +172,10 @@ fn not_local(detail: String) -> Refusal {
         StatusCode::FORBIDDEN,
         "not-local",
         detail,
-        Some("speak to the service as localhost or 127.0.0.1"),
+        Some(
+            "speak to the service as localhost or 127.0.0.1; names of a reverse proxy go into \
+             http.hosts",
+        ),
     )
 }
 
@@ -178,7 +225,9 @@ mod tests {
         for &(name, value) in fields {
             headers.append(name, HeaderValue::from_static(value));
         }
-        check_place(&uri.parse().unwrap(), &headers).map_err(|refusal| refusal.detail().to_owned())
+        let proxies = ["bench.example".to_owned()];
+        let checked = check_place(&uri.parse().unwrap(), &headers, &proxies);
+        checked.map_err(|refusal| refusal.detail().to_owned())
     }
 
     #[test]
@@ -193,6 +242,15 @@ mod tests {
             assert_eq!(place("/v1/status", fields), Ok(()), "{fields:?}");
         }
         assert_eq!(place("http://localhost/v1/status", &[host]), Ok(()));
+        let proxy = ("host", "Bench.example");
+        for fields in [
+            &[proxy][..],
+            &[("host", "bench.example:8443")],
+            &[proxy, ("origin", "https://bench.example")],
+            &[proxy, ("origin", "http://bench.example")],
+        ] {
+            assert_eq!(place("/v1/status", fields), Ok(()), "{fields:?}");
+        }
         for (uri, fields, why) in [
             ("/", &[][..], "(none)"),
             ("/", &[("host", "a.example")], "a.example"),
@@ -200,6 +258,12 @@ mod tests {
             ("/", &[host, ("host", "a.example")], "more than once"),
             ("/", &[host, ("origin", "http://a.example")], "a.example"),
             ("/", &[host, ("origin", "null")], "null"),
+            ("/", &[("host", "x.bench.example")], "x.bench.example"),
+            (
+                "/",
+                &[proxy, ("origin", "https://a.example")],
+                "another site",
+            ),
             (
                 "/",
                 &[host, ("origin", "http://127.0.0.1:80")],

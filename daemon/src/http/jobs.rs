@@ -3,9 +3,11 @@
 use axum::extract::{Path, State};
 use axum::http::StatusCode;
 use axum::response::Json;
-use relief_api::{Job, JobId, JobList};
+use relief_api::{Job, JobId, JobList, Part, path};
 
+use super::openapi::Problems;
 use super::problem::Refusal;
+use super::query::{Params, limit, wrong_query};
 use super::{Context, blocking};
 
 /// Jobs have numbers; whatever else is asked for is not there.
@@ -20,11 +22,28 @@ fn number(text: &str) -> Result<JobId, Refusal> {
     })
 }
 
-pub(super) async fn list(State(context): State<Context>) -> Result<Json<JobList>, Refusal> {
-    let jobs = blocking(context, |service| service.jobs()).await?;
-    Ok(Json(JobList { jobs }))
+/// The jobs, newest first.
+#[utoipa::path(get, path = path::JOBS, tag = "jobs", operation_id = "list_jobs", params(Part),
+    responses((status = 200, body = JobList)))]
+pub(super) async fn list(
+    State(context): State<Context>,
+    Params(part): Params<Part>,
+) -> Result<Json<JobList>, Refusal> {
+    let limit = limit(&part)?;
+    let before = part.before.map(|text| {
+        text.parse()
+            .map_err(|_| wrong_query(format!("`before` is {text}, but jobs have numbers")))
+    });
+    let before = before.transpose()?;
+    blocking(context, move |service| service.jobs_part(before, limit))
+        .await
+        .map(Json)
 }
 
+/// One job.
+#[utoipa::path(get, path = path::JOB, tag = "jobs", operation_id = "get_job",
+    params(("job" = JobId, Path, description = "Number of the job")),
+    responses((status = 200, body = Job), (status = 404, response = Problems)))]
 pub(super) async fn get(
     State(context): State<Context>,
     Path(job): Path<String>,
@@ -35,6 +54,11 @@ pub(super) async fn get(
         .map(Json)
 }
 
+/// Queues a job again that failed or was cancelled.
+#[utoipa::path(post, path = path::JOB_RETRY, tag = "jobs", operation_id = "retry_job",
+    params(("job" = JobId, Path, description = "Number of the job")),
+    responses((status = 202, body = Job), (status = 404, response = Problems),
+        (status = 409, response = Problems)))]
 pub(super) async fn retry(
     State(context): State<Context>,
     Path(job): Path<String>,
@@ -44,6 +68,11 @@ pub(super) async fn retry(
     Ok((StatusCode::ACCEPTED, Json(job)))
 }
 
+/// Cancels a job that waits or runs.
+#[utoipa::path(post, path = path::JOB_CANCEL, tag = "jobs", operation_id = "cancel_job",
+    params(("job" = JobId, Path, description = "Number of the job")),
+    responses((status = 200, body = Job), (status = 404, response = Problems),
+        (status = 409, response = Problems)))]
 pub(super) async fn cancel(
     State(context): State<Context>,
     Path(job): Path<String>,

@@ -4,16 +4,23 @@
 //! tokio's blocking threads.
 
 mod body;
+mod download;
 mod events;
 mod files;
 mod guard;
+mod images;
 mod jobs;
 mod listen;
+mod metrics;
+mod openapi;
+mod page;
 mod problem;
+mod query;
 mod scanners;
 mod scans;
 mod serve;
 mod stall;
+mod tickets;
 mod tokens;
 mod webhooks;
 
@@ -23,10 +30,11 @@ use axum::Router;
 use axum::extract::State;
 use axum::middleware::from_fn_with_state;
 use axum::response::Json;
-use axum::routing::{any, get, post};
+use axum::routing::any;
 use relief_api::{Status, path};
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
+use utoipa_axum::routes;
 
 pub use listen::ListenError;
 pub(crate) use listen::{bind_loopback, bind_socket, check_handed_over};
@@ -34,73 +42,72 @@ pub(crate) use serve::serve;
 
 use crate::service::Service;
 use problem::Refusal;
+use tickets::Tickets;
 
 /// What handlers need.
 #[derive(Clone)]
 pub(crate) struct Context {
-    pub(crate) service: Arc<Service>,
+    service: Arc<Service>,
     /// Ends the event streams, which would otherwise keep their connections for ever.
-    pub(crate) stop: CancellationToken,
+    stop: CancellationToken,
     /// Places for those who listen to events.
-    pub(crate) listeners: Arc<Semaphore>,
+    listeners: Arc<Semaphore>,
+    tickets: Tickets,
+    /// The description of all endpoints.
+    document: Arc<str>,
+}
+
+impl Context {
+    fn new(service: &Arc<Service>, stop: &CancellationToken, document: String) -> Self {
+        Self {
+            service: Arc::clone(service),
+            stop: stop.clone(),
+            listeners: Arc::new(Semaphore::new(service.config().http.listeners)),
+            tickets: Tickets::new(),
+            document: document.into(),
+        }
+    }
 }
 
 /// All endpoints, as they are offered on the socket, whose file mode tells who may ask.
-pub(crate) fn on_socket(context: &Context) -> Router {
-    let tokens = Router::new()
-        .route(path::TOKENS, get(tokens::list).post(tokens::create))
-        .route(path::TOKEN_REVOKE, post(tokens::revoke));
-    complete(tokens, context)
+pub(crate) fn on_socket(service: &Arc<Service>, stop: &CancellationToken) -> Router {
+    let all = openapi::described()
+        .routes(routes!(tokens::list, tokens::create))
+        .routes(routes!(tokens::revoke));
+    let (router, document) = openapi::split(all);
+    let context = Context::new(service, stop, document);
+    complete(router, &context).merge(page::router())
 }
 
-/// The endpoints for bearers of a token, as they are offered on a loopback address.
-pub(crate) fn on_loopback(context: &Context) -> Router {
-    let tokens = Router::new()
+/// The endpoints for bearers of a token, as they are offered on a loopback address. Places for
+/// listeners are their own: bearers of tokens must not take those of the socket.
+pub(crate) fn on_loopback(service: &Arc<Service>, stop: &CancellationToken) -> Router {
+    let (_, document) = openapi::split(
+        openapi::described()
+            .routes(routes!(tokens::list, tokens::create))
+            .routes(routes!(tokens::revoke)),
+    );
+    let (router, _) = openapi::split(openapi::described());
+    let router = router
         .route(path::TOKENS, any(tokens::only_on_the_socket))
         .route(path::TOKEN_REVOKE, any(tokens::only_on_the_socket));
-    // Places of their own: bearers of tokens must not take those of the socket.
-    let listeners = context.service.config().http.listeners;
-    let context = Context {
-        listeners: Arc::new(Semaphore::new(listeners)),
-        ..context.clone()
-    };
-    complete(tokens, &context).layer(from_fn_with_state(context, guard::bearers_only))
+    let context = Context::new(service, stop, document);
+    complete(router, &context)
+        .layer(from_fn_with_state(context.clone(), guard::bearers_only))
+        .merge(page::router().layer(from_fn_with_state(context, guard::this_machine_only)))
 }
 
-fn complete(tokens: Router<Context>, context: &Context) -> Router {
-    tokens
-        .route(path::STATUS, get(status))
-        .route(path::LASER, get(scanners::lasers))
-        .route(path::SCANNERS, get(scanners::list))
-        .route(path::SCANNER, get(scanners::get))
-        .route(path::SCANNER_ABORT, post(scans::abort_on))
-        .route(path::SCANNER_RESUME, post(scans::resume_on))
-        .route(path::SCANNER_LASER, get(scanners::laser))
-        .route(path::SCANS, get(scans::list).post(scans::start))
-        .route(path::SCAN_PREVIEW, post(scans::preview))
-        .route(path::SCAN, get(scans::get))
-        .route(path::SCAN_ABORT, post(scans::abort))
-        .route(path::SCAN_RESUME, post(scans::resume))
-        .route(path::SCAN_RERUN, post(scans::rerun))
-        .route(path::SCAN_JOURNAL, get(files::journal))
-        .route(path::ABORT, post(scans::abort_all))
-        .route(path::RESUME, post(scans::resume_any))
-        .route(path::JOBS, get(jobs::list))
-        .route(path::JOB, get(jobs::get))
-        .route(path::JOB_RETRY, post(jobs::retry))
-        .route(path::JOB_CANCEL, post(jobs::cancel))
-        .route(path::SPOOL, get(files::entry))
-        .route(path::SPOOL_FILE, get(files::file))
-        .route(path::WEBHOOKS, get(webhooks::list))
-        .route(path::WEBHOOK_DELIVERIES, get(webhooks::deliveries))
-        .route(path::WEBHOOK_TEST, post(webhooks::test))
-        .route(path::EVENTS, get(events::stream))
+fn complete(router: Router<Context>, context: &Context) -> Router {
+    router
         .fallback(problem::no_such_path)
         .method_not_allowed_fallback(problem::no_such_method)
         .layer(from_fn_with_state(context.clone(), body::taken_whole))
         .with_state(context.clone())
 }
 
+/// The service at a glance.
+#[utoipa::path(get, path = path::STATUS, tag = "service", operation_id = "get_status",
+    responses((status = 200, body = Status)))]
 // Waits for whoever just writes a record, or a line to the log of a laser.
 async fn status(State(context): State<Context>) -> Result<Json<Status>, Refusal> {
     let status = blocking(context, |service| Ok(service.status()));

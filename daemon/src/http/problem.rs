@@ -120,6 +120,17 @@ impl From<ServiceError> for Refusal {
                         .into(),
                 ),
             ),
+            ServiceError::NothingToPause { .. } => (S::CONFLICT, "nothing-to-pause", None),
+            ServiceError::CannotPause { .. } => (S::CONFLICT, "cannot-pause", None),
+            ServiceError::WhichRunning { .. } => (
+                S::CONFLICT,
+                "which-scan",
+                Some(
+                    "name the scanner that is to stop (--scanner) or its scan; `relief abort` ends \
+                     all of them"
+                        .into(),
+                ),
+            ),
             ServiceError::NoSuchJob { .. } => (
                 S::NOT_FOUND,
                 "no-such-job",
@@ -146,6 +157,28 @@ impl From<ServiceError> for Refusal {
                         .into(),
                 ),
             ),
+            ServiceError::RequestUnderWay => (
+                S::CONFLICT,
+                "request-under-way",
+                Some("ask again in a moment: the answer is then that of the first request".into()),
+            ),
+            ServiceError::KeyUsed { .. } => (
+                S::UNPROCESSABLE_ENTITY,
+                "key-used",
+                Some("give each request a key of its own, such as a random UUID".into()),
+            ),
+            ServiceError::TooLarge { .. } => (
+                S::CONFLICT,
+                "scan-too-large",
+                Some("run it again with these settings: `relief rerun`".into()),
+            ),
+            ServiceError::Regridding => (
+                S::SERVICE_UNAVAILABLE,
+                "busy-regridding",
+                Some("try again in a moment".into()),
+            ),
+            ServiceError::NoImage { .. } => (S::CONFLICT, "no-image", None),
+            ServiceError::Unwanted => (S::REQUEST_TIMEOUT, "slow-request", None),
             ServiceError::Store(_) => (
                 S::INTERNAL_SERVER_ERROR,
                 "records-unusable",

@@ -31,7 +31,7 @@ const FAREWELL: Duration = Duration::from_secs(1);
 pub(crate) async fn serve<L>(
     mut listener: L,
     app: Router,
-    limits: HttpConfig,
+    limits: Arc<HttpConfig>,
     stop: CancellationToken,
 ) where
     L: Listener,
@@ -47,7 +47,7 @@ pub(crate) async fn serve<L>(
             () = stop.cancelled() => break,
         };
         if let Ok(place) = Arc::clone(&places).try_acquire_owned() {
-            let (app, stop) = (app.clone(), stop.clone());
+            let (app, limits, stop) = (app.clone(), Arc::clone(&limits), stop.clone());
             connections.spawn(answer(stream, place, app, limits, stop));
         } else if let Ok(door) = Arc::clone(&doors).try_acquire_owned() {
             tracing::warn!(limit = limits.connections, "too many connections");
@@ -62,7 +62,7 @@ async fn answer<S>(
     stream: S,
     _place: OwnedSemaphorePermit,
     app: Router,
-    limits: HttpConfig,
+    limits: Arc<HttpConfig>,
     stop: CancellationToken,
 ) where
     S: AsyncRead + AsyncWrite + Send + Unpin + 'static,

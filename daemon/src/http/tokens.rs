@@ -4,17 +4,25 @@
 use axum::extract::{Path, State};
 use axum::http::StatusCode;
 use axum::response::Json;
-use relief_api::{CreateToken, NewToken, Token, TokenList};
+use relief_api::{CreateToken, NewToken, Token, TokenList, path};
 
+use super::openapi::Problems;
 use super::problem::{Body, Refusal};
 use super::{Context, blocking};
 
+/// The tokens, oldest first. On the socket only.
+#[utoipa::path(get, path = path::TOKENS, tag = "tokens", operation_id = "list_tokens",
+    responses((status = 200, body = TokenList)))]
 pub(super) async fn list(State(context): State<Context>) -> Json<TokenList> {
     Json(TokenList {
         tokens: context.service.tokens.list(),
     })
 }
 
+/// Makes a token. On the socket only.
+#[utoipa::path(post, path = path::TOKENS, tag = "tokens", operation_id = "create_token",
+    request_body = CreateToken,
+    responses((status = 201, body = NewToken), (status = 409, response = Problems)))]
 pub(super) async fn create(
     State(context): State<Context>,
     Body(request): Body<CreateToken>,
@@ -27,6 +35,9 @@ pub(super) async fn create(
     Ok((StatusCode::CREATED, Json(token)))
 }
 
+/// Takes a token back. On the socket only.
+#[utoipa::path(post, path = path::TOKEN_REVOKE, tag = "tokens", operation_id = "revoke_token", params(("token" = String, Path, description = "Name of the token")),
+    responses((status = 200, body = Token), (status = 404, response = Problems)))]
 pub(super) async fn revoke(
     State(context): State<Context>,
     Path(name): Path<String>,

@@ -98,13 +98,6 @@ impl Service {
         self.store.job(id)?.ok_or(ServiceError::NoSuchJob { id })
     }
 
-    /// All jobs, newest first.
-    pub(crate) fn jobs(&self) -> Result<Vec<Job>, ServiceError> {
-        let mut jobs = self.store.jobs()?;
-        jobs.reverse();
-        Ok(jobs)
-    }
-
     /// Queues a job again that failed or was cancelled.
     pub(crate) fn retry_job(&self, id: JobId) -> Result<Job, ServiceError> {
         self.check_running()?;
@@ -210,7 +203,7 @@ fn new_job(scan: &Scan, result: String, name: String) -> Job {
 }
 
 /// The settings that were kept with a scan.
-fn kept_processing(settings: &[u8]) -> Result<Processing, String> {
+pub(crate) fn kept_processing(settings: &[u8]) -> Result<Processing, String> {
     serde_json::from_slice(settings)
         .map_err(|error| format!("the settings kept with it cannot be read ({error})"))
 }

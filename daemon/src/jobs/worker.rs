@@ -155,6 +155,7 @@ fn attempt(
         }
     }
     service.keep_job(&job)?;
+    service.metrics.job_ended(&job);
     if let Some(event) = published {
         service.hub.tell(event);
     }

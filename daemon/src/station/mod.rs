@@ -207,20 +207,44 @@ impl Station {
         // First the reason: whoever takes the scan stops the scanner as soon as it is asked to.
         self.laser.stop_asked(reason);
         abort.ask(reason);
-        std::thread::scope(|scope| {
-            // No other start of the service is to go on with it, from this moment on and whatever
-            // the scanner does; nor does the scanner wait for a disk.
-            let end = || abort.presence.end();
-            let thread = std::thread::Builder::new().name(self.loop_name("abort-noted"));
-            let noted = thread.spawn_scoped(scope, end);
-            if let Err(error) = self.scanner.abort() {
-                tracing::warn!(scanner = self.name, %error, "cannot tell the scanner to stop");
-            }
-            if noted.is_err() {
-                end();
-            }
-        });
+        // No other start of the service is to go on with it.
+        let tell = || self.scanner.abort();
+        if let Err(error) = self.noting(&|| abort.presence.end(), tell) {
+            tracing::warn!(scanner = self.name, %error, "cannot tell the scanner to stop");
+        }
         Some(stopped)
+    }
+
+    /// Has the scan of this id stand still until a person lets it go on.
+    ///
+    /// # Errors
+    /// As [`Scanner::pause_scan`].
+    pub(crate) fn pause(&self, id: &str) -> Result<(), ScannerError> {
+        let abort = match &*lock(&self.slot) {
+            Slot::Taken { scan, abort } if scan.id == id => Arc::clone(abort),
+            _ => return Err(ScannerError::NothingToPause),
+        };
+        // Another start of the service is to ask as well.
+        let tell = || self.scanner.pause_scan();
+        let paused = self.noting(&|| abort.presence.withdraw(), tell);
+        if let Err(ScannerError::NothingToPause | ScannerError::CannotPause(_)) = paused {
+            abort.presence.restore();
+        }
+        paused
+    }
+
+    /// Tells the scanner something while this is noted on disk: what is noted holds from this
+    /// moment on, whatever the scanner does, and the scanner does not wait for a disk.
+    fn noting<T>(&self, note: &(dyn Fn() + Sync), tell: impl FnOnce() -> T) -> T {
+        std::thread::scope(|scope| {
+            let thread = std::thread::Builder::new().name(self.loop_name("noted"));
+            let noted = thread.spawn_scoped(scope, note);
+            let told = tell();
+            if noted.is_err() {
+                note();
+            }
+            told
+        })
     }
 
     /// True while a scan is under way or about to be.

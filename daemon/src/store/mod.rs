@@ -9,6 +9,7 @@
 mod backend;
 mod error;
 mod messages;
+mod pages;
 mod record;
 mod salvage;
 

@@ -62,7 +62,7 @@ async fn loopback_is_for_bearers_of_a_token() {
     }
     // Nothing behind the listener is open: not what is not there, nor other methods.
     for (method, path) in [
-        ("GET", "/"),
+        ("GET", "/v2"),
         ("POST", path::ABORT),
         ("OPTIONS", path::STATUS),
         ("GET", path::EVENTS),

@@ -70,9 +70,19 @@ impl Client {
     }
 
     pub(crate) async fn events(&self) -> Events {
+        self.events_with("").await
+    }
+
+    /// The events since this one.
+    pub(crate) async fn events_since(&self, last: &str) -> Events {
+        self.events_with(&format!("Last-Event-ID: {last}\r\n"))
+            .await
+    }
+
+    async fn events_with(&self, fields: &str) -> Events {
         let mut stream = UnixStream::connect(&self.socket).await.unwrap();
         let request = format!(
-            "GET {} HTTP/1.0\r\nHost: localhost\r\n\r\n",
+            "GET {} HTTP/1.0\r\nHost: localhost\r\n{fields}\r\n",
             relief_api::path::EVENTS
         );
         stream.write_all(request.as_bytes()).await.unwrap();
@@ -80,7 +90,10 @@ impl Client {
         let first = lines.next_line().await.unwrap().unwrap();
         assert!(first.contains(" 200 "), "{first}");
         while !lines.next_line().await.unwrap().unwrap().is_empty() {}
-        Events { lines }
+        Events {
+            lines,
+            last_id: String::new(),
+        }
     }
 }
 
@@ -127,9 +140,15 @@ const GUARD: Duration = Duration::from_secs(120);
 
 pub(crate) struct Events {
     lines: tokio::io::Lines<BufReader<UnixStream>>,
+    last_id: String,
 }
 
 impl Events {
+    /// Id of the event that came last.
+    pub(crate) fn last_id(&self) -> &str {
+        &self.last_id
+    }
+
     /// The next event; `None` when the service has closed the stream.
     pub(crate) async fn next(&mut self) -> Option<Event> {
         let mut kind = String::new();
@@ -137,6 +156,9 @@ impl Events {
             let line = self.lines.next_line().await.unwrap()?;
             if let Some(value) = line.strip_prefix("event: ") {
                 kind = value.to_owned();
+            }
+            if let Some(id) = line.strip_prefix("id: ") {
+                id.clone_into(&mut self.last_id);
             }
             if let Some(data) = line.strip_prefix("data: ") {
                 let event: Event = serde_json::from_str(data).unwrap();

@@ -2,7 +2,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use reliefd::Config;
-use reliefd::config::WebhookConfig;
+use reliefd::config::{HttpConfig, WebhookConfig};
 
 fn refused(text: &str) -> String {
     Config::parse(text, Path::new("relief.toml"))
@@ -339,7 +339,15 @@ fn the_examples_are_sound_and_show_the_defaults() {
     assert_eq!(all.regrid.neighbours, Some(49));
     assert_eq!(all.journal, Config::default().journal);
     assert_eq!(all.queue, Config::default().queue);
-    assert_eq!(all.http, Config::default().http);
+    let http = Config::default().http;
+    assert_eq!(all.http.hosts, ["bench.lab.example"]);
+    assert_eq!(
+        all.http,
+        HttpConfig {
+            hosts: all.http.hosts.clone(),
+            ..http
+        }
+    );
     assert_eq!(
         all.service.socket_mode,
         Config::default().service.socket_mode

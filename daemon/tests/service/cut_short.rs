@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
 
-use relief_api::{Scan, ScanState, Status, path};
+use relief_api::{Event, Scan, ScanState, Status, path};
 use reliefd::Config;
 use scan_record::{JournalReader, RawColumn};
 use storage::LocalDisk;
@@ -149,6 +149,36 @@ async fn after_a_restart_of_the_computer_a_person_is_asked() {
     assert!(reason.contains("started anew"), "{reason}");
     let mut events = rig.client.events().await;
     let _: Scan = rig.client.post(&path::scan_resume(&scan.id), &()).await;
+    let over = ended(&mut events, &scan.id).await;
+    assert_eq!((over.state, over.columns), (ScanState::Complete, COLUMNS));
+    rig.daemon.shutdown().await;
+    first.daemon.shutdown().await;
+}
+
+/// Somebody had paused it, and has not said yet that it may go on.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_scan_paused_on_request_waits_after_the_service_died_as_well() {
+    let (first, scan) = amid().await;
+    let mut events = first.client.events().await;
+    let _: Scan = first.client.ask(&path::scan_pause(&scan.id)).await;
+    if active(&first).await.unwrap().state != ScanState::Paused {
+        let paused = |event: &Event| match event {
+            Event::Scan(scan) => (scan.state == ScanState::Paused).then_some(()),
+            _ => None,
+        };
+        events.until(paused).await;
+    }
+    let rig = Rig::start(left_by(&first), |_| {}).await;
+    let paused = settled(&rig.client, &scan.id).await;
+    assert_eq!(
+        (paused.state, paused.needs_person),
+        (ScanState::Paused, true)
+    );
+    let reason = paused.reason.unwrap();
+    let words = "before that: paused on request; `relief resume` lets it go on";
+    assert!(reason.ends_with(words), "{reason}");
+    let mut events = rig.client.events().await;
+    let _: Scan = rig.client.ask(&path::scan_resume(&scan.id)).await;
     let over = ended(&mut events, &scan.id).await;
     assert_eq!((over.state, over.columns), (ScanState::Complete, COLUMNS));
     rig.daemon.shutdown().await;

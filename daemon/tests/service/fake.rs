@@ -44,6 +44,10 @@ struct State {
     /// A pause after this many columns of a scan, until somebody lets it go on.
     pause_after: Option<(u32, Pause)>,
     is_paused: bool,
+    /// Columns are being delivered.
+    is_scanning: bool,
+    /// Somebody wants them to stop.
+    pause_asked: bool,
 }
 
 /// The scanner, and the test's hand on it.
@@ -161,6 +165,7 @@ impl FakeScanner {
         let (sender, receiver) = sync_channel(4);
         let this = self.this.get().unwrap().clone();
         let scanner = this.upgrade().unwrap();
+        scanner.change(|state| state.is_scanning = true);
         std::thread::spawn(move || {
             if first > 0 {
                 let needs_person = waits_for.is_some();
@@ -176,18 +181,31 @@ impl FakeScanner {
                 let _ = sender.send(StreamItem::Resumed);
             }
             let end = (first..plan.columns).try_for_each(|index| {
-                if let Some(pause) = scanner.pause_before(index) {
+                let stand_still = |pause| {
                     let tell = |item| sender.send(item).map_err(|_| ScannerError::Closed);
                     tell(StreamItem::Paused(pause))?;
                     scanner.wait_for_resume();
-                    tell(StreamItem::Resumed)?;
+                    tell(StreamItem::Resumed)
+                };
+                if let Some(pause) = scanner.pause_before(index) {
+                    stand_still(pause)?;
                 }
-                scanner.wait_for_leave(index)?;
+                while !scanner.wait_for_leave(index)? {
+                    stand_still(Pause {
+                        cause: ScannerError::PausedOnRequest,
+                        needs_person: true,
+                        columns: index,
+                    })?;
+                    scanner.change(|state| state.laser_on = true);
+                }
                 sender
                     .send(StreamItem::Column(column(&plan, index)))
                     .map_err(|_| ScannerError::Closed)
             });
-            scanner.change(|state| state.laser_on = false);
+            scanner.change(|state| {
+                state.laser_on = false;
+                state.is_scanning = false;
+            });
             let _ = sender.send(StreamItem::End(end));
         });
         let info = ScanInfo {
@@ -211,8 +229,8 @@ impl FakeScanner {
         self.changed.wait_while(state, |state| state.hung).unwrap()
     }
 
-    /// Waits for leave to deliver column `index`.
-    fn wait_for_leave(&self, index: u32) -> Result<(), ScannerError> {
+    /// Waits for leave to deliver column `index`; `false` means that somebody wants a pause.
+    fn wait_for_leave(&self, index: u32) -> Result<bool, ScannerError> {
         let mut state = self.state.lock().unwrap();
         loop {
             state = self.changed.wait_while(state, |state| state.hung).unwrap();
@@ -222,12 +240,16 @@ impl FakeScanner {
             if state.fault_after.is_some_and(|after| index >= after) {
                 return Err(ScannerError::Fault(Faults::TABLE_STALL));
             }
+            if std::mem::take(&mut state.pause_asked) {
+                state.is_paused = true;
+                return Ok(false);
+            }
             match &mut state.permits {
-                None => return Ok(()),
+                None => return Ok(true),
                 Some(0) => state = self.changed.wait(state).unwrap(),
                 Some(permits) => {
                     *permits -= 1;
-                    return Ok(());
+                    return Ok(true);
                 }
             }
         }
@@ -353,6 +375,19 @@ impl Scanner for FakeScanner {
 
     fn resume_scan(&self) -> Result<(), ScannerError> {
         self.change(|state| state.is_paused = false);
+        Ok(())
+    }
+
+    fn pause_scan(&self) -> Result<(), ScannerError> {
+        let mut state = self.answering();
+        if !state.is_scanning {
+            return Err(ScannerError::NothingToPause);
+        }
+        if !state.is_paused {
+            state.pause_asked = true;
+            state.laser_on = false;
+            self.changed.notify_all();
+        }
         Ok(())
     }
 

@@ -8,6 +8,7 @@
 
 mod access;
 mod ailing;
+mod api;
 mod client;
 mod config;
 mod cut_short;
@@ -18,6 +19,7 @@ mod hostile;
 mod jobs;
 mod laser;
 mod old_state;
+mod pause;
 mod power;
 mod preview;
 mod refusals;

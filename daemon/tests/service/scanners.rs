@@ -348,6 +348,7 @@ async fn a_scanner_is_meant_by_its_name_where_there_are_several() {
         ("GET", path::scanner("up"), None),
         ("GET", path::scanner_laser("up"), None),
         ("POST", path::scanner_abort("up"), None),
+        ("POST", path::scanner_pause("up"), None),
         ("POST", path::scanner_resume("up"), None),
     ] {
         let unknown = refused(&rig, method, &path, body).await;

@@ -57,7 +57,8 @@ async fn a_scan_becomes_a_result_in_the_spool() {
             "report.html",
             "report.json",
             "report.pdf",
-            "residuals.png"
+            "residuals.png",
+            "view.glb"
         ]
     );
     let report = json(&directory.join("report.json"));

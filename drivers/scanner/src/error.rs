@@ -242,6 +242,15 @@ pub enum ScannerError {
     /// A scan that was interrupted earlier cannot be taken up.
     #[error("{0}")]
     NotTakenUp(String),
+    /// A person has asked for a pause.
+    #[error("paused on request")]
+    PausedOnRequest,
+    /// No scan runs that could be paused.
+    #[error("no scan is running")]
+    NothingToPause,
+    /// The scan could not go on after a pause, or has not begun yet.
+    #[error("the scan cannot be paused: {0}")]
+    CannotPause(String),
     /// No scan is paused.
     #[error("no scan is paused")]
     NothingPaused,

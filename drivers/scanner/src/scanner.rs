@@ -63,6 +63,20 @@ pub trait Scanner: Send + Sync {
         Err(ScannerError::NothingPaused)
     }
 
+    /// Stops the running scan between two columns, until [`Scanner::resume_scan`]. One that is
+    /// paused already goes on by itself no more; where a person is waited for, nothing changes. The
+    /// scanner has closed the scan, and so turned the laser off, when this returns.
+    ///
+    /// # Errors
+    /// [`ScannerError::NothingToPause`]; [`ScannerError::CannotPause`] if the scan could not go on
+    /// afterwards, or is just being begun. After any other error the scan is paused, but the device
+    /// could not be reached: it stops by itself after its dead-man time.
+    fn pause_scan(&self) -> Result<(), ScannerError> {
+        Err(ScannerError::CannotPause(
+            "scans of this scanner do not go on after a pause".to_owned(),
+        ))
+    }
+
     /// Turns the laser off and stops the table at once. A running scan's stream ends with
     /// [`ScannerError::Aborted`], as does whatever else is waited for.
     ///

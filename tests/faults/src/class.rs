@@ -2,7 +2,7 @@
 
 use sim_scanner::fault::{FaultSpec, Strikes};
 
-use crate::conditions::{CLOCK_JUMP, Conditions, HOST_SLEEP, HostFaults, LONG_SLEEP};
+use crate::conditions::{CLOCK_JUMP, Conditions, HOST_SLEEP, HostFaults, LONG_SLEEP, PAUSE};
 use crate::scene::Dice;
 
 /// Who ends what a class of faults brings about.
@@ -46,7 +46,7 @@ const fn person(name: &'static str, rate: f64, words: &'static str) -> Class {
 }
 
 /// All classes.
-pub const CLASSES: [Class; 23] = [
+pub const CLASSES: [Class; 24] = [
     class("flip", 1e-4, "bit"),
     class("lose", 1e-3, "byte"),
     class("double", 1e-3, "byte"),
@@ -70,6 +70,7 @@ pub const CLASSES: [Class; 23] = [
     person("laser", 0.06, "laser fault"),
     person("interlock", 0.06, "interlock open"),
     person("move-part", 0.06, "has moved"),
+    person(PAUSE, 0.06, "paused on request"),
 ];
 
 impl Class {
@@ -115,6 +116,7 @@ pub fn mix(seed: u64) -> (Conditions, Vec<&'static Class>) {
 fn conditions(classes: &[(&Class, f64)], seed: u64) -> Conditions {
     let mut faults = FaultSpec::default();
     let mut host = HostFaults::default();
+    let mut pause = 0.0;
     for (class, rate) in classes {
         let (line, device) = (&mut faults.line, &mut faults.device);
         let place = match class.name {
@@ -148,6 +150,7 @@ fn conditions(classes: &[(&Class, f64)], seed: u64) -> Conditions {
             "move-part" => &mut device.move_part,
             HOST_SLEEP => &mut host.sleep,
             LONG_SLEEP => &mut host.long_sleep,
+            PAUSE => &mut pause,
             name => panic!("no fault is called {name}"),
         };
         *place = *rate;
@@ -158,6 +161,7 @@ fn conditions(classes: &[(&Class, f64)], seed: u64) -> Conditions {
         seed,
         faults,
         host,
+        pause,
         careless: false,
         // Every other scan is on a line that nobody sees being pulled.
         feels_the_plug: seed.is_multiple_of(2),

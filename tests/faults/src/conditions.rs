@@ -14,6 +14,8 @@ pub struct Conditions {
     pub faults: FaultSpec,
     /// What goes wrong with the host.
     pub host: HostFaults,
+    /// A person pauses the scan, at this rate per column.
+    pub pause: f64,
     /// The person at first lets the scan go on without having put anything right.
     pub careless: bool,
     /// Both ends see at once that the cable is out, as on USB; otherwise bytes are lost.
@@ -41,6 +43,9 @@ pub const LONG_SLEEP: &str = "long-sleep";
 
 /// Clocks jump: the device's, the host's, or both.
 pub const CLOCK_JUMP: &str = "clock-jump";
+
+/// A person pauses the scan.
+pub const PAUSE: &str = "pause";
 
 /// How a scan went.
 #[derive(Debug, Clone)]

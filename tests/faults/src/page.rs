@@ -66,7 +66,9 @@ pub(crate) fn page(tallies: &[Tally], from: u64) -> String {
          forward or back, or to the last second before it begins anew; and, at the same rate, the \
          host's clock leaps ahead by 1 to 400 s between two looks at the line, every other time \
          that of the device with it, as where both are in one suspended machine. (The driver \
-         goes by a clock that counts from the computer's start and never runs back.)\n\n\
+         goes by a clock that counts from the computer's start and never runs back.) `pause`: \
+         somebody pauses the scan within 0.5 s of a column, and after every other word that lets it \
+         go on within 4 s once more, whatever it is at then.\n\n\
          *Struck* are the scans in which the fault happened at least once, *times* is how often it \
          did in all of them (of a mix: any of its faults). *Excused* are scans whose object was \
          moved before 16 samples of it were measured, too little to notice it by: their journal \

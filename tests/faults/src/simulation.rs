@@ -85,6 +85,9 @@ struct Simulation {
     disk: Vec<(Duration, u32)>,
     disk_dice: Dice,
     person_at: Option<Duration>,
+    /// When somebody pauses the scan.
+    pause_at: Option<Duration>,
+    pause_dice: Dice,
     /// Since when the scan waits for a person.
     asked_since: Option<Duration>,
     /// How often the person has come since the last new column.
@@ -145,6 +148,8 @@ impl Simulation {
             disk_dice: Dice::new(conditions.seed, 3),
             asked_since: None,
             person_at: None,
+            pause_at: None,
+            pause_dice: Dice::new(conditions.seed, 4),
             visits: 0,
             asleep_until: Duration::ZERO,
             guard: Guard::default(),

@@ -1,9 +1,12 @@
 //! A scan that pauses, and goes on by itself or on a word.
 
 use anyhow::Result;
-use relief_api::{Event, Scan, ScanState, ScannerLink, Status, path};
-use relief_tests::rig::{Events, GUARD, Refused, Rig, journal_columns, small_house};
+use relief_api::{Event, LaserState, Scan, ScanState, ScannerLink, Status, path};
+use relief_tests::rig::{
+    Events, GUARD, Refused, Rig, journal_columns, leisurely_house, small_house,
+};
 use scanner_protocol::{Faults, ResetCause};
+use sim_scanner::config::SimConfig;
 
 /// Waits until the scan is paused for a reason with these words in it.
 async fn paused(events: &mut Events, id: &str, words: &str) -> Result<Scan> {
@@ -28,10 +31,12 @@ async fn amid(columns: u32) -> Result<(Rig, Events, Scan)> {
 }
 
 /// What an undisturbed scan keeps.
-async fn undisturbed() -> Result<Vec<scan_record::RawColumn>> {
-    let rig = Rig::start(&small_house()).await?;
-    let ended = rig.scan_to_result(&super::named("house")).await?;
-    let columns = journal_columns(&rig.journal(&ended.scan.id).await?)?;
+async fn undisturbed(scanner: &SimConfig) -> Result<Vec<scan_record::RawColumn>> {
+    let rig = Rig::start(scanner).await?;
+    let mut events = rig.client().events().await?;
+    let scan = rig.scan(&super::named("house")).await?;
+    events.scan_complete(&scan.id).await?;
+    let columns = journal_columns(&rig.journal(&scan.id).await?)?;
     rig.end().await?;
     Ok(columns)
 }
@@ -62,7 +67,7 @@ async fn an_open_interlock_pauses_the_scan_until_a_person_has_looked() -> Result
     let over = events.scan_complete(&scan.id).await?;
     assert_eq!((over.columns, over.reason), (60, None));
     let columns = journal_columns(&rig.journal(&scan.id).await?)?;
-    assert_eq!(columns, undisturbed().await?);
+    assert_eq!(columns, undisturbed(&small_house()).await?);
 
     let again = rig.client().ask::<Scan>(path::RESUME).await;
     let refused = again.expect_err("it is over").downcast::<Refused>()?.0;
@@ -83,7 +88,7 @@ async fn a_reset_of_the_device_is_got_over_by_itself() -> Result<()> {
     let over = events.scan_complete(&scan.id).await?;
     assert_eq!(over.columns, 60);
     let columns = journal_columns(&rig.journal(&scan.id).await?)?;
-    assert_eq!(columns, undisturbed().await?);
+    assert_eq!(columns, undisturbed(&small_house()).await?);
     rig.end().await
 }
 
@@ -106,7 +111,7 @@ async fn a_moved_object_is_refused_with_its_figure_until_it_is_put_back() -> Res
     let _: Scan = rig.client().ask(path::RESUME).await?;
     events.scan_complete(&scan.id).await?;
     let columns = journal_columns(&rig.journal(&scan.id).await?)?;
-    assert_eq!(columns, undisturbed().await?);
+    assert_eq!(columns, undisturbed(&small_house()).await?);
     rig.end().await
 }
 
@@ -118,5 +123,52 @@ async fn a_paused_scan_can_be_aborted() -> Result<()> {
     let _: Scan = rig.client().ask(path::ABORT).await?;
     let over = events.scan_over(&scan.id).await?;
     assert_eq!((over.state, over.columns), (ScanState::Aborted, 20));
+    rig.end().await
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_scan_paused_on_request_stands_still_with_the_laser_off() -> Result<()> {
+    // A scanner that waits for the test would have its laser off by itself.
+    let leisurely = leisurely_house();
+    let rig = Rig::start(&leisurely).await?;
+    let control = rig.control()?;
+    let mut events = rig.client().events().await?;
+    let scan = rig.scan(&super::named("house")).await?;
+    events.columns(&scan.id, 20).await?;
+    control.wait_until(GUARD, |device| device.laser_on)?;
+    let _: Scan = rig.client().ask(path::PAUSE).await?;
+    // By the simulator's truth, as soon as this is answered.
+    assert!(!control.snapshot().laser_on);
+    let stopped = paused(&mut events, &scan.id, "paused on request").await?;
+    assert!(stopped.needs_person);
+    assert!((20..2_000).contains(&stopped.columns), "{stopped:?}");
+    let status: Status = rig.client().get(path::STATUS).await?;
+    assert_eq!(status.scanner.link, ScannerLink::Scanning, "no trouble");
+    assert_eq!(status.laser.map(|entry| entry.laser), Some(LaserState::Off));
+
+    // Once more changes nothing, and no column comes.
+    let _: Scan = rig.client().ask(&path::scan_pause(&scan.id)).await?;
+    assert!(!control.snapshot().laser_on);
+    let still: Scan = rig.client().get(&path::scan(&scan.id)).await?;
+    assert_eq!(
+        (still.state, still.columns),
+        (ScanState::Paused, stopped.columns)
+    );
+
+    let _: Scan = rig.client().ask(path::RESUME).await?;
+    let over = events.scan_complete(&scan.id).await?;
+    assert_eq!((over.columns, over.reason), (2_000, None));
+    let columns = journal_columns(&rig.journal(&scan.id).await?)?;
+    // How fast it measures is not seen in what it measures.
+    let mut hurried = leisurely;
+    hurried.device.line_rate_hz = small_house().device.line_rate_hz;
+    assert!(columns == undisturbed(&hurried).await?);
+
+    let again = rig.client().ask::<Scan>(path::PAUSE).await;
+    let refused = again.expect_err("it is over").downcast::<Refused>()?.0;
+    assert_eq!(
+        (refused.status, refused.kind.as_str()),
+        (409, "nothing-to-pause")
+    );
     rig.end().await
 }

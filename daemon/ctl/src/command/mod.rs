@@ -3,6 +3,7 @@
 pub(crate) mod abort;
 pub(crate) mod change;
 pub(crate) mod compare;
+pub(crate) mod config;
 pub(crate) mod convert;
 pub(crate) mod demo;
 pub(crate) mod doctor;
@@ -17,6 +18,7 @@ pub(crate) mod manual;
 mod named;
 mod pages;
 mod part;
+pub(crate) mod pause;
 mod places;
 mod regularize;
 pub(crate) mod rerun;
@@ -53,6 +55,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Skin(args) => block_on(skin::run(args, json)),
         Command::Scan(args) => block_on(scan::run(args, json)),
         Command::Abort(args) => block_on(abort::run(args, json)),
+        Command::Pause(args) => block_on(pause::run(args, json)),
         Command::Resume(args) => block_on(resume::run(args, json)),
         Command::Status(args) => block_on(status::run(args, json)),
         Command::Scans(args) => block_on(scans::run(args, json)),
@@ -67,6 +70,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Laser(args) => block_on(laser::run(args, json)),
         Command::Token(args) => block_on(token::run(args, json)),
         Command::Webhooks(args) => block_on(webhooks::run(args, json)),
+        Command::Config(args) => config::run(args, json),
         Command::Manual(args) => manual::run(&args, json),
     }
 }

@@ -59,17 +59,24 @@ const WITH_STEP: [&str; 4] = ["a.igs", "a.step", "manifest.json", "report.json"]
 #[tokio::test(flavor = "multi_thread")]
 async fn pictures_are_the_first_to_go_when_the_disk_is_full() {
     let (rig, disk) = super::rig(|_| {}).await;
-    // The third of four cannot be made, or finds no room.
-    for only_writes in [false, true] {
+    // One of them cannot be made, or finds no room.
+    for (picture, only_writes) in [
+        ("residuals.png", false),
+        ("residuals.png", true),
+        ("view.glb", true),
+    ] {
         if only_writes {
-            disk.refuse_writes("residuals.png", Errno::NOSPC);
+            disk.refuse_writes(picture, Errno::NOSPC);
         } else {
-            disk.refuse("residuals.png", Errno::NOSPC);
+            disk.refuse(picture, Errno::NOSPC);
         }
         let (scan, _) = rig.scan_to_result("a").await;
         let (names, warnings) = result(&rig, &scan.id).await;
         assert_eq!(names, WITH_STEP);
-        assert!(warnings.contains("pictures were left out"), "{warnings}");
+        assert!(
+            warnings.contains("the pictures and the view in three dimensions were left out"),
+            "{warnings}"
+        );
         disk.heal();
     }
     // Then the page, which tells what other files hold.
@@ -77,7 +84,7 @@ async fn pictures_are_the_first_to_go_when_the_disk_is_full() {
         disk.refuse_writes(page, Errno::NOSPC);
         let (scan, _) = rig.scan_to_result("a").await;
         let (names, warnings) = result(&rig, &scan.id).await;
-        assert_eq!(names.len(), WITH_STEP.len() + 4, "{names:?}");
+        assert_eq!(names.len(), WITH_STEP.len() + 5, "{names:?}");
         assert!(
             !names
                 .iter()
@@ -90,13 +97,13 @@ async fn pictures_are_the_first_to_go_when_the_disk_is_full() {
     disk.refuse_writes("a.step", Errno::NOSPC);
     let (scan, _) = rig.scan_to_result("a").await;
     let (names, warnings) = result(&rig, &scan.id).await;
-    assert_eq!(names.len(), BARE.len() + 4 + 2);
+    assert_eq!(names.len(), BARE.len() + 5 + 2);
     assert!(!names.contains(&"a.step".to_owned()), "{names:?}");
     assert!(warnings.contains("STEP file was left out"), "{warnings}");
     disk.heal();
     let (scan, _) = rig.scan_to_result("a").await;
     let (names, warnings) = result(&rig, &scan.id).await;
-    assert_eq!(names.len(), WITH_STEP.len() + 4 + 2);
+    assert_eq!(names.len(), WITH_STEP.len() + 5 + 2);
     assert!(!warnings.contains("left out"), "{warnings}");
     rig.daemon.shutdown().await;
 }
@@ -117,7 +124,10 @@ async fn the_reserve_is_for_scans_and_not_for_pictures() {
     crate::rig::job_over(&mut events, &rig, scan.jobs[0]).await;
     let (names, warnings) = result(&rig, &scan.id).await;
     assert_eq!(names, BARE);
-    assert!(warnings.contains("pictures were left out"), "{warnings}");
+    assert!(
+        warnings.contains("the pictures and the view in three dimensions were left out"),
+        "{warnings}"
+    );
     assert!(warnings.contains("the page was left out"), "{warnings}");
     assert!(warnings.contains("STEP file was left out"), "{warnings}");
     rig.daemon.shutdown().await;

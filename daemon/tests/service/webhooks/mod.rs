@@ -189,6 +189,26 @@ async fn trouble_is_told_to_those_who_want_to_hear_of_it() {
         assert_eq!(told(WebhookEvent::JobDone).scan.unwrap().id, scan.id);
         assert_eq!(jobs.next().message().event, WebhookEvent::JobDone);
     }
+    // Nor is one that somebody has asked for: who has done so knows.
+    let mut events = rig.client.events().await;
+    rig.scanner.allow(5);
+    let scan = rig.start_scan("on request").await;
+    let five = |event: &relief_api::Event| {
+        matches!(event, relief_api::Event::Column { columns: 5, .. }).then_some(())
+    };
+    events.until(five).await;
+    let _: Scan = rig.client.ask(&path::scan_pause(&scan.id)).await;
+    let paused = |event: &relief_api::Event| match event {
+        relief_api::Event::Scan(scan) => (scan.state == ScanState::Paused).then_some(()),
+        _ => None,
+    };
+    events.until(paused).await;
+    rig.scanner.allow_all();
+    let _: Scan = rig.client.ask(&path::scan_resume(&scan.id)).await;
+    ended(&mut events, &scan.id).await;
+    assert_eq!(told(WebhookEvent::ScanEnded).scan.unwrap().id, scan.id);
+    assert_eq!(told(WebhookEvent::JobDone).scan.unwrap().id, scan.id);
+    assert_eq!(jobs.next().message().event, WebhookEvent::JobDone);
     let mut events = rig.client.events().await;
     rig.scanner.fault_after(3);
     let scan = rig.start_scan("broken").await;

@@ -60,6 +60,10 @@ macro_rules! attached {
                 self.link.resume_scan()
             }
 
+            fn pause_scan(&self) -> Result<(), ScannerError> {
+                self.link.pause_scan()
+            }
+
             fn abort(&self) -> Result<(), ScannerError> {
                 self.link.abort()
             }

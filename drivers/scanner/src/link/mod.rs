@@ -31,6 +31,7 @@ enum Call {
     Acknowledge(ScanNumber, u32),
     CloseScan(ScanNumber),
     Resume(SyncSender<Result<Outcome, ScannerError>>),
+    Pause(SyncSender<Result<Outcome, ScannerError>>),
     TakeUp(
         Box<InterruptedScan>,
         SyncSender<Result<Outcome, ScannerError>>,
@@ -169,6 +170,10 @@ impl Scanner for LinkScanner {
 
     fn resume_scan(&self) -> Result<(), ScannerError> {
         self.call(Call::Resume).map(|_| ())
+    }
+
+    fn pause_scan(&self) -> Result<(), ScannerError> {
+        self.call(Call::Pause).map(|_| ())
     }
 
     fn abort(&self) -> Result<(), ScannerError> {

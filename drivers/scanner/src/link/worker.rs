@@ -66,6 +66,8 @@ pub(super) struct Worker {
     identify: Vec<Reply>,
     identity: Option<Box<Identity>>,
     stream: Option<Stream>,
+    /// Who waits for the device to have closed a scan that is paused on request.
+    pausing: Vec<Reply>,
     next_scan: u64,
 }
 
@@ -101,6 +103,7 @@ impl Worker {
             identify: Vec::new(),
             identity: None,
             stream: None,
+            pausing: Vec::new(),
             next_scan: 0,
         }
     }
@@ -132,6 +135,7 @@ impl Worker {
             }
             self.take_events();
             self.mind_the_scan();
+            self.tell_who_pauses();
         }
     }
 
@@ -184,6 +188,12 @@ impl Worker {
                 let _ = reply.send(resumed.map(|()| Outcome::Done));
                 self.hurry();
             }
+            Call::Pause(reply) => match self.pause() {
+                Ok(()) => self.pausing.push(reply),
+                Err(error) => {
+                    let _ = reply.send(Err(error));
+                }
+            },
             Call::TakeUp(scan, reply) => {
                 let begun = self.take_up(*scan, now);
                 let _ = reply.send(begun);
@@ -193,10 +203,11 @@ impl Worker {
                 let _ = reply.send(Err(ScannerError::ScanRunning));
             }
             Call::Do(command, reply) => {
-                if command == Command::Abort
-                    && let Some(stream) = &mut self.stream
-                {
-                    stream.scan.abort();
+                if command == Command::Abort {
+                    if let Some(stream) = &mut self.stream {
+                        stream.scan.abort();
+                    }
+                    self.answer_who_pauses(&Err(ScannerError::Aborted));
                 }
                 self.next_ticket += 1;
                 let ticket = Ticket(self.next_ticket);
@@ -236,6 +247,42 @@ impl Worker {
         self.stream
             .as_ref()
             .is_some_and(|stream| stream.scan.is_paused())
+    }
+
+    /// Has the scan stop until a person lets it go on.
+    fn pause(&mut self) -> Result<(), ScannerError> {
+        // What has come is handed on, and a scan that is over with it is not paused.
+        self.take_events();
+        if !self.plans.is_empty() {
+            return Err(ScannerError::CannotPause(
+                "it is just being begun; try again in a moment, or abort it".to_owned(),
+            ));
+        }
+        match &mut self.stream {
+            Some(stream) => stream.scan.pause(),
+            None => Err(ScannerError::NothingToPause),
+        }
+    }
+
+    /// Answers those who asked for a pause, once the device has closed the scan.
+    fn tell_who_pauses(&mut self) {
+        let stopping = self.stream.as_ref().is_some_and(|s| s.scan.is_stopping());
+        if self.pausing.is_empty() || stopping {
+            return;
+        }
+        let closed = match &self.line {
+            Some(line) => line.session.closed(),
+            None => Some(Err(self.logged.clone().unwrap_or(ScannerError::Closed))),
+        };
+        if let Some(closed) = closed {
+            self.answer_who_pauses(&closed);
+        }
+    }
+
+    fn answer_who_pauses(&mut self, closed: &Result<(), ScannerError>) {
+        for reply in self.pausing.drain(..) {
+            let _ = reply.send(closed.clone().map(|()| Outcome::Done));
+        }
     }
 
     /// A device that has just been plugged in is tried at once, and then, since it may need a
@@ -409,6 +456,7 @@ impl Worker {
         for reply in self.identify.drain(..) {
             let _ = reply.send(Err(error.clone()));
         }
+        self.answer_who_pauses(&Err(error.clone()));
         self.parked.clear();
         for reply in std::mem::take(&mut self.callers).into_values() {
             let _ = reply.send(Err(error.clone()));

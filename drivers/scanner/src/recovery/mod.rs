@@ -16,6 +16,7 @@
 //! in; columns, each once, and word of pauses come out.
 
 mod interrupted;
+mod on_request;
 mod overlap;
 mod pause;
 
@@ -110,8 +111,10 @@ enum State {
     Waiting(Duration),
     /// Waits for a person.
     Attended,
+    /// Where it was paused meanwhile, a person is waited for once the table is at home.
     Homing(Ticket),
     Homed,
+    /// Where it was paused meanwhile, what the device begins is unwanted.
     Continuing(Ticket),
     /// The scan on the device is unwanted; then a person is waited for.
     Refused,
@@ -245,15 +248,15 @@ impl Recovery {
         Ok(())
     }
 
-    /// The device cannot be reached, which is news to a scan that has just been taken up.
+    /// The device cannot be reached, which is news to a scan that is to go on and knows of no
+    /// trouble: one that has just been taken up, or was paused on request.
     pub fn unreachable(&mut self, error: &ScannerError) {
-        let just_taken_up = |pause: &Paused| {
-            matches!(
-                pause.told.cause,
-                ScannerError::ProgramEnded { before: None }
-            )
+        let knows_of_none = |pause: &Paused| match pause.told.cause {
+            ScannerError::ProgramEnded { before: None } => true,
+            ScannerError::PausedOnRequest => !pause.told.needs_person,
+            _ => false,
         };
-        if self.pause.as_ref().is_some_and(just_taken_up) {
+        if self.pause.as_ref().is_some_and(knows_of_none) {
             self.tell(error.clone(), self.needs_person());
         }
     }
@@ -464,10 +467,20 @@ impl Recovery {
 
     fn finished(&mut self, ticket: Ticket, result: Result<Answer, ScannerError>, now: Duration) {
         match (self.state, result) {
-            (State::Homing(ours), Ok(_)) if ours == ticket => self.state = State::Homed,
+            (State::Homing(ours), Ok(_)) if ours == ticket => {
+                self.state = if self.needs_person() {
+                    State::Attended
+                } else {
+                    State::Homed
+                };
+            }
             (State::Continuing(ours), Ok(Answer::Scan(info))) if ours == ticket => {
                 if info == self.info {
-                    self.state = State::Running;
+                    self.state = if self.needs_person() {
+                        State::Refused
+                    } else {
+                        State::Running
+                    };
                     self.again.clear();
                 } else {
                     self.end(Err(ScannerError::Protocol(format!(
@@ -491,7 +504,10 @@ impl Recovery {
         let Some(settings) = self.settings.as_ref().filter(|_| class != Class::Final) else {
             return self.end(Err(error));
         };
-        let needs_person = class == Class::NeedsPerson || self.attempts >= settings.attempts;
+        // Who has paused it meanwhile has not said yet that it may go on.
+        let waited_for = self.needs_person();
+        let needs_person =
+            waited_for || class == Class::NeedsPerson || self.attempts >= settings.attempts;
         let failures = self.pause.as_ref().map_or(0, |pause| pause.failures);
         let wait = settings
             .first_pause
@@ -503,7 +519,10 @@ impl Recovery {
             State::Waiting(now + wait)
         };
         let shown = for_a_person(&error);
-        self.tell(error, needs_person);
+        // What passes by itself need not be told to whoever is waited for anyway.
+        if !waited_for || class == Class::NeedsPerson {
+            self.tell(error, needs_person);
+        }
         if let Some(pause) = &mut self.pause {
             pause.failures += 1;
             pause.shown = pause.shown.union(shown);

@@ -20,6 +20,10 @@ pub struct Pause {
 impl fmt::Display for Pause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.cause)?;
+        let on_request = self.cause == ScannerError::PausedOnRequest;
+        if on_request && self.needs_person {
+            return f.write_str("; `relief resume` lets it go on");
+        }
         let program_ended = match &self.cause {
             ScannerError::ProgramEnded { before } => Some(before),
             _ => None,
@@ -29,7 +33,7 @@ impl fmt::Display for Pause {
             Ok(())
         } else if self.needs_person {
             f.write_str("; see to it, then let the scan go on with `relief resume`")
-        } else if program_ended.is_some() {
+        } else if program_ended.is_some() || on_request {
             f.write_str("; the scan goes on by itself once its last columns are found unchanged")
         } else {
             f.write_str("; the scan goes on by itself once that is over")
@@ -129,5 +133,15 @@ mod tests {
         assert!(pause.to_string().contains("relief resume"));
         pause.needs_person = false;
         assert!(pause.to_string().contains("by itself"));
+        pause.cause = ScannerError::PausedOnRequest;
+        assert_eq!(
+            pause.to_string(),
+            "paused on request; the scan goes on by itself once its last columns are found unchanged"
+        );
+        pause.needs_person = true;
+        assert_eq!(
+            pause.to_string(),
+            "paused on request; `relief resume` lets it go on"
+        );
     }
 }

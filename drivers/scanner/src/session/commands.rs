@@ -116,6 +116,7 @@ impl Session {
     pub fn close_scan(&mut self) {
         if let Some(scan) = self.scan.take() {
             self.scan_over = false;
+            self.unclosed = None;
             self.requests.push(
                 &CloseScan {
                     scan_id: scan.scan_id(),
@@ -123,6 +124,16 @@ impl Session {
                 Purpose::CloseScan,
             );
         }
+    }
+
+    /// Whether the device has no scan any more, as far as it has answered; `None` while it has yet
+    /// to do so.
+    #[must_use]
+    pub fn closed(&self) -> Option<Result<(), ScannerError>> {
+        if !self.is_ready() || self.requests.has_close() {
+            return None;
+        }
+        Some(self.unclosed.clone().map_or(Ok(()), Err))
     }
 
     fn abort(&mut self, ticket: Option<Ticket>) {

@@ -53,6 +53,8 @@ pub struct Session {
     scan: Option<ScanTracker>,
     /// All columns of `scan` have been handed on; it is kept until they are acknowledged.
     scan_over: bool,
+    /// Why nobody knows whether the device has closed the last scan.
+    unclosed: Option<ScannerError>,
     next_scan_id: u16,
     /// Running number of frames that are not requests.
     stream_tag: u16,
@@ -109,6 +111,7 @@ impl Session {
             recovered: None,
             scan: None,
             scan_over: false,
+            unclosed: None,
             // No scan takes less than a request, so this is ahead of earlier scans' too.
             next_scan_id: first_tag,
             stream_tag: 0,
@@ -248,6 +251,9 @@ impl Session {
                         awaited: purpose.awaited(),
                         after: timeout * attempts,
                     };
+                    if purpose == Purpose::CloseScan {
+                        self.unclosed = Some(error.clone());
+                    }
                     self.fail(&purpose, error);
                 }
             }

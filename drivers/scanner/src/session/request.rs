@@ -207,6 +207,12 @@ impl Requests {
             })
     }
 
+    /// Whether the closing of a scan has been asked for and not yet answered.
+    pub(super) fn has_close(&self) -> bool {
+        let mut open = self.open.iter().chain(&self.queue);
+        open.any(|open| open.purpose == Purpose::CloseScan)
+    }
+
     /// A column is safe: a scan that the device is being asked to take up counts from there.
     pub(super) fn acknowledge(&mut self, column: u32) {
         for open in self.open.iter_mut().chain(&mut self.queue) {

@@ -11,6 +11,7 @@ mod going_on;
 mod hostile;
 mod link;
 mod opening;
+mod pause;
 mod pty;
 mod recovery;
 mod resume;

@@ -9,6 +9,7 @@ use scanner_driver::session::{Answer, Command, Event, Session, Ticket};
 use scanner_driver::{Pause, ScannerError};
 use scanner_protocol::ScanPlan;
 
+use super::surroundings::PAUSE_SOON_S;
 use super::{Simulation, Stage};
 
 /// The service's way to begin a scan: home, then scan, and anew so often if the trouble may
@@ -45,6 +46,7 @@ impl Simulation {
         }
         self.reach_the_disk();
         self.look_after_it();
+        self.pause_on_request();
         self.begin();
         self.events()?;
         if let Some(scan) = &mut self.scan {
@@ -72,6 +74,7 @@ impl Simulation {
             .collect();
         times.push(self.line.due_for_host());
         times.push(self.person_at);
+        times.push(self.pause_at);
         times.extend(self.disk.iter().map(|(time, _)| Some(*time)));
         times
     }
@@ -166,6 +169,7 @@ impl Simulation {
                         journal.append(column)?;
                     }
                     self.risk_the_host();
+                    self.risk_a_pause(self.conditions.pause, PAUSE_SOON_S);
                 }
                 Progress::Paused(pause) => self.paused(pause),
                 Progress::Resumed => {

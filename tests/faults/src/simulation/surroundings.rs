@@ -7,7 +7,7 @@ use sim_scanner::Vec3;
 use sim_scanner::source::Source;
 
 use super::Simulation;
-use crate::conditions::{CLOCK_JUMP, HOST_SLEEP, LONG_SLEEP};
+use crate::conditions::{CLOCK_JUMP, HOST_SLEEP, LONG_SLEEP, PAUSE};
 
 /// How long a person takes to look.
 const PERSON: Duration = Duration::from_secs(30);
@@ -31,6 +31,14 @@ const LONG_SLEEP_S: (f64, f64) = (16.0 * 60.0, 3600.0);
 
 /// The least and the most by which a clock leaps: two of them are below that quarter of an hour.
 const LEAP_S: (f64, f64) = (1.0, 400.0);
+
+/// A pause comes so long after a column, seconds, at most.
+pub(super) const PAUSE_SOON_S: f64 = 0.5;
+
+/// The share of words after which somebody pauses the scan once more, and so long after them,
+/// seconds, at most: while the table is homed, or when the scan is just about to go on.
+const PAUSED_AGAIN: f64 = 0.5;
+const PAUSED_AGAIN_S: f64 = 4.0;
 
 impl Simulation {
     /// Columns reach the disk, and are acknowledged.
@@ -89,6 +97,32 @@ impl Simulation {
             let _ = scan.resume(self.clock.shows(self.now));
         }
         self.guard.word_given(self.now);
+        if self.conditions.pause > 0.0 {
+            self.risk_a_pause(PAUSED_AGAIN, PAUSED_AGAIN_S);
+        }
+    }
+
+    /// Somebody may want the scan to stand still, within this time.
+    pub(super) fn risk_a_pause(&mut self, rate: f64, within_s: f64) {
+        // Nothing is drawn for what cannot happen.
+        if rate > 0.0 && self.pause_at.is_none() && self.pause_dice.uniform() < rate {
+            let soon_s = within_s * self.pause_dice.uniform();
+            self.pause_at = Some(self.now + Duration::from_secs_f64(soon_s));
+        }
+    }
+
+    /// Somebody pauses the scan, whatever it is at.
+    pub(super) fn pause_on_request(&mut self) {
+        if self.pause_at.is_none_or(|at| self.now < at) {
+            return;
+        }
+        self.pause_at = None;
+        // It may be over meanwhile.
+        if let Some(scan) = &mut self.scan
+            && scan.pause().is_ok()
+        {
+            self.strikes.note(PAUSE);
+        }
     }
 
     /// Nothing has come of all the visits.

@@ -108,7 +108,7 @@ fn lines(told: &Told) -> String {
     lines.push(String::new());
     lines.push(format!("CAD file     {}", told.iges.display()));
     lines.push(format!(
-        "beside it    STEP file, page, pictures, report and manifest in {}",
+        "beside it    STEP file, page, pictures, view, report and manifest in {}",
         told.directory.display()
     ));
     lines.join("\n")

@@ -79,7 +79,7 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
             findings.push(Finding::bad(
                 "configuration",
                 format!("{error}; the checks below take the defaults"),
-                "mend the file at the place named (reliefd --check-config looks at it again), or \
+                "mend the file at the place named (`relief config check` looks at it again), or \
                  name another with --config",
             ));
             Config::default()

@@ -1,6 +1,7 @@
 //! A scan across interruptions under simulated time: who lets it go on, and when the laser may
 //! be on again.
 
+mod on_request;
 mod rig;
 mod taken_up;
 

@@ -249,6 +249,10 @@ impl Rig {
         self.scan.resume(self.now).unwrap();
     }
 
+    pub(super) fn pause(&mut self) {
+        self.scan.pause().unwrap();
+    }
+
     /// The laser stays off for a good while, and a person is still asked.
     pub(super) fn stays_dark(&mut self) {
         self.laser_seen = self.device.laser_on;

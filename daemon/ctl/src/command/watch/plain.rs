@@ -1,4 +1,4 @@
-//! `relief watch`.
+//! Events as lines of text, or as elements of a JSON array.
 
 use std::io::Write;
 
@@ -6,24 +6,14 @@ use relief_api::{Event, ScannerStatus};
 
 use crate::failure::Failure;
 use crate::output;
-use crate::service::EndpointArgs;
+use crate::service::Client;
 
-/// Show what the service does, as it happens, until Ctrl-C
-#[derive(Debug, clap::Args)]
-pub(crate) struct Args {
-    /// End after this many events
-    #[arg(long, value_name = "N")]
-    count: Option<u64>,
-    #[command(flatten)]
-    endpoint: EndpointArgs,
-}
-
-pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
-    let client = args.endpoint.client()?;
+/// Tells the events of the service until it ends, or so many of them.
+pub(super) async fn run(client: &Client, count: Option<u64>, json: bool) -> Result<(), Failure> {
     let mut events = client.events().await?;
     let mut told = 0;
     let ended = loop {
-        if args.count.is_some_and(|count| told >= count) {
+        if count.is_some_and(|count| told >= count) {
             break Ok(());
         }
         let event = tokio::select! {
@@ -53,7 +43,8 @@ fn element(event: &Event, first: bool) -> Result<(), Failure> {
         .map_err(Failure::Output)
 }
 
-fn line(event: &Event) -> String {
+/// An event in a line.
+pub(super) fn line(event: &Event) -> String {
     match event {
         Event::Status(status) => {
             let several = status.scanners.iter().map(|one| &one.status);
