@@ -2,7 +2,7 @@
 /** The list of jobs: what they are at, what went wrong, and what can be done about it. */
 
 import { at, post } from './api.js';
-import { app, on, t, tell, word } from './app.js';
+import { app, english, on, t, tell, word } from './app.js';
 import { during } from './dialogs.js';
 import { attribute, fill, h, icon, text } from './dom.js';
 import { seconds, when } from './format.js';
@@ -88,7 +88,7 @@ function jobRow(changed) {
     const settings = Object.entries(job.settings ?? {}).map(([name, value]) => `${name} = ${JSON.stringify(value)}`);
     text(about, [t('jobs.number', { id: job.id }), when(job.queued_at, app.words.language), job.scanner,
       job.attempts > 1 ? t('jobs.attempts', { count: job.attempts }) : '', ...settings].filter(Boolean).join(' \u00b7 '));
-    fill(error, fault(job.error, job.hint), (job.left_out ?? []).map((/** @type {string} */ words) => fault(words, undefined)));
+    fill(error, fault(job.error, job.hint), (job.left_out ?? []).map((/** @type {string} */ words) => english(h('p', { class: 'remark' }, words))));
     show(app.model.progress.get(job.id) ?? (job.stage ? { stage: job.stage, fraction: 0 } : undefined));
     fill(actions,
       job.state === 'done' ? h('a', { class: 'button', href: routeTo('result', job.result), 'aria-label': t('jobs.open', { name: job.name }) }, icon('link'), h('span', null, t('scans.result'))) : null,

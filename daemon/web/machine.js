@@ -9,6 +9,7 @@ import { clock, fixed } from './format.js';
 import { askAbort } from './laser.js';
 import { Live, underWay } from './model.js';
 import { chip, progress, reading, tablist } from './parts.js';
+import { patient } from './patience.js';
 import { RangePicture } from './picture.js';
 import { Profile } from './profile.js';
 import { routeTo } from './route.js';
@@ -91,7 +92,8 @@ export function openMachine(name) {
         tell('change');
       }
       if (live.whole || live.columns === 0) return;
-      live.under(await get(`/v1/scans/${at(live.scan)}/image?most_nodes=${MOST_NODES}`));
+      const path = `/v1/scans/${at(live.scan)}/image?most_nodes=${MOST_NODES}`;
+      live.under(await patient(() => get(path), () => element.isConnected));
       tell('change');
     } catch (error) {
       // Columns that were removed, or a service that has no images, leave the picture empty.
@@ -247,7 +249,7 @@ function jobPanel(which) {
       const words = now ? `${word('stage', now.stage)} ${Math.round(100 * now.fraction)} %` : '';
       bar.update(now?.fraction ?? 0, words);
       return h('div', { class: 'job-now' }, h('div', { class: 'head' },
-        job.state === 'done' ? h('a', { href: routeTo('result', job.result) }, t('jobs.open', { name: job.name })) : h('span', null, job.name), state),
+        job.state === 'done' ? h('a', { href: routeTo('result', job.result), 'aria-label': t('jobs.open', { name: job.name }) }, job.name) : h('span', null, job.name), state),
       job.state === 'running' ? [bar, h('p', { class: 'dim small' }, words || t('jobs.begins'))] : null,
       job.error ? english(h('p', { class: 'dim small' }, job.error)) : null);
     }), h('a', { class: 'more', href: routeTo('jobs') }, t('machine.all-jobs')));

@@ -8,6 +8,7 @@ import { fill, h, icon } from './dom.js';
 import { fixed, seconds } from './format.js';
 import { Lattice } from './lattice.js';
 import { underWay } from './model.js';
+import { patient } from './patience.js';
 import { RangePicture } from './picture.js';
 import { routeTo } from './route.js';
 import { openRerun } from './scans.js';
@@ -90,14 +91,18 @@ function page(scan, kept, open, state) {
   const after = new RangePicture({ label: t('try.after'), onCursor: follow });
   pictures.push(before, after);
   open.push(...pictures);
+  before.nothing(t('list.asking'));
   after.nothing(t('try.nothing'));
   const panel = (/** @type {string} */ key, /** @type {RangePicture} */ picture) => h('section', { class: 'panel', 'aria-label': t(key) }, h('h2', null, t(key)), picture.element);
 
   /** @type {any} */
   let base = null;
+  const wanted = () => !state.gone;
+  const regridded = (/** @type {Record<string, unknown>} */ settings) => patient(
+    () => post(`/v1/scans/${at(scan.id)}/regrid`, { settings, most_nodes: MOST_NODES }), wanted);
   const loadBefore = async () => {
     try {
-      base = await get(`/v1/scans/${at(scan.id)}/image?most_nodes=${MOST_NODES}`);
+      base = await patient(() => get(`/v1/scans/${at(scan.id)}/image?most_nodes=${MOST_NODES}`), wanted);
       if (!state.gone) before.show(Lattice.of(base));
     } catch (error) {
       before.nothing(error instanceof ApiError ? error.message : String(error));
@@ -106,25 +111,28 @@ function page(scan, kept, open, state) {
   const run = () => during(show, async () => {
     const settings = fields.value();
     if (!settings) throw new Error(t('settings.wrong-line'));
+    // The service makes one image at a time.
+    await loading;
     const [image, told] = await Promise.all([
-      post(`/v1/scans/${at(scan.id)}/regrid`, { settings, most_nodes: MOST_NODES }),
+      regridded(settings),
       // The numbers are of the scanner that is there; without it there are none.
       post('/v1/scans/preview', { ...(scan.scanner ? { scanner: scan.scanner } : {}), settings }).catch((error) => error),
     ]);
     if (state.gone) return;
     after.show(Lattice.of(image));
-    // The figures of the scan as it was come from the same place, once, so that they compare.
-    if (base?.noise_mm === undefined) base = await post(`/v1/scans/${at(scan.id)}/regrid`, { settings: {}, most_nodes: MOST_NODES }).catch(() => base);
-    if (state.gone) return;
     fill(compared, comparison(base, image));
     announce(t('try.done'));
     fill(numbers, told instanceof Error ? trouble(told) : [h('h3', null, t('try.next-scan')), previewFacts(told)]);
+    if (base?.seconds !== undefined) return;
+    // The figures of the scan as it was come from the same place, once, so that they compare.
+    base = await regridded({}).catch(() => base);
+    if (!state.gone) fill(compared, comparison(base, image));
   });
   form.addEventListener('submit', (/** @type {Event} */ event) => {
     event.preventDefault();
     run();
   });
-  loadBefore();
+  const loading = loadBefore();
   return h('div', { class: 'try' }, form, h('div', { class: 'pair' }, panel('try.before', before), panel('try.after', after), compared));
 }
 
@@ -133,12 +141,13 @@ function comparison(base, image) {
   const nodes = (/** @type {any} */ one) => one?.nodes ?? Lattice.of(one).nodes;
   const row = (/** @type {string} */ key, /** @type {string} */ before, /** @type {string} */ after) => h('tr', null, h('th', { scope: 'row' }, t(key)), h('td', { class: 'figure number' }, before), h('td', { class: 'figure number' }, after));
   const none = fixed(null, 0);
+  const noise = (/** @type {any} */ one) => (one?.noise_mm === undefined || one.noise_mm === null ? none : `${fixed(one.noise_mm, 4)} mm`);
   return h('section', { class: 'panel', 'aria-label': t('try.compared') }, h('h2', null, t('try.compared')), h('table', null,
     h('thead', null, h('tr', null, h('th', { scope: 'col' }, t('try.figure')), h('th', { scope: 'col', class: 'number' }, t('try.before')), h('th', { scope: 'col', class: 'number' }, t('try.after')))),
     h('tbody', null,
       row('summary.pitch', base ? `${fixed(base.pitch_mm, 3)} mm` : none, `${fixed(image.pitch_mm, 3)} mm`),
       row('summary.nodes', base ? nodes(base).toLocaleString() : none, nodes(image).toLocaleString()),
-      row('summary.noise', base?.noise_mm === undefined ? none : `${fixed(base.noise_mm, 4)} mm`, `${fixed(image.noise_mm, 4)} mm`),
-      row('summary.inliers', base?.inlier_share === undefined ? none : `${fixed(100 * base.inlier_share, 1)} %`, image.inlier_share === null || image.inlier_share === undefined ? none : `${fixed(100 * image.inlier_share, 1)} %`),
+      row('summary.noise', noise(base), noise(image)),
+      row('summary.inliers', base?.inlier_share === undefined || base.inlier_share === null ? none : `${fixed(100 * base.inlier_share, 1)} %`, image.inlier_share === null || image.inlier_share === undefined ? none : `${fixed(100 * image.inlier_share, 1)} %`),
       row('try.seconds', base?.seconds === undefined ? none : seconds(base.seconds), seconds(image.seconds)))));
 }

@@ -10,6 +10,7 @@ import { bytes, when } from './format.js';
 import { readGlb } from './glb.js';
 import { Lattice } from './lattice.js';
 import { fileLink, tablist } from './parts.js';
+import { patient } from './patience.js';
 import { RangePicture } from './picture.js';
 import { routeTo } from './route.js';
 import { openRerun } from './scans.js';
@@ -117,7 +118,7 @@ function viewers(result, names, report, open, state, onPick) {
     image: async () => {
       const picture = new RangePicture({ label: t('result.image') });
       open.push(picture);
-      const image = await get(`/v1/scans/${at(report.scan.id)}/image?most_nodes=250000`);
+      const image = await patient(() => get(`/v1/scans/${at(report.scan.id)}/image?most_nodes=250000`), () => !state.gone);
       picture.show(Lattice.of(image));
       return picture.element;
     },

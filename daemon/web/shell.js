@@ -36,7 +36,11 @@ export function shell(views, speak) {
   const go = () => {
     const route = parseRoute(location.hash);
     const shown = route.view === 'result' ? 'jobs' : route.view;
-    for (const [k, link] of links.entries()) attribute(link, 'aria-current', NAVIGATION[k] === shown ? 'page' : null);
+    for (const [k, link] of links.entries()) {
+      attribute(link, 'aria-current', NAVIGATION[k] === shown ? 'page' : null);
+      // On a telephone not all of them fit.
+      if (NAVIGATION[k] === shown) link.scrollIntoView({ block: 'nearest', inline: 'nearest' });
+    }
     view?.close?.();
     app.viewName = t(`nav.${route.view}`);
     view = views[route.view](route.argument);

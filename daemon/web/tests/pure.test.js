@@ -5,6 +5,7 @@ import { test } from 'node:test';
 import { deviationColour, heightColour, table, ticks } from '../colour.js';
 import { Rate, bytes, clock, fixed, settingLines, withUncertainty } from '../format.js';
 import { Words, choose } from '../i18n.js';
+import { patient } from '../patience.js';
 import { parseRoute, routeTo, tokenIn } from '../route.js';
 import { SseParser, backoffMs } from '../sse.js';
 
@@ -135,4 +136,25 @@ test('words take values, plurals, and fall back', () => {
   assert.equal(words.say('missing'), 'missing');
   assert.equal(words.word('stage', 'to do'), 'to do');
   assert.equal(words.word('stage', 'of a later version'), 'of a later version');
+});
+
+test('a busy service is asked again, and nothing else is', async () => {
+  let asked = 0;
+  let waited = 0;
+  const busy = (times, kind = 'busy-regridding') => () => {
+    asked += 1;
+    return asked <= times ? Promise.reject(Object.assign(new Error('busy'), { kind })) : Promise.resolve(asked);
+  };
+  const wait = () => Promise.resolve(waited += 1);
+  assert.equal(await patient(busy(3), () => true, wait), 4);
+  assert.equal(waited, 3);
+  asked = 0;
+  await assert.rejects(patient(busy(3), () => asked < 2, wait), /busy/);
+  assert.equal(asked, 2);
+  asked = 0;
+  await assert.rejects(patient(busy(1, 'no-image'), () => true, wait), /busy/);
+  assert.equal(asked, 1);
+  asked = 0;
+  await assert.rejects(patient(busy(1e6), () => true, wait), /busy/);
+  assert.ok(asked < 1000);
 });

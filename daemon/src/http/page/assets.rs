@@ -58,6 +58,7 @@ pub(super) const ASSETS: &[Asset] = &[
     asset!("orbit.js"),
     asset!("paged.js"),
     asset!("parts.js"),
+    asset!("patience.js"),
     asset!("picture.js"),
     asset!("preview.js"),
     asset!("profile.js"),
