@@ -2,9 +2,9 @@
 //! other settings.
 
 use std::io;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::sync::{Arc, MutexGuard, TryLockError};
+use std::time::{Duration, Instant};
 
 use range_image::{Monitor, RangeImage};
 use relief_api::{LiveColumn, Regrid, RegridImage, ScanImage, SettingOverrides};
@@ -18,6 +18,10 @@ use crate::service::Service;
 
 /// Larger scans are not regridded for showing: it would take minutes, which is a job's work.
 const MOST_SAMPLES: u64 = 4_000_000;
+
+/// How long a request waits for its turn.
+const LONGEST_WAIT: Duration = Duration::from_secs(10);
+const LOOK_AGAIN: Duration = Duration::from_millis(20);
 
 /// Whether somebody still waits for an image.
 #[derive(Debug, Clone, Default)]
@@ -81,6 +85,25 @@ impl Service {
         }
     }
 
+    /// One at a time, on one processor: scans and jobs go before pictures.
+    fn turn_to_regrid(&self, wanted: &Wanted) -> Result<MutexGuard<'_, ()>, ServiceError> {
+        let begun = Instant::now();
+        loop {
+            match self.regridding.try_lock() {
+                Ok(turn) => return Ok(turn),
+                // Nothing is left half done by a defect: it holds nothing but the turn.
+                Err(TryLockError::Poisoned(turn)) => return Ok(turn.into_inner()),
+                Err(TryLockError::WouldBlock) if wanted.is_cancelled() => {
+                    return Err(ServiceError::Unwanted);
+                }
+                Err(TryLockError::WouldBlock) if begun.elapsed() > LONGEST_WAIT => {
+                    return Err(ServiceError::Regridding);
+                }
+                Err(TryLockError::WouldBlock) => std::thread::sleep(LOOK_AGAIN),
+            }
+        }
+    }
+
     /// What the range image of a kept scan would be with other settings.
     pub(crate) fn regridded(
         &self,
@@ -98,11 +121,7 @@ impl Service {
         if !scan.state.is_over() {
             return Err(ServiceError::ScanNotOver { id: scan.id });
         }
-        // One at a time, on one processor: scans and jobs go before pictures.
-        let _turn = self
-            .regridding
-            .try_lock()
-            .map_err(|_| ServiceError::Regridding)?;
+        let _turn = self.turn_to_regrid(wanted)?;
         let path = self.journal_path(&scan.id);
         let mut journal = JournalReader::open(&path).map_err(|e| nothing(e.to_string()))?;
         let header = journal.header().clone();

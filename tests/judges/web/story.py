@@ -52,7 +52,7 @@ class Story:
         page.get_by_label("Name", exact=True).fill(name)
         page.get_by_label("Operator").fill("A. Judge")
         self.shot(opened, "start")
-        page.get_by_role("button", name="Start …").click()
+        page.get_by_role("button", name="Start \u2026").click()
         self.shot(opened, "start-sure")
         page.get_by_role("button", name="Laser on: start the scan").click()
 
@@ -209,7 +209,7 @@ class Story:
             self.tab_to(page, "Start scan")
             press("Enter")
             page.keyboard.type("by hand")
-            self.tab_to(page, "Start …")
+            self.tab_to(page, "Start \u2026")
             press("Enter")
             self.tab_to(page, "Laser on: start the scan")
             press("Enter")
