@@ -12,6 +12,7 @@ use super::link::Word;
 use super::picture::Picture;
 use super::rate::Rate;
 use crate::command::watch::plain;
+use crate::output;
 
 /// Most lines of the log, results and jobs that are kept.
 const MOST: usize = 50;
@@ -193,8 +194,9 @@ impl Board {
                     work.stage = Some((stage, fraction));
                 }
             }
-            Event::Published { directory, .. } => {
-                self.published.push_front(directory);
+            Event::Published { result, files, .. } => {
+                let told = format!("{result} ({})", output::counted(files.len(), "file"));
+                self.published.push_front(told);
                 self.published.truncate(MOST);
             }
             Event::Lagged { .. } | Event::Unknown => {}

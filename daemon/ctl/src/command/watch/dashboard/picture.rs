@@ -11,6 +11,8 @@ use super::colours::Depth;
 
 /// Most columns, and nodes in one, that are kept: more than any terminal has of either.
 const MOST: i64 = 600;
+/// Nodes that are looked at to choose the colours.
+const LOOKED_AT: usize = 5000;
 /// From little to much, where there are no colours.
 const SHADES: [char; 4] = ['\u{2591}', '\u{2592}', '\u{2593}', '\u{2588}'];
 
@@ -24,7 +26,6 @@ pub(super) struct Picture {
     first: Option<i64>,
     /// Columns of the scan before it, those of now, and all of them.
     progress: Option<[u32; 3]>,
-    z_um: Option<[i32; 2]>,
 }
 
 impl Picture {
@@ -35,10 +36,6 @@ impl Picture {
         self.progress = Some([before, columns, planned]);
         for column in live {
             self.first.get_or_insert(column.i);
-            for um in column.z_um.iter().flatten().copied() {
-                let [low, high] = self.z_um.unwrap_or([um; 2]);
-                self.z_um = Some([low.min(um), high.max(um)]);
-            }
             if column.i.rem_euclid(self.step) != 0 {
                 continue;
             }
@@ -64,9 +61,21 @@ impl Picture {
         columns.max(rows) / self.step.max(1) > MOST
     }
 
-    /// Least and greatest height, millimetres.
+    /// The heights that colours tell apart, millimetres.
     pub(super) fn z_mm(&self) -> Option<[f64; 2]> {
-        self.z_um.map(|z| z.map(|um| f64::from(um) * 1e-3))
+        self.z_um().map(|z| z.map(|um| f64::from(um) * 1e-3))
+    }
+
+    /// The heights but for the lowest and the highest hundredth: one outlier would leave all others
+    /// one colour.
+    fn z_um(&self) -> Option<[i32; 2]> {
+        let nodes: usize = self.columns.values().map(BTreeMap::len).sum();
+        let heights = self.columns.values().flat_map(BTreeMap::values);
+        let mut some: Vec<i32> = heights.step_by(nodes / LOOKED_AT + 1).copied().collect();
+        some.sort_unstable();
+        let beyond = some.len() / 100;
+        let last = some.len().checked_sub(beyond + 1)?;
+        Some([*some.get(beyond)?, *some.get(last)?])
     }
 
     /// How many are kept.
@@ -106,7 +115,7 @@ impl Picture {
     /// Draws it with two nodes in each character, one above the other.
     pub(super) fn draw(&self, area: Rect, buffer: &mut Buffer, depth: Depth) {
         let (Some([[i_low, i_high], [j_low, j_high]]), Some([z_low, z_high])) =
-            (self.whole(), self.z_um)
+            (self.whole(), self.z_um())
         else {
             return;
         };

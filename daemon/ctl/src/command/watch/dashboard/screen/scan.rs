@@ -90,7 +90,7 @@ fn pace(station: &Station, scan: &Scan, now: &Now) -> String {
     }
     if let Some(rate) = station.rate.per_second(now.s) {
         let left = f64::from(scan.columns_planned.saturating_sub(scan.columns));
-        told += &format!(", {rate:.1} columns/s, {} left", duration(left / rate));
+        told += &format!(", {} left, {rate:.1} columns/s", duration(left / rate));
     }
     if let Some((samples, x_mm)) = station.last_column {
         told += &format!(", x {x_mm:.1} mm, {samples} samples");

@@ -1,5 +1,8 @@
 //! The program as its users meet it: arguments in, files, text and exit code out.
 
+mod demo;
+mod doctor;
+
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -307,98 +310,6 @@ fn scattered_dots_are_no_part_and_the_user_learns_why() {
 }
 
 #[test]
-fn a_configuration_is_checked_without_a_service() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
-    fs::write(at.join("good.toml"), "[scanner]\nport = \"/dev/ttyS7\"\n").unwrap();
-    let output = relief(at, &["config", "check", "good.toml"]);
-    let told = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success(), "{told}");
-    assert_eq!(told, "good.toml: sound\nscanner: /dev/ttyS7\n");
-
-    fs::write(at.join("bad.toml"), "[regrid]\npitch_mm = -1.0\n").unwrap();
-    let output = relief(at, &["config", "check", "bad.toml"]);
-    refused(&output, 1, "bad.toml, line 2, column");
-    let output = relief(at, &["config", "check", "none.toml"]);
-    refused(&output, 1, "cannot read the configuration none.toml");
-}
-
-#[test]
-fn the_doctor_names_every_trouble_and_its_remedy() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
-    let config = format!(
-        "[service]\nstate_dir = {:?}\nspool_dir = {:?}\n[scanner]\nport = {:?}\n",
-        at,
-        at.join("no-spool"),
-        at.join("no-port")
-    );
-    fs::write(at.join("reliefd.toml"), config).unwrap();
-    let socket = at.join("none.sock");
-    let output = relief(
-        at,
-        &[
-            "doctor",
-            "--json",
-            "--config",
-            "reliefd.toml",
-            "--socket",
-            socket.to_str().unwrap(),
-        ],
-    );
-    assert_eq!(output.status.code(), Some(1));
-    assert_eq!(String::from_utf8_lossy(&output.stderr).lines().count(), 1);
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(told["healthy"], false);
-    let graded = |check: &str| {
-        let findings = told["findings"].as_array().unwrap();
-        let found = findings
-            .iter()
-            .find(|finding| finding["check"] == check)
-            .unwrap();
-        assert_eq!(
-            found["remedy"].is_null(),
-            found["grade"] == "good",
-            "{found}"
-        );
-        found["grade"].as_str().unwrap().to_owned()
-    };
-    assert_eq!(graded("configuration"), "good");
-    assert_ne!(graded("kept scans"), "bad");
-    for check in ["scanner port", "spool", "service"] {
-        assert_eq!(graded(check), "bad", "{check}");
-    }
-}
-
-#[test]
-fn the_doctor_looks_for_a_scanner_on_usb() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
-    // Numbers that no maker has.
-    let config = "[scanner]\ntransport = \"usb\"\nvendor_id = 0xffff\nproduct_id = 0xffff\n";
-    fs::write(at.join("reliefd.toml"), config).unwrap();
-    let arguments = [
-        "doctor",
-        "--config",
-        "reliefd.toml",
-        "--socket",
-        "none.sock",
-    ];
-    let output = relief(at, &arguments);
-    assert_eq!(output.status.code(), Some(1));
-    let told = String::from_utf8_lossy(&output.stdout).into_owned();
-    for line in [
-        concat!("ok        version: ", env!("CARGO_PKG_VERSION")),
-        "TROUBLE   scanner on USB: there is no ffff:ffff\n          -> ",
-        "doubtful  udev rules: ",
-        "ok        serial ports: ",
-        "ok        USB scanners: ",
-    ] {
-        assert!(told.contains(line), "no `{line}` in:\n{told}");
-    }
-}
-
-#[test]
 fn help_is_there_for_every_command() {
     let directory = tempfile::tempdir().unwrap();
     let help = relief(directory.path(), &["--help"]);
@@ -419,59 +330,6 @@ fn help_is_there_for_every_command() {
             "{command}"
         );
     }
-}
-
-#[test]
-fn the_demo_leaves_the_deliverables_and_nothing_else() {
-    let directory = tempfile::tempdir().unwrap();
-    let temporary = directory.path().join("tmp");
-    fs::create_dir(&temporary).unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_relief"))
-        .current_dir(directory.path())
-        .env("TMPDIR", &temporary)
-        .args(["demo", "--json", "--object", "cylinder", "--out", "there"])
-        .output()
-        .unwrap();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(told["iges"], "there/cylinder.igs");
-    assert_eq!(told["scan"]["state"], "complete");
-    assert_eq!(told["job"]["state"], "done");
-    let model = &told["report"]["model"];
-    assert_eq!(model["faces"], 2);
-    // None is 0, never the -0 of an empty sum.
-    let lengths = model["edge_lengths"].as_object().unwrap();
-    assert!(
-        lengths
-            .values()
-            .all(|length| length.as_f64().unwrap().is_sign_positive())
-    );
-    let mut names: Vec<String> = fs::read_dir(directory.path().join("there"))
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
-    assert_eq!(
-        names,
-        [
-            "cylinder.igs",
-            "cylinder.step",
-            "inliers.png",
-            "manifest.json",
-            "range.png",
-            "regions.png",
-            "report.html",
-            "report.json",
-            "report.pdf",
-            "residuals.png",
-            "view.glb"
-        ]
-    );
-    assert_eq!(fs::read_dir(&temporary).unwrap().count(), 0);
 }
 
 #[test]
@@ -498,34 +356,6 @@ fn coordinates_in_metres_are_suspected_where_the_grid_would_be_too_fine() {
     assert!(!at.join("metres.igs").exists());
     let output = relief(at, &["convert", "metres.xyz", "--units", "m"]);
     assert!(output.status.success() && at.join("metres.igs").exists());
-}
-
-#[test]
-fn the_demo_tells_at_once_what_it_cannot_do() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
-    fs::write(at.join("taken"), "mine").unwrap();
-    refused(
-        &relief(at, &["demo", "--out", "taken"]),
-        2,
-        "not a directory",
-    );
-    assert_eq!(fs::read_to_string(at.join("taken")).unwrap(), "mine");
-    refused(
-        &relief(at, &["demo", "--noise-mm", "-1"]),
-        2,
-        "between 0 and 100",
-    );
-    refused(
-        &relief(at, &["demo", "--outliers", "-0.1"]),
-        2,
-        "between 0 and 1",
-    );
-    refused(
-        &relief(at, &["demo", "--dropouts", "1"]),
-        2,
-        "choose a share below 1",
-    );
 }
 
 /// A pyramid of four sides in the middle of a level table, 60 mm square.
