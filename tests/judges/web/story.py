@@ -72,7 +72,7 @@ class Story:
             self.bench.wait(lambda: (self.columns() or 0) > 20)
             page.wait_for_timeout(500)
             few = opened.colours(image)
-            self.bench.wait(lambda: (self.columns() or 0) > 60)
+            self.bench.wait(lambda: (self.columns() or 0) > 50)
             page.wait_for_timeout(500)
             more = opened.colours(image)
             assert few > 20 and more > few, f"{few} colours, then {more}"
@@ -298,7 +298,8 @@ class Story:
         with self.open() as opened:
             page = opened.page
             expect(page.get_by_role("button", name="Start scan")).to_be_enabled()
-            page.wait_for_function("performance.getEntriesByName('first-contentful-paint')[0]")
+            painted = "performance.getEntriesByName('first-contentful-paint').length > 0"
+            self.bench.wait(lambda: page.evaluate(painted))
             paint_ms, sent = page.evaluate(
                 """() => [
                     performance.getEntriesByName('first-contentful-paint')[0].startTime,
@@ -314,7 +315,7 @@ def main():
     programs, pictures = map(pathlib.Path, sys.argv[1:3])
     pictures.mkdir(parents=True, exist_ok=True)
     # Slow enough to be watched.
-    scanner = ["--columns", "240", "--samples", "256", "--line-rate", "40", "--noise-mm", "0.05"]
+    scanner = ["--columns", "240", "--samples", "256", "--line-rate", "10", "--noise-mm", "0.05"]
     with tempfile.TemporaryDirectory() as folder, browser() as opened:
         with Bench(programs.resolve(), folder, scanner) as bench:
             story = Story(bench, opened, pictures)
