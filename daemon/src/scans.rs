@@ -429,6 +429,7 @@ mod tests {
                 table_origin_mm: 0.0,
                 table_count_mm: 0.01,
                 head: Head::Cartesian { count_mm: 0.01 },
+                correction: None,
             },
             column_pitch_mm: 0.5,
             sample_spacing_mm: 0.5,
@@ -436,6 +437,7 @@ mod tests {
             plan: Vec::new(),
             settings: Vec::new(),
             metadata: Vec::new(),
+            correction: Vec::new(),
         };
         let mut journal = JournalWriter::create(&service.journal_path(&scan.id), &header).unwrap();
         for index in 0..4 {

@@ -203,7 +203,7 @@ fn journal(reader: impl BufRead, name: &str) -> Result<Input, Failure> {
     };
     let text = |text: &String| (!text.is_empty()).then(|| text.clone());
     Ok(Input {
-        camera_mm: header.calibration.head.camera_mm(),
+        camera_mm: header.calibration.camera_mm(),
         column_pitch_mm: positive(header.column_pitch_mm).unwrap_or_else(|| spacing_x(&columns)),
         sample_spacing_mm: positive(header.sample_spacing_mm)
             .unwrap_or_else(|| spacing_y(&columns)),
