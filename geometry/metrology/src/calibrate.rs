@@ -14,15 +14,15 @@ use crate::deviations::{Deviation, Deviations, UNKNOWNS};
 use crate::find;
 use crate::linear::{Chosen, choose, covariance, singular_values, step};
 use crate::measured::{Normal, Reference, normal};
-use crate::scan::{Placed, Scan};
-use crate::sphere::{self, cap};
+use crate::scan::{Placed, Ray, Scan};
+use crate::sphere::{self, Sighted, cap};
 use crate::steps::{self, Steps};
 
 /// Gauss-Newton steps, at most.
 const STEPS: usize = 60;
 /// It is solved once no unknown moves by more, as a share of what is usual, and no reference by
 /// more millimetres.
-const STILL: f64 = 1e-8;
+const STILL: f64 = 1e-6;
 /// Fewest places at which spheres must have been seen.
 pub const FEWEST_PLACES: usize = 3;
 /// Spheres whose centres are nearer than this share of the diameter are at one place.
@@ -200,11 +200,22 @@ pub fn calibrate(scans: &[Scan], references: &References) -> Result<Calibrated, 
     if places < FEWEST_PLACES && !has_steps {
         return Err(CalibrateError::TooFew { places });
     }
-    let mut references: Vec<Reference> = sightings.iter().map(|s| s.reference.clone()).collect();
-    let uncorrected = solve(&announced, &mut references, &[false; UNKNOWNS], None)
+    // Without the known places at first: until the camera is known to be elsewhere, they would draw
+    // the spheres away from their samples.
+    let mut references: Vec<Reference> = sightings
+        .iter()
+        .map(|sighting| sighting.reference.clone().anywhere())
+        .collect();
+    let mut uncorrected = solve(&announced, &mut references, &[false; UNKNOWNS], None)
         .ok_or(CalibrateError::NothingDetermined)?;
     let rms_before_mm = uncorrected.normal.rms_mm();
     let before = measured(&announced, &references);
+    for (reference, sighting) in references.iter_mut().zip(&sightings) {
+        reference.tie_as(&sighting.reference);
+    }
+    uncorrected.normal.matrix = normal(&announced, &uncorrected.deviations, &references)
+        .ok_or(CalibrateError::NothingDetermined)?
+        .matrix;
     let first = settled(&announced, &mut references, &uncorrected)?;
     // Once more with the samples that then lie on the caps.
     recapped(
@@ -416,7 +427,7 @@ fn sighted(
                     centre_mm,
                     radius_mm: found.fit.diameter_mm / 2.0,
                     place: known_place(scan, centre_mm, &references.places)?,
-                    samples: found.cap.iter().map(|&(raw, _)| raw).collect(),
+                    samples: found.cap.iter().map(|own| own.raw).collect(),
                 },
             });
         }
@@ -556,7 +567,7 @@ fn recapped(
         {
             *samples = cap(placed, *centre_mm, 2.0 * *radius_mm)
                 .into_iter()
-                .map(|(raw, _)| raw)
+                .map(|own| own.raw)
                 .collect();
         }
     }
@@ -581,7 +592,12 @@ fn measured(calibration: &Calibration, references: &[Reference]) -> Vec<Size> {
                 samples,
                 ..
             } => {
-                let points: Vec<_> = samples.iter().map(|&raw| at(raw)).collect();
+                let sighted = |raw| Sighted {
+                    raw,
+                    point_mm: at(raw),
+                    ray: Ray::of(calibration, raw),
+                };
+                let points: Vec<_> = samples.iter().map(|&raw| sighted(raw)).collect();
                 let fit = sphere::fit(&points, *centre_mm, 2.0 * radius_mm, false);
                 let (error_mm, uncertainty_mm) = fit.map_or((f64::NAN, f64::NAN), |fit| {
                     (

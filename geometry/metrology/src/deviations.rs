@@ -212,15 +212,16 @@ impl Deviations {
 }
 
 /// How a sample in the part frame moves with each of the deviations that are corrected,
-/// millimetres per unit.
+/// millimetres per unit; `range` is its range in counts and parts of counts.
 #[must_use]
 pub fn derivatives(
     announced: &Calibration,
     correction: &Correction,
     raw: RawSample,
+    range: f64,
 ) -> SMatrix<f64, 3, DEVIATIONS> {
     let mut columns = [[0.0; 3]; DEVIATIONS];
-    let (lateral, range) = (f64::from(raw.lateral_counts), f64::from(raw.range_counts));
+    let lateral = f64::from(raw.lateral_counts);
     let in_plane = |[y, z]: [f64; 2]| [0.0, y, z];
     let (by_angle, by_angle_scale, by_offset, by_range_scale) = match announced.head {
         Head::Polar {
@@ -338,7 +339,8 @@ mod tests {
                     range_counts,
                 };
                 let own = calibration(head, &deviations);
-                let closed = derivatives(&own, &deviations.correction(), raw);
+                let closed =
+                    derivatives(&own, &deviations.correction(), raw, f64::from(range_counts));
                 for index in 0..DEVIATIONS {
                     let step = 1e-5;
                     let at = |side: f64| {

@@ -73,11 +73,9 @@ pub struct StepFigures {
 #[must_use]
 pub fn sphere(placed: &Placed, found: &SphereFit) -> Option<SphereFigures> {
     let near_mm = Vector3::from(found.centre_mm);
-    let all: Vec<Vector3<f64>> = cap(placed, near_mm, found.diameter_mm)
-        .into_iter()
-        .map(|(_, point)| point)
-        .collect();
-    let robust = sphere::fit(&all, near_mm, found.diameter_mm, false)?;
+    let cap = cap(placed, near_mm, found.diameter_mm);
+    let all: Vec<Vector3<f64>> = cap.iter().map(|own| own.point_mm).collect();
+    let robust = sphere::fit(&cap, near_mm, found.diameter_mm, false)?;
     let (kept, left_out) = without_strays(&all, |point| robust.distance_mm(*point));
     let plain = least_squares(&kept, &robust)?;
     let off = kept.iter().map(|point| plain.distance_mm(*point));

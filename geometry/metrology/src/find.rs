@@ -4,13 +4,13 @@
 use nalgebra::Vector3;
 
 use crate::random::Draws;
-use crate::scan::{Placed, RawSample, within};
-use crate::sphere::{self, SphereFit, cap};
+use crate::scan::{Placed, within};
+use crate::sphere::{self, Sighted, SphereFit, cap};
 
 /// Threes of samples that are tried for a sphere.
-const TRIALS: usize = 4000;
+const TRIALS: usize = 2000;
 /// Samples that the search looks at, about.
-const SOME: usize = 40_000;
+const SOME: usize = 10_000;
 /// A sample lies on a sphere if it is off by less than this share of the radius: a scanner that is
 /// not yet calibrated sees an ellipsoid.
 const NEAR: f64 = 0.03;
@@ -35,7 +35,7 @@ pub struct Found {
     /// The sphere, with its diameter as given.
     pub fit: SphereFit,
     /// The samples whose rays meet its cap, whether they lie on it or not.
-    pub cap: Vec<(RawSample, Vector3<f64>)>,
+    pub cap: Vec<Sighted>,
     /// Whether the cap is seen on all sides; otherwise the scan ends on it, or something hides it.
     pub is_whole: bool,
 }
@@ -150,15 +150,17 @@ fn votes(left: &Placed, centre_mm: Vector3<f64>, radius_mm: f64) -> (usize, usiz
     // A little less than the cap, since rays are taken for parallel here.
     let reach_mm = 0.8 * radius_mm;
     let near_mm = near(radius_mm);
+    let square = |length: f64| length * length;
+    let shell = square(radius_mm - near_mm)..square(radius_mm + near_mm);
     let (mut agree, mut seen) = (0, 0);
     for column in left.columns_within(centre_mm.x - reach_mm, centre_mm.x + reach_mm) {
         for (_, point) in within(column, centre_mm.y - reach_mm, centre_mm.y + reach_mm) {
             let off = point - centre_mm;
-            if libm::hypot(off.x, off.y) > reach_mm {
+            if off.xy().norm_squared() > square(reach_mm) {
                 continue;
             }
             seen += 1;
-            if (off.norm() - radius_mm).abs() < near_mm {
+            if shell.contains(&off.norm_squared()) {
                 agree += 1;
             }
         }
@@ -172,18 +174,17 @@ fn refined(placed: &Placed, near_mm: Vector3<f64>, diameter_mm: f64) -> Option<F
     let mut last = None;
     for _ in 0..3 {
         let cap = cap(placed, centre_mm, diameter_mm);
-        let points: Vec<_> = cap.iter().map(|&(_, point)| point).collect();
-        let fit = sphere::fit(&points, centre_mm, diameter_mm, true)?;
+        let fit = sphere::fit(&cap, centre_mm, diameter_mm, true)?;
         centre_mm = Vector3::from(fit.centre_mm);
         last = Some((fit, cap));
     }
     let (fit, cap) = last?;
     let on = |point: &Vector3<f64>| fit.distance_mm(*point).abs() < 2.0 * near(diameter_mm / 2.0);
-    let agree = cap.iter().filter(|(_, point)| on(point)).count();
+    let agree = cap.iter().filter(|own| on(&own.point_mm)).count();
     if agree < FEWEST_SAMPLES || (agree as f64) < AGREE * cap.len() as f64 {
         return None;
     }
-    let is_whole = is_whole(&fit, cap.iter().map(|(_, point)| point).filter(|p| on(p)));
+    let is_whole = is_whole(&fit, cap.iter().map(|own| &own.point_mm).filter(|p| on(p)));
     Some(Found { fit, cap, is_whole })
 }
 

@@ -7,7 +7,7 @@ use range_image::correction::DEVIATIONS;
 use crate::deviations::{Deviation, Deviations, UNKNOWNS, derivatives};
 use crate::linear::{Matrix, Vector};
 use crate::robust::{Spread, deviation, weight};
-use crate::scan::{RawSample, position_mm};
+use crate::scan::{Met, RawSample, Ray, position_mm};
 use crate::steps::tangents;
 
 /// Smallest deviation that residuals are measured in, millimetres.
@@ -30,6 +30,23 @@ pub(crate) enum Reference {
         middle_mm: Vector3<f64>,
         samples: Vec<(RawSample, f64)>,
     },
+}
+
+impl Reference {
+    /// The same at a place that nobody knows.
+    pub(crate) fn anywhere(mut self) -> Self {
+        if let Self::Sphere { place, .. } = &mut self {
+            *place = None;
+        }
+        self
+    }
+
+    /// Ties it to the place that another is known to be at.
+    pub(crate) fn tie_as(&mut self, other: &Self) {
+        if let (Self::Sphere { place, .. }, Self::Sphere { place: known, .. }) = (self, other) {
+            *place = *known;
+        }
+    }
 }
 
 /// Normal equations of one reference: the scanner's unknowns, and the three of the reference.
@@ -122,26 +139,30 @@ pub(crate) fn normal(
 /// A residual in millimetres, and how it changes with the sample's place and the reference's
 /// unknowns.
 struct Residual {
+    raw: RawSample,
     off_mm: f64,
+    range_counts: f64,
     by_place: Vector3<f64>,
     by_own: Vector3<f64>,
 }
 
-fn residual(reference: &Reference, point: Vector3<f64>, height_mm: f64) -> Residual {
-    match reference {
+/// `None` where the ray does not meet the reference.
+fn residual(
+    calibration: &Calibration,
+    reference: &Reference,
+    raw: RawSample,
+    height_mm: f64,
+) -> Option<Residual> {
+    let point = position_mm(calibration, raw);
+    let ray = Ray::of(calibration, raw);
+    let (met, by_own) = match reference {
         Reference::Sphere {
             centre_mm,
             radius_mm,
             ..
         } => {
-            let from = point - centre_mm;
-            let length = from.norm().max(f64::MIN_POSITIVE);
-            let outwards = from / length;
-            Residual {
-                off_mm: length - radius_mm,
-                by_place: outwards,
-                by_own: -outwards,
-            }
+            let met = ray.meets(*centre_mm, *radius_mm)?;
+            (met, -met.normal)
         }
         Reference::Steps {
             normal,
@@ -149,15 +170,28 @@ fn residual(reference: &Reference, point: Vector3<f64>, height_mm: f64) -> Resid
             middle_mm,
             ..
         } => {
-            let (across, along) = tangents(*normal);
-            let from = point - middle_mm;
-            Residual {
-                off_mm: normal.dot(&point) - offset_mm - height_mm,
-                by_place: *normal,
-                by_own: Vector3::new(across.dot(&from), along.dot(&from), -1.0),
+            let closing = normal.dot(&ray.along);
+            if closing >= 0.0 {
+                return None;
             }
+            let range_mm = (offset_mm + height_mm - normal.dot(&ray.origin_mm)) / closing;
+            let met = Met {
+                range_mm,
+                normal: *normal,
+            };
+            let (across, along) = tangents(*normal);
+            let from = ray.origin_mm + ray.along * range_mm - middle_mm;
+            let by_own = Vector3::new(across.dot(&from), along.dot(&from), -1.0);
+            (met, by_own)
         }
-    }
+    };
+    Some(Residual {
+        raw,
+        off_mm: met.off_mm(&ray, point),
+        range_counts: met.range_counts(&ray),
+        by_place: met.normal,
+        by_own,
+    })
 }
 
 fn block(
@@ -171,29 +205,23 @@ fn block(
         correction: Some(correction),
         ..*announced
     };
-    let samples: Vec<(RawSample, Residual)> = match reference {
+    let samples: Vec<Residual> = match reference {
         Reference::Sphere { samples, .. } => samples
             .iter()
-            .map(|&raw| {
-                let at = position_mm(&calibration, raw);
-                (raw, residual(reference, at, 0.0))
-            })
+            .filter_map(|&raw| residual(&calibration, reference, raw, 0.0))
             .collect(),
         Reference::Steps { samples, .. } => samples
             .iter()
-            .map(|&(raw, height_mm)| {
-                let at = position_mm(&calibration, raw);
-                (raw, residual(reference, at, height_mm))
-            })
+            .filter_map(|&(raw, height_mm)| residual(&calibration, reference, raw, height_mm))
             .collect(),
     };
-    let scale = deviation(samples.iter().map(|(_, r)| r.off_mm)).max(LEAST_MM);
+    let scale = deviation(samples.iter().map(|own| own.off_mm)).max(LEAST_MM);
     let mut own = SMatrix::<f64, DEVIATIONS, DEVIATIONS>::zeros();
     let mut cross = SMatrix::<f64, DEVIATIONS, 3>::zeros();
     let mut right = SVector::<f64, DEVIATIONS>::zeros();
     let mut inner = Matrix3::zeros();
     let mut inner_right = Vector3::zeros();
-    for (raw, residual) in &samples {
+    for residual in &samples {
         let off = residual.off_mm / scale;
         all.spread.add(off);
         let weight = weight(off);
@@ -202,7 +230,8 @@ fn block(
         }
         all.squares_mm2.0 += weight * residual.off_mm * residual.off_mm;
         all.squares_mm2.1 += weight;
-        let by = derivatives(announced, &correction, *raw).transpose() * residual.by_place / scale;
+        let moves = derivatives(announced, &correction, residual.raw, residual.range_counts);
+        let by = moves.transpose() * residual.by_place / scale;
         let by_own = residual.by_own / scale;
         let weighed = by * weight;
         own += weighed * by.transpose();

@@ -90,22 +90,88 @@ pub(crate) fn position_mm(calibration: &Calibration, raw: RawSample) -> Vector3<
     Vector3::new(at.x_mm, at.y_mm, at.z_mm)
 }
 
-/// Unit direction of the ray that brought a sample, from the camera; straight along -z where the
-/// device does not tell where its rays come from.
-pub(crate) fn ray(calibration: &Calibration, raw: RawSample) -> Vector3<f64> {
-    if calibration.camera_mm().is_none() {
-        return Vector3::new(0.0, 0.0, -1.0);
-    }
-    // The ray is straight, so two ranges along it tell its direction.
-    const FAR_COUNTS: i32 = 1 << 20;
-    let at = |range_counts| {
-        position_mm(
-            calibration,
-            RawSample {
+/// The ray that brought a sample.
+///
+/// A scanner errs along its rays far more than across them: encoders know the angle and the
+/// table's place. So residuals are taken along the ray, to where it should have met the reference,
+/// and the slopes are those of that place. To the nearest point of the surface, from wherever noise
+/// put the sample, would be biased by about (noise / radius)^2 (Al-Sharadqah and Chernov 2009),
+/// which is more than many samples leave of the noise itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// Where the range is 0, millimetres.
+    pub origin_mm: Vector3<f64>,
+    /// Unit direction away from the camera; straight along -z where the device does not tell where
+    /// its rays come from.
+    pub along: Vector3<f64>,
+    /// Way along it for a range count, millimetres.
+    pub count_mm: f64,
+}
+
+impl Ray {
+    pub(crate) fn of(calibration: &Calibration, raw: RawSample) -> Self {
+        // The ray is straight, so two ranges along it tell its direction.
+        const FAR_COUNTS: i32 = 1 << 20;
+        let at = |range_counts| {
+            let raw = RawSample {
                 range_counts,
                 ..raw
-            },
-        )
-    };
-    (at(FAR_COUNTS) - at(0)).normalize()
+            };
+            position_mm(calibration, raw)
+        };
+        let origin_mm = at(0);
+        let far = at(FAR_COUNTS) - origin_mm;
+        let long_mm = far.norm();
+        let sign = if far.z > 0.0 { -1.0 } else { 1.0 };
+        Self {
+            origin_mm,
+            along: far * (sign / long_mm),
+            count_mm: sign * long_mm / f64::from(FAR_COUNTS),
+        }
+    }
+
+    /// How far from a point it passes by, millimetres.
+    pub(crate) fn passes_by_mm(&self, point_mm: Vector3<f64>) -> f64 {
+        let to = point_mm - self.origin_mm;
+        (to - self.along * to.dot(&self.along)).norm()
+    }
+
+    /// Where it meets a sphere, with the unit normal there; `None` where it passes by.
+    pub(crate) fn meets(&self, centre_mm: Vector3<f64>, radius_mm: f64) -> Option<Met> {
+        let to = centre_mm - self.origin_mm;
+        let along_mm = to.dot(&self.along);
+        let beside_squared = (to - self.along * along_mm).norm_squared();
+        let half_squared = radius_mm * radius_mm - beside_squared;
+        if half_squared <= 0.0 {
+            return None;
+        }
+        let range_mm = along_mm - libm::sqrt(half_squared);
+        let point_mm = self.origin_mm + self.along * range_mm;
+        Some(Met {
+            range_mm,
+            normal: (point_mm - centre_mm) / radius_mm,
+        })
+    }
+}
+
+/// Where a ray should have met a reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Met {
+    /// Way along the ray, millimetres.
+    pub(crate) range_mm: f64,
+    /// Unit normal of the reference there.
+    pub(crate) normal: Vector3<f64>,
+}
+
+impl Met {
+    /// Distance of a sample from the reference's tangent plane there, positive outside,
+    /// millimetres.
+    pub(crate) fn off_mm(&self, ray: &Ray, point_mm: Vector3<f64>) -> f64 {
+        self.normal.dot(&ray.along) * ((point_mm - ray.origin_mm).dot(&ray.along) - self.range_mm)
+    }
+
+    /// The range counts of that place.
+    pub(crate) fn range_counts(&self, ray: &Ray) -> f64 {
+        self.range_mm / ray.count_mm
+    }
 }

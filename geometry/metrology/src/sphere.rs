@@ -1,9 +1,9 @@
-//! A sphere fitted to samples: orthogonal distances, without those that stray.
+//! A sphere fitted to samples: distances along their rays, without those that stray.
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 
 use crate::robust::{Spread, deviation, weight};
-use crate::scan::{Placed, RawSample, ray};
+use crate::scan::{Placed, RawSample, Ray};
 
 /// Samples whose ray meets the sphere at a greater angle to its normal are left out, degrees:
 /// towards the rim, light is lost and mixed with that of what stands behind.
@@ -48,18 +48,30 @@ impl SphereFit {
     }
 }
 
-/// Fits a sphere to points near where it is; its diameter, too, unless `fixed`.
+/// A sample on a sphere: where it is, millimetres, and the ray that brought it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sighted {
+    /// The sample in counts.
+    pub raw: RawSample,
+    /// The sample in the part frame, millimetres.
+    pub point_mm: Vector3<f64>,
+    /// Its ray.
+    pub ray: Ray,
+}
+
+/// Fits a sphere to samples near where it is; its diameter, too, unless `fixed`.
 ///
-/// Gauss-Newton steps on the orthogonal distances with Tukey's weights, whose scale is the median
-/// size of the distances. `None` where there are too few points, or they do not tell it.
+/// Gauss-Newton steps on the distances from the tangent plane where each ray should have met the
+/// sphere ([`Ray`]), with Tukey's weights, whose scale is the median size of the distances. `None`
+/// where there are too few samples, or they do not tell it.
 #[must_use]
 pub fn fit(
-    points_mm: &[Vector3<f64>],
+    samples: &[Sighted],
     near_mm: Vector3<f64>,
     diameter_mm: f64,
     fixed: bool,
 ) -> Option<SphereFit> {
-    if points_mm.len() < FEWEST {
+    if samples.len() < FEWEST {
         return None;
     }
     let mut centre = near_mm;
@@ -67,24 +79,28 @@ pub fn fit(
     let mut covariance = Matrix4::zeros();
     let mut scale = 0.0;
     for _ in 0..ROUNDS {
-        let distance = |p: &Vector3<f64>| (p - centre).norm() - radius;
-        scale = deviation(points_mm.iter().map(distance)).max(LEAST_MM);
+        let residuals: Vec<(f64, Vector3<f64>)> = samples
+            .iter()
+            .filter_map(|own| {
+                let met = own.ray.meets(centre, radius)?;
+                Some((met.off_mm(&own.ray, own.point_mm), met.normal))
+            })
+            .collect();
+        if residuals.len() < FEWEST {
+            return None;
+        }
+        scale = deviation(residuals.iter().map(|(off, _)| *off)).max(LEAST_MM);
         let mut matrix = Matrix4::zeros();
         let mut right = Vector4::zeros();
         let mut spread = Spread::default();
-        for point in points_mm {
-            let from = point - centre;
-            let length = from.norm();
-            if length <= 0.0 {
-                continue;
-            }
-            let off = (length - radius) / scale;
+        for (off_mm, normal) in residuals {
+            let off = off_mm / scale;
             spread.add(off);
             let weight = weight(off);
             let slope = Vector4::new(
-                -from.x / length,
-                -from.y / length,
-                -from.z / length,
+                -normal.x,
+                -normal.y,
+                -normal.z,
                 if fixed { 0.0 } else { -1.0 },
             ) / scale;
             matrix += slope * slope.transpose() * weight;
@@ -115,7 +131,7 @@ pub fn fit(
         diameter_mm: 2.0 * radius,
         covariance_mm2,
         deviation_mm: scale,
-        samples: points_mm.len(),
+        samples: samples.len(),
     })
 }
 
@@ -124,35 +140,20 @@ pub fn fit(
 /// They are chosen by their rays alone, so that no error of a range has a say in it; whatever a
 /// ray brought back counts, be it from the sphere or not.
 #[must_use]
-pub fn cap(
-    placed: &Placed,
-    centre_mm: Vector3<f64>,
-    diameter_mm: f64,
-) -> Vec<(RawSample, Vector3<f64>)> {
+pub fn cap(placed: &Placed, centre_mm: Vector3<f64>, diameter_mm: f64) -> Vec<Sighted> {
     let (sin, _) = libm::sincos(INCIDENCE_MOST_DEG * core::f64::consts::PI / 180.0);
     let reach_mm = diameter_mm / 2.0 * sin;
     let columns = placed.columns_within(centre_mm.x - reach_mm, centre_mm.x + reach_mm);
     let mut found = Vec::new();
     for column in columns {
-        for &(raw, point) in column {
-            if passes_by(placed, raw, point, centre_mm) <= reach_mm {
-                found.push((raw, point));
+        for &(raw, point_mm) in column {
+            let ray = Ray::of(&placed.calibration, raw);
+            if ray.passes_by_mm(centre_mm) <= reach_mm {
+                found.push(Sighted { raw, point_mm, ray });
             }
         }
     }
     found
-}
-
-/// How far from a centre the ray of a sample passes by, millimetres.
-pub(crate) fn passes_by(
-    placed: &Placed,
-    raw: RawSample,
-    point_mm: Vector3<f64>,
-    centre_mm: Vector3<f64>,
-) -> f64 {
-    let to = centre_mm - point_mm;
-    let along = ray(&placed.calibration, raw);
-    (to - along * to.dot(&along)).norm()
 }
 
 #[cfg(test)]
@@ -160,8 +161,9 @@ mod tests {
     use super::*;
     use crate::random::Draws;
 
-    /// Points of the side of a sphere that faces +z, with noise of `noise_mm` along the radius.
-    fn points(count: usize, noise_mm: f64, strays: f64) -> Vec<Vector3<f64>> {
+    /// Samples of the side of a sphere that faces +z, by rays along -z, with noise of `noise_mm`
+    /// along the radius.
+    fn points(count: usize, noise_mm: f64, strays: f64) -> Vec<Sighted> {
         let mut draws = Draws::new(7);
         let mut normal = || (0..12).map(|_| draws.uniform()).sum::<f64>() - 6.0;
         let mut others = Draws::new(8);
@@ -179,7 +181,18 @@ mod tests {
                 } else {
                     noise_mm * normal()
                 };
-                Vector3::new(1.0, 2.0, 3.0) + way * (12.7 + off)
+                let point_mm = Vector3::new(1.0, 2.0, 3.0 + off / way.z) + way * 12.7;
+                let ray = Ray {
+                    origin_mm: Vector3::new(point_mm.x, point_mm.y, 750.0),
+                    along: -Vector3::z(),
+                    count_mm: 1.0,
+                };
+                let raw = RawSample {
+                    table_counts: 0,
+                    lateral_counts: 0,
+                    range_counts: 0,
+                };
+                Sighted { raw, point_mm, ray }
             })
             .collect()
     }
@@ -202,7 +215,12 @@ mod tests {
         let rms = |off: &dyn Fn(&SphereFit) -> f64| {
             libm::sqrt(fits.iter().map(|f| off(f) * off(f)).sum::<f64>() / fits.len() as f64)
         };
+        let mean = fits.iter().map(|f| f.diameter_mm - 25.4).sum::<f64>() / 200.0;
         let scattered = rms(&|f| f.diameter_mm - 25.4);
+        assert!(
+            mean.abs() < 0.25 * scattered,
+            "biased by {mean} of {scattered}"
+        );
         let told = rms(&|f| f.diameter_uncertainty_mm());
         assert!((scattered / told - 1.0).abs() < 0.15, "{scattered} {told}");
         let scattered = rms(&|f| f.centre_mm[1] - 2.0);
