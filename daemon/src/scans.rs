@@ -9,7 +9,7 @@ use scanner_driver::ScannerError;
 use scanner_protocol::Identity;
 
 use crate::acquisition::{
-    AbortRequest, ResolvedPlan, Task, Ticket, calibration, check_grid, preview, resolve, run,
+    AbortRequest, ResolvedPlan, Task, Ticket, check_grid, preview, resolve, run,
 };
 use crate::config::Processing;
 use crate::error::ServiceError;
@@ -111,7 +111,7 @@ impl Service {
     ) -> Result<ResolvedPlan, ServiceError> {
         let plan = request.plan.or(&self.config().scan_on(station.name()));
         let plan = resolve(&plan, identity)?;
-        let calibration = calibration(&identity.calibration);
+        let calibration = station.calibration(identity)?;
         check_grid(&processing.regrid, &plan, &calibration)?;
         Ok(plan)
     }

@@ -62,7 +62,8 @@ pub use scan::{
     SettingOverrides, StartScan,
 };
 pub use status::{
-    ScannerLink, ScannerList, ScannerStatus, ScannerSummary, Status, StorageStatus, THE_SCANNER,
+    CalibrationStatus, ScannerLink, ScannerList, ScannerStatus, ScannerSummary, Status,
+    StorageStatus, THE_SCANNER,
 };
 pub use token::{CreateToken, MAX_TOKEN_NAME_CHARS, NewToken, Token, TokenList};
 pub use webhook::{

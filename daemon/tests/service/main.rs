@@ -8,6 +8,7 @@
 
 mod access;
 mod ailing;
+mod calibration;
 mod client;
 mod config;
 mod cut_short;
