@@ -17,6 +17,7 @@
 //! the distance. So [`calibrate`](calibrate::calibrate) determines what the scans allow of, leaves
 //! the rest at zero, and says which ([`Undetermined`]). Spheres at known places tell the rest.
 
+mod adjust;
 pub mod calibrate;
 pub mod deviations;
 pub mod figures;
@@ -27,6 +28,8 @@ mod random;
 mod robust;
 pub mod scan;
 pub mod series;
+mod sight;
+mod sizes;
 pub mod sphere;
 pub mod steps;
 

@@ -53,20 +53,16 @@ fn deviations_are_found_within_their_uncertainties() {
     let mut pulls = Vec::new();
     for run in 0..8 {
         let told = calibrate(&scans(1000 * run, &PLACES), &spheres()).unwrap();
-        assert_eq!(
-            names(&told),
-            [
-                "angle scale",
-                "table towards y",
-                "table towards z",
-                "table scale"
-            ]
-        );
-        pulls.extend(
-            told.determined
-                .iter()
-                .map(|own| (own.value - truth(own.deviation)) / own.uncertainty),
-        );
+        let all = told.determined.iter().chain(&told.insignificant);
+        for own in all.clone() {
+            pulls.push((own.value - truth(own.deviation)) / own.uncertainty);
+        }
+        assert_eq!(names(&told)[0], "angle scale");
+        assert_eq!(all.count(), 4, "and the table's two directions and scale");
+        for own in &told.insignificant {
+            assert_eq!(told.deviations.get(own.deviation), 0.0);
+            assert!(own.value.abs() < 2.0 * own.uncertainty, "{own:?}");
+        }
         // What is not determined stays at zero, and moves and turns all as one.
         for own in &told.undetermined {
             assert_eq!(told.deviations.get(own.deviation), 0.0);
@@ -92,6 +88,22 @@ fn deviations_are_found_within_their_uncertainties() {
 }
 
 #[test]
+fn a_scanner_that_is_mounted_as_it_says_is_left_alone() {
+    let scans: Vec<Scan> = (70..)
+        .zip(&PLACES)
+        .map(|(seed, &place)| Taken::of("sphere", "", seed).at(&[place]).scan())
+        .collect();
+    let told = calibrate(&scans, &spheres()).unwrap();
+    assert!(told.determined.len() <= 1, "{:?}", told.determined);
+    assert!(told.insignificant.len() >= 3, "{:?}", told.insignificant);
+    assert!(
+        (told.rms_mm[1] - told.rms_mm[0]).abs() < 2e-4,
+        "{:?}",
+        told.rms_mm
+    );
+}
+
+#[test]
 fn known_places_tell_where_the_camera_is() {
     let mut known = spheres();
     known.places = PLACES
@@ -104,7 +116,7 @@ fn known_places_tell_where_the_camera_is() {
     let told = calibrate(&scans(7, &PLACES), &known).unwrap();
     let undetermined: Vec<_> = told.undetermined.iter().map(|u| u.deviation).collect();
     assert_eq!(undetermined, [Deviation::RangeOffset]);
-    for own in &told.determined {
+    for own in told.determined.iter().chain(&told.insignificant) {
         let pull = (own.value - truth(own.deviation)) / own.uncertainty;
         assert!(pull.abs() < 4.0, "{own:?} {pull}");
     }
