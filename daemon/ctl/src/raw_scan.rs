@@ -113,9 +113,11 @@ fn read(name: &str, source: impl Read) -> Result<RawScan, Failure> {
     let mut columns = Vec::new();
     let mut samples = 0;
     while let Some(raw) = journal.next_column().map_err(failed)? {
-        // The range of a reading that drove the detector too hard is not to be trusted.
-        let sound = raw.samples.iter().filter(|sample| !sample.saturated);
-        let column: Vec<RawSample> = sound
+        // Saturated ones as well, which are those of a bright surface that faces the beam: without
+        // them the middle of a sphere would be missing. Strays weigh nothing later on.
+        let column: Vec<RawSample> = raw
+            .samples
+            .iter()
             .map(|sample| RawSample {
                 table_counts: raw.table_counts,
                 lateral_counts: sample.lateral_counts,

@@ -351,7 +351,12 @@ fn what_cannot_be_calibrated_with_is_refused_in_words() {
             1,
             "plate.scan: no sphere of 25.4 mm is seen",
         ),
-        (&["cloud.xyz"][..], &diameter[..], 1, "cloud.xyz is no scan journal"),
+        (
+            &["cloud.xyz"][..],
+            &diameter[..],
+            1,
+            "cloud.xyz is no scan journal",
+        ),
         (
             &["a.scan"][..],
             &["--sphere-diameter-mm", "50"][..],
@@ -377,7 +382,12 @@ fn what_cannot_be_calibrated_with_is_refused_in_words() {
             1,
             "must ascend",
         ),
-        (&["none.scan"][..], &diameter[..], 1, "cannot read none.scan"),
+        (
+            &["none.scan"][..],
+            &diameter[..],
+            1,
+            "cannot read none.scan",
+        ),
     ] {
         let told = relief(at, &[&["calibrate"][..], scans, options].concat());
         let error = stderr(&told);

@@ -7,15 +7,18 @@ use crate::robust::{Spread, deviation, weight};
 use crate::scan::{Placed, RawSample, within};
 
 /// Threes of samples that are tried for a plane.
-const TRIALS: usize = 600;
+const TRIALS: usize = 1000;
 /// Samples that the search looks at, about.
 const SOME: usize = 8_000;
 /// Rounds of assigning and fitting.
 const ROUNDS: usize = 12;
 /// How far apart the samples of a first plane lie at most, millimetres.
-const REACH_MM: f64 = 8.0;
-/// A sample belongs to a height if it is off by less than this, or a third of a step, millimetres.
+const REACH_MM: f64 = 10.0;
+/// A sample belongs to a height if it is off by less than this, or a quarter of a step,
+/// millimetres.
 const NEAR_MM: f64 = 1.0;
+/// By how much less it may be off in each round, until that is reached.
+const NARROWER: f64 = 0.7;
 /// Share of the samples that must lie on the heights.
 const AGREE: f64 = 0.25;
 /// Fewest samples on a height that counts as seen.
@@ -68,14 +71,16 @@ impl Steps {
 /// is seen is something else.
 #[must_use]
 pub fn find(placed: &Placed, heights_mm: &[f64]) -> Option<Steps> {
-    let near_mm = near(heights_mm);
-    let (mut normal, mut offset_mm) = likeliest(placed, heights_mm, near_mm)?;
+    let (wide_mm, near_mm) = near(heights_mm);
+    let (mut normal, mut offset_mm) = likeliest(placed, heights_mm, wide_mm)?;
     let points: Vec<_> = placed.columns.iter().flatten().collect();
     let nearest = |normal: Vector3<f64>, offset_mm: f64, point: Vector3<f64>| {
         nearest(heights_mm, normal.dot(&point) - offset_mm)
     };
     let mut deviation_mm = near_mm;
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
+        // The first plane is told by a few neighbours, and far from these it may be well off.
+        let near_mm = (wide_mm * libm::pow(NARROWER, round as f64)).max(near_mm);
         let on: Vec<_> = points
             .iter()
             .filter_map(|&&(_, point)| {
@@ -120,15 +125,21 @@ pub fn find(placed: &Placed, heights_mm: &[f64]) -> Option<Steps> {
     (agree && found.seen(heights_mm.len()) >= heights_mm.len().min(2)).then_some(found)
 }
 
-/// Half of what a sample may be off its height.
-fn near(heights_mm: &[f64]) -> f64 {
+/// What a sample may be off its height, at first and in the end.
+fn near(heights_mm: &[f64]) -> (f64, f64) {
     let mut sorted = heights_mm.to_vec();
     sorted.sort_by(f64::total_cmp);
     let least = sorted
         .windows(2)
         .map(|pair| pair[1] - pair[0])
         .fold(f64::INFINITY, f64::min);
-    (least / 3.0).min(NEAR_MM)
+    let near_mm = (least / 4.0).min(NEAR_MM);
+    let wide_mm = if least.is_finite() {
+        least / 4.0
+    } else {
+        near_mm
+    };
+    (wide_mm, near_mm)
 }
 
 /// The height nearest to this, and how far off it is.
