@@ -6,6 +6,7 @@ use relief_api::{JobId, JobState, ScanState, THE_SCANNER};
 use scanner_driver::ScannerError;
 
 use crate::acquisition::PlanError;
+use crate::calibration::CalibrationError;
 use crate::config::OverrideError;
 use crate::spool::SpoolError;
 use crate::station::Station;
@@ -54,6 +55,9 @@ pub enum ServiceError {
     /// The scanner cannot do it.
     #[error("{0}")]
     Plan(#[from] PlanError),
+    /// The calibration is not for this scanner.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
     /// A setting is wrong.
     #[error("{0}")]
     Setting(#[from] OverrideError),

@@ -12,6 +12,7 @@
 //! the other scanners do; jobs run on others, so that a second scan can be taken while the
 //! first is processed.
 
+pub mod calibration;
 pub mod config;
 pub mod logging;
 pub mod systemd;

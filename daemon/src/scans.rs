@@ -9,7 +9,7 @@ use scanner_driver::ScannerError;
 use scanner_protocol::Identity;
 
 use crate::acquisition::{
-    AbortRequest, ResolvedPlan, Task, Ticket, calibration, check_grid, preview, resolve, run,
+    AbortRequest, ResolvedPlan, Task, Ticket, check_grid, preview, resolve, run,
 };
 use crate::config::Processing;
 use crate::error::ServiceError;
@@ -116,7 +116,7 @@ impl Service {
     ) -> Result<ResolvedPlan, ServiceError> {
         let plan = request.plan.or(&self.config().scan_on(station.name()));
         let plan = resolve(&plan, identity)?;
-        let calibration = calibration(&identity.calibration);
+        let calibration = station.calibration(identity)?;
         check_grid(&processing.regrid, &plan, &calibration)?;
         Ok(plan)
     }
@@ -515,6 +515,7 @@ mod tests {
                 table_origin_mm: 0.0,
                 table_count_mm: 0.01,
                 head: Head::Cartesian { count_mm: 0.01 },
+                correction: None,
             },
             column_pitch_mm: 0.5,
             sample_spacing_mm: 0.5,
@@ -522,6 +523,7 @@ mod tests {
             plan: Vec::new(),
             settings: Vec::new(),
             metadata: Vec::new(),
+            correction: Vec::new(),
         };
         let mut journal = JournalWriter::create(&service.journal_path(&scan.id), &header).unwrap();
         for index in 0..4 {

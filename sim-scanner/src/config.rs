@@ -14,6 +14,7 @@ use crate::endpoint::usb::{self, Attachment, Personality, UsbError, UsbServer};
 use crate::line::LineFaults;
 use crate::preset::{self, Overrides, Preset, SetupError};
 use crate::replay::{Replay, ReplayError};
+use crate::scene::artefacts::{self, Artefact};
 use crate::scene::{Body, Material, Mesh, Scene, Stain, StlError};
 use crate::source::Source;
 
@@ -30,7 +31,7 @@ pub enum Object {
 
 impl Object {
     /// The objects that come with the simulator.
-    pub const BUILT_IN: [&'static str; 7] = [
+    pub const BUILT_IN: [&'static str; 12] = [
         "house",
         "cylinder",
         "figure",
@@ -38,6 +39,11 @@ impl Object {
         "house-on-table",
         "cylinder-on-table",
         "house-before-plane",
+        "sphere",
+        "spheres",
+        "ball-bar",
+        "step-gauge",
+        "plate",
     ];
 }
 
@@ -79,6 +85,8 @@ pub struct SimConfig {
     pub preset: Preset,
     /// What differs from the preset. Plays no part for a recording.
     pub overrides: Overrides,
+    /// How references (spheres, ball bars, step gauges, plates) are made and placed.
+    pub artefact: Artefact,
     /// Seed of everything random.
     pub seed: u64,
     /// Names and pace.
@@ -149,8 +157,11 @@ impl SimConfig {
                 })?;
                 return Ok(Source::Replay(replay));
             }
-            Object::BuiltIn(name) => preset::object(name, material)
-                .ok_or_else(|| SimError::UnknownObject(name.clone()))?,
+            Object::BuiltIn(name) => match artefacts::scene(name, &self.artefact, material) {
+                Some(scene) => Some(scene.map_err(SetupError::Setting)?),
+                None => preset::object(name, material),
+            }
+            .ok_or_else(|| SimError::UnknownObject(name.clone()))?,
             Object::Stl(path) => Scene::new(vec![Body::Mesh(Box::new(read_stl(path)?))], material),
         };
         if let Some(distance_mm) = self.back_plane_mm

@@ -26,6 +26,7 @@ pub mod endpoint;
 pub mod fault;
 pub mod line;
 pub mod mechanics;
+pub mod mount;
 pub mod noise;
 pub mod optics;
 pub mod preset;

@@ -10,13 +10,16 @@ use clap::Parser;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGUSR2};
 use signal_hook::iterator::Signals;
 
+use sim_scanner::Vec3;
 use sim_scanner::config::{Object, SimConfig, SimError};
 use sim_scanner::control::Control;
 use sim_scanner::device::DeviceSettings;
 use sim_scanner::endpoint::pty::PtyServer;
 use sim_scanner::endpoint::usb::{Attachment, Personality, UsbServer};
 use sim_scanner::fault::FaultSpec;
+use sim_scanner::mount::Mount;
 use sim_scanner::preset::{Overrides, Preset};
+use sim_scanner::scene::artefacts::Artefact;
 use sim_scanner::source::Source;
 
 /// A simulated slide-table laser scanner on a pseudo-terminal or on USB.
@@ -37,10 +40,38 @@ struct Cli {
     usb_class: UsbClass,
 
     /// What stands on the table: house, cylinder, figure, groove; house-on-table,
-    /// cylinder-on-table, house-before-plane, which have a background; or an STL file in mm,
-    /// which keeps its own coordinates
+    /// cylinder-on-table, house-before-plane, which have a background; sphere, spheres, ball-bar,
+    /// step-gauge, plate, which are references; or an STL file in mm, which keeps its own
+    /// coordinates
     #[arg(long, default_value = "house", value_name = "OBJECT|FILE.stl")]
     object: Object,
+
+    /// Diameter of the reference's spheres, mm
+    #[arg(long, value_name = "D", default_value_t = 25.4)]
+    diameter_mm: f64,
+
+    /// Where a reference stands in the measuring volume: the centre of each sphere, or the middle
+    /// of a gauge or plate, mm
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    at_mm: Vec<Vec3>,
+
+    /// How a step gauge or plate is turned about x and about y, degrees
+    #[arg(long, value_name = "A,B", value_parser = tilt, allow_hyphen_values = true, default_value = "0,0")]
+    tilt_deg: (f64, f64),
+
+    /// How the head is mounted against what the device announces, as key=value,...:
+    /// angle-offset-deg, angle-scale (a share), range-offset-mm, range-scale, camera-y-mm,
+    /// camera-z-mm, plane-about-y-deg, plane-about-z-deg (of the laser plane), table-y-deg,
+    /// table-z-deg, table-scale.
+    /// Example: angle-offset-deg=0.5,angle-scale=0.005,camera-z-mm=2
+    #[arg(
+        long,
+        default_value = "",
+        hide_default_value = true,
+        value_name = "SPEC",
+        allow_hyphen_values = true
+    )]
+    mount: Mount,
 
     /// The scanner to imitate
     #[arg(long, value_enum, default_value = "paper")]
@@ -192,6 +223,29 @@ enum PresetName {
 #[derive(Debug, Clone, Copy)]
 struct LineRate(Option<f64>);
 
+/// Numbers between commas.
+fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let parsed: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    let numbers: [f64; N] = parsed.ok()?.try_into().ok()?;
+    numbers
+        .iter()
+        .all(|number| number.is_finite())
+        .then_some(numbers)
+}
+
+fn place(text: &str) -> Result<Vec3, String> {
+    numbers(text)
+        .map(Vec3::from_array)
+        .ok_or_else(|| "give x, y and z in mm, as in 10,-20,5".into())
+}
+
+fn tilt(text: &str) -> Result<(f64, f64), String> {
+    numbers(text)
+        .map(|[a, b]| (a, b))
+        .filter(|(a, b)| a.abs() <= 60.0 && b.abs() <= 60.0)
+        .ok_or_else(|| "give two angles of at most 60 degrees, as in 5,-3".into())
+}
+
 fn line_rate(text: &str) -> Result<LineRate, String> {
     if text == "max" {
         return Ok(LineRate(None));
@@ -228,6 +282,12 @@ impl Cli {
                 glare_width_deg: self.glare_width_deg,
                 jitter_mm: self.jitter_mm,
                 backlash_mm: self.backlash_mm,
+                mount: self.mount,
+            },
+            artefact: Artefact {
+                diameter_mm: self.diameter_mm,
+                at_mm: self.at_mm,
+                tilt_deg: self.tilt_deg,
             },
             seed: self.seed,
             device: DeviceSettings {

@@ -9,6 +9,8 @@
 //! * a spot of which a part is lost has its centre off the beam's axis, and triangulation
 //!   turns that into a range error: the curl at the ends of a run (Curless and Levoy 1995).
 
+use glam::DMat3;
+
 use crate::Vec3;
 use crate::scene::{Hit, Scene};
 
@@ -23,6 +25,26 @@ pub struct Optics {
     pub baseline_mm: (f64, f64),
     /// Radius of the spot, millimetres; 0 for a beam without width.
     pub spot_radius_mm: f64,
+}
+
+/// How the head is turned about the laser's pivot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Turn {
+    /// Not at all.
+    None,
+    /// By this rotation.
+    By(DMat3),
+}
+
+impl Turn {
+    /// A direction of the head in the part frame.
+    #[must_use]
+    pub fn apply(&self, direction: Vec3) -> Vec3 {
+        match self {
+            Self::None => direction,
+            Self::By(rotation) => *rotation * direction,
+        }
+    }
 }
 
 /// The light of one spot that reaches the sensor.
@@ -89,12 +111,26 @@ impl Optics {
     /// What the sensor sees of the spot at this table position and angle; `None` for nothing.
     #[must_use]
     pub fn look(&self, scene: &Scene, x_mm: f64, angle_rad: f64) -> Option<Spot> {
-        let laser = self.laser_mm(x_mm);
-        let sensor = self.sensor_mm(x_mm);
-        let direction = Self::direction(angle_rad);
-        let upwards = Vec3::new(0.0, -direction.z, direction.y);
+        self.look_from(scene, self.laser_mm(x_mm), &Turn::None, angle_rad)
+    }
+
+    /// As [`Optics::look`], with the laser's pivot there and the head turned about it.
+    #[must_use]
+    pub fn look_from(
+        &self,
+        scene: &Scene,
+        laser: Vec3,
+        turn: &Turn,
+        angle_rad: f64,
+    ) -> Option<Spot> {
+        let (beside_x, beside_y) = self.baseline_mm;
+        let sensor = laser + turn.apply(Vec3::new(beside_x, beside_y, 0.0));
+        let straight = Self::direction(angle_rad);
+        let direction = turn.apply(straight);
+        let upwards = turn.apply(Vec3::new(0.0, -straight.z, straight.y));
+        let sideways = turn.apply(Vec3::X);
         let seen = |x: f64, y: f64| {
-            let offset = (Vec3::X * x + upwards * y) * self.spot_radius_mm;
+            let offset = (sideways * x + upwards * y) * self.spot_radius_mm;
             scene
                 .cast(laser + offset, direction)
                 .filter(|hit| scene.sees(hit.point_mm, hit.normal, sensor))
@@ -123,7 +159,7 @@ impl Optics {
         let mut gathered = Gathered::default();
         for ((x, y, share), met) in beams.iter().zip(&returns) {
             let offset = (*x * self.spot_radius_mm, *y * self.spot_radius_mm);
-            let expected = along_axis(hit.point_mm - Vec3::X * offset.0 - upwards * offset.1);
+            let expected = along_axis(hit.point_mm - sideways * offset.0 - upwards * offset.1);
             gathered.add(*share, offset, *met, expected, self.spot_radius_mm);
         }
         Some(Spot {

@@ -1,6 +1,7 @@
 //! The simulated scanner: columns of counts, each the same whenever it is asked for.
 
 use crate::mechanics::Mechanics;
+use crate::mount::{Mount, Stand};
 use crate::noise::{NoiseModel, SampleKey};
 use crate::optics::Optics;
 use crate::random::{Draws, Purpose};
@@ -118,6 +119,8 @@ pub struct Scanner {
     /// How far the object stands from where the part frame has it, millimetres: it has been
     /// moved, and nobody has told the device.
     pub part_offset_mm: crate::Vec3,
+    /// How the head is mounted; the device knows nothing of it.
+    pub mount: Mount,
     /// How readings stray.
     pub noise: NoiseModel,
     /// Seed of everything random.
@@ -165,11 +168,9 @@ impl Scanner {
             nominal,
             sweep.pitch_counts < 0,
         );
-        let x_mm = self.x_mm(stop.reported_counts) + stop.error_mm - self.part_offset_mm.x;
-        // Moving the camera the other way shows it the same.
-        let mut optics = self.optics;
-        optics.camera_y_mm -= self.part_offset_mm.y;
-        optics.camera_z_mm -= self.part_offset_mm.z;
+        let x_mm = self.x_mm(stop.reported_counts) + stop.error_mm;
+        // Moving the camera the other way shows the object the same.
+        let stand = self.mount.stand(&self.optics, x_mm, self.part_offset_mm);
         let samples = (0..sweep.samples)
             .map(|sample| {
                 let key = SampleKey {
@@ -178,7 +179,7 @@ impl Scanner {
                     column: index,
                     sample,
                 };
-                let (sample_out, truth) = self.sample(sweep, key, &optics, x_mm);
+                let (sample_out, truth) = self.sample(sweep, key, &stand);
                 note(sample, truth);
                 sample_out
             })
@@ -190,16 +191,13 @@ impl Scanner {
         }
     }
 
-    fn sample(
-        &self,
-        sweep: &Sweep,
-        key: SampleKey,
-        optics: &Optics,
-        x_mm: f64,
-    ) -> (Sample, SampleTruth) {
+    fn sample(&self, sweep: &Sweep, key: SampleKey, stand: &Stand) -> (Sample, SampleTruth) {
         let lateral_counts = self.lateral_counts(sweep, key);
         let angle_rad = self.angle_rad(lateral_counts);
-        let spot = optics.look(&self.scene, x_mm, angle_rad);
+        let true_rad = self.mount.angle_rad(angle_rad);
+        let spot = self
+            .optics
+            .look_from(&self.scene, stand.laser_mm, &stand.turn, true_rad);
         let reading = spot.and_then(|spot| {
             let material = self.scene.material(spot.hit.face);
             self.noise.read(key, &spot, material, self.head.window_mm)
@@ -221,17 +219,18 @@ impl Scanner {
             };
             return (lost, truth);
         };
+        let told_mm = self.mount.told_range_mm(reading.range_mm);
         let (lateral_counts, range_counts) = match self.head.kind {
             HeadKind::Polar { range_count_nm, .. } => {
                 let count_mm = f64::from(range_count_nm) * 1e-6;
-                (lateral_counts, counts(reading.range_mm, count_mm))
+                (lateral_counts, counts(told_mm, count_mm))
             }
             HeadKind::Cartesian { count_nm, .. } => {
                 let count_mm = f64::from(count_nm) * 1e-6;
                 let (sin, cos) = libm::sincos(angle_rad);
                 (
-                    counts(self.optics.camera_y_mm + reading.range_mm * sin, count_mm),
-                    counts(self.optics.camera_z_mm - reading.range_mm * cos, count_mm),
+                    counts(self.optics.camera_y_mm + told_mm * sin, count_mm),
+                    counts(self.optics.camera_z_mm - told_mm * cos, count_mm),
                 )
             }
         };

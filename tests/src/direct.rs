@@ -50,7 +50,7 @@ pub fn journal(path: &Path, label: &Label, threads: usize) -> Result<Vec<u8>> {
         columns.push(raw.calibrated(&header.calibration));
     }
     let pitch_mm = recommended_pitch_mm(header.column_pitch_mm, header.sample_spacing_mm);
-    let camera_mm = header.calibration.head.camera_mm();
+    let camera_mm = header.calibration.camera_mm();
     columns_to_iges(&columns, camera_mm, pitch_mm, label, threads)
 }
 

@@ -38,6 +38,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &["nurbs", "range-image", "reconstruct", "shapes"],
     ),
     ("compare", &["range-image"]),
+    ("metrology", &["range-image"]),
     ("skin", &["nurbs", "range-image"]),
     (
         "surfacing",
@@ -180,13 +181,14 @@ const DAEMON: [&str; 18] = [
     "toolpath",
 ];
 
-const COMMAND_LINE: [&str; 24] = [
+const COMMAND_LINE: [&str; 25] = [
     "cad-exchange",
     "compare",
     "deliverables",
     "features",
     "fill",
     "mesh-files",
+    "metrology",
     "nurbs",
     "pipeline",
     "range-image",

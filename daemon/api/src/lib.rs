@@ -76,7 +76,8 @@ pub use scan::{
     SettingOverrides, StartScan,
 };
 pub use status::{
-    ScannerLink, ScannerList, ScannerStatus, ScannerSummary, Status, StorageStatus, THE_SCANNER,
+    CalibrationStatus, ScannerLink, ScannerList, ScannerStatus, ScannerSummary, Status,
+    StorageStatus, THE_SCANNER,
 };
 pub use ticket::{CreateTicket, Ticket};
 pub use token::{CreateToken, MAX_TOKEN_NAME_CHARS, NewToken, Token, TokenList};

@@ -101,6 +101,22 @@ pub struct ScannerStatus {
     /// What is wrong, when something is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub problem: Option<String>,
+    /// The calibration of the mounted scanner that is in force; absent without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<CalibrationStatus>,
+}
+
+/// A calibration in force.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CalibrationStatus {
+    /// When the scanner was calibrated, RFC 3339 in UTC.
+    pub date: String,
+    /// Whole days since.
+    pub age_days: i64,
+    /// Root mean square of the distances of samples from the reference once corrected.
+    pub residual_mm: f64,
+    /// Whether it is older than the configuration allows without a warning.
+    pub overdue: bool,
 }
 
 /// A scanner at a glance.

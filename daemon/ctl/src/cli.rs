@@ -6,9 +6,9 @@ use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    abort, change, compare, config, convert, demo, doctor, features, fetch, fill, jobs, laser,
-    manual, pause, rerun, resume, scan, scans, skin, status, surface, token, toolpath, watch,
-    webhooks,
+    abort, accept, calibrate, change, compare, config, convert, demo, doctor, features, fetch,
+    fill, jobs, laser, manual, pause, rerun, resume, scan, scans, skin, status, surface, token,
+    toolpath, watch, webhooks,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
@@ -17,7 +17,8 @@ use crate::command::{
 /// existing scan file, `relief surface` makes one B-spline surface of it, and `relief compare` holds
 /// it against its nominal; `relief features` recognises holes, pockets, slots and their like in it;
 /// `relief skin` makes a surface of cross-sections, `relief fill` closes the holes of a mesh, and
-/// `relief toolpath` mills a model; `relief doctor` finds out why something does not work. The other
+/// `relief toolpath` mills a model; `relief calibrate` finds out how a mounted scanner deviates, and
+/// `relief accept` how well it measures; `relief doctor` finds out why something does not work. The other
 /// commands speak to the service, reliefd.
 #[derive(Debug, Parser)]
 #[command(name = "relief", version, max_term_width = 100)]
@@ -34,6 +35,8 @@ pub(crate) struct Invocation {
 pub(crate) enum Command {
     Demo(demo::Args),
     Convert(convert::Args),
+    Calibrate(calibrate::Args),
+    Accept(accept::Args),
     Compare(compare::Args),
     Features(features::Args),
     Fill(fill::Args),

@@ -10,6 +10,7 @@ use deliverables::ScanReport;
 use jiff::Timestamp;
 use pipeline::Settings;
 use range_image::{Column, Sample};
+use reliefd::calibration::InForce;
 use reliefd::config::Processing;
 use scan_files::{PointScan, ReadOptions, ScanFileError, Units, Unpacked, recommended_pitch_mm};
 use scan_record::{Ending, JournalReader};
@@ -195,6 +196,14 @@ fn journal(reader: impl BufRead, name: &str) -> Result<Input, Failure> {
     }
     // What the service kept with the scan; a journal of another writer may lack it.
     let kept: Option<relief_api::Scan> = serde_json::from_slice(&header.metadata).ok();
+    let started_at: Option<Timestamp> = kept.as_ref().and_then(|scan| scan.started_at.parse().ok());
+    let calibration = InForce::kept_with(&header);
+    notes.extend(
+        calibration
+            .as_ref()
+            .zip(started_at)
+            .and_then(|(own, at)| own.overdue(at)),
+    );
     let identity: serde_json::Value = serde_json::from_slice(&header.identity).unwrap_or_default();
     let field = |key: &str| identity.get(key).and_then(|value| value.as_str());
     let source = match (field("model"), field("serial")) {
@@ -203,7 +212,7 @@ fn journal(reader: impl BufRead, name: &str) -> Result<Input, Failure> {
     };
     let text = |text: &String| (!text.is_empty()).then(|| text.clone());
     Ok(Input {
-        camera_mm: header.calibration.head.camera_mm(),
+        camera_mm: header.calibration.camera_mm(),
         column_pitch_mm: positive(header.column_pitch_mm).unwrap_or_else(|| spacing_x(&columns)),
         sample_spacing_mm: positive(header.sample_spacing_mm)
             .unwrap_or_else(|| spacing_y(&columns)),
@@ -217,10 +226,11 @@ fn journal(reader: impl BufRead, name: &str) -> Result<Input, Failure> {
             columns: columns.len() as u64,
             samples,
             dropouts: Some(dropouts),
+            calibration: calibration.map(|own| own.report(started_at)),
         },
         columns,
         processing: serde_json::from_slice(&header.settings).ok(),
-        timestamp: kept.as_ref().and_then(|scan| scan.started_at.parse().ok()),
+        timestamp: started_at,
         name: kept.map(|scan| scan.name),
         notes,
         units_suspected: None,

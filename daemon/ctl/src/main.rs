@@ -7,6 +7,7 @@ mod follow;
 mod input;
 mod output;
 mod progress;
+mod raw_scan;
 mod service;
 mod summary;
 

@@ -7,6 +7,7 @@
 //! The bytes follow from the arguments alone, timings in the report apart: the time of
 //! the scan is given by the caller.
 
+pub mod acceptance;
 pub mod comparison;
 mod deviations;
 mod export;
@@ -27,13 +28,14 @@ mod summary;
 mod view;
 mod write;
 
+pub use acceptance::AcceptanceReport;
 pub use comparison::ComparisonReport;
 pub use export::{
     CadOptions, Entities, LengthUnit, Schema, WriteError, file_stem, write_iges, write_step,
     write_surfaces, write_trimmed,
 };
 pub use file::{hexadecimal, sha256_of, write_atomically};
-pub use filed::{PageFormat, PageFormats, comparison_page, scan_page};
+pub use filed::{PageFormat, PageFormats, acceptance_page, comparison_page, scan_page};
 pub use further::{
     CharacterLineFigures, FairingFigures, Further, MachineFile, MachineFileError, MillError,
     MillOf, Milled, OperationFigures, SectionFigures, SimulationFigures, SkinCounts, SkinDeviation,

@@ -101,6 +101,22 @@ pub struct ScanReport {
     pub samples: u64,
     /// Rays that brought no sample, where the source counts them.
     pub dropouts: Option<u64>,
+    /// The correction of the scanner that was in use; `null` without one.
+    #[serde(default)]
+    pub calibration: Option<CalibrationReport>,
+}
+
+/// How a scanner was corrected.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CalibrationReport {
+    /// When it was calibrated.
+    pub date: String,
+    /// Whole days from then to the scan; `null` where the scan's time is not known.
+    pub age_days: Option<i64>,
+    /// Root mean square of the distances of samples from the reference once corrected.
+    pub residual_mm: f64,
+    /// Deviations that were not determined.
+    pub undetermined: Vec<String>,
 }
 
 /// The settings that can change the result.

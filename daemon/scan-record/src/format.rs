@@ -5,8 +5,9 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 /// First bytes of every journal. The line feed catches transfers in text mode.
 pub const MAGIC: [u8; 8] = *b"RELSCAN\n";
 
-/// The format version this crate writes, and the newest it reads.
-pub const VERSION: u16 = 1;
+/// The newest format version, which is written where there is a correction; without one it is
+/// the first, so that earlier programs read it, too.
+pub const VERSION: u16 = 2;
 
 /// Most samples a column may have: four times what the finest profile sensors on the
 /// market deliver (16 384 points), and 640 KiB of memory for a hostile file.

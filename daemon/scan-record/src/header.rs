@@ -1,13 +1,15 @@
 //! What stands before the columns.
 
-use range_image::{Calibration, calibration::Head};
+use range_image::correction::DEVIATIONS;
+use range_image::{Calibration, Correction, calibration::Head};
 
 use crate::format::Fields;
 
 /// Everything about a scan that is known before its first column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
-    /// From counts to millimetres, as the scanner announced it.
+    /// From counts to millimetres, as the scanner announced it, and the correction that was in
+    /// use.
     pub calibration: Calibration,
     /// Nominal distance of neighbouring columns, millimetres; 0 where unknown.
     pub column_pitch_mm: f64,
@@ -21,7 +23,14 @@ pub struct Header {
     pub settings: Vec<u8>,
     /// Name, part, operator, note and the like, in the writer's encoding.
     pub metadata: Vec<u8>,
+    /// Where the correction came from, in the writer's encoding; not kept without one.
+    pub correction: Vec<u8>,
 }
+
+/// Version of a file without a correction.
+const UNCORRECTED: u16 = 1;
+/// Version of a file with one.
+const CORRECTED: u16 = 2;
 
 const HEAD_POLAR: u8 = 0;
 const HEAD_CARTESIAN: u8 = 1;
@@ -54,12 +63,32 @@ impl Header {
             out.extend_from_slice(&(bytes.len() as u32).to_le_bytes());
             out.extend_from_slice(bytes);
         }
+        if let Some(correction) = &self.calibration.correction {
+            for number in correction.to_array() {
+                out.extend_from_slice(&number.to_le_bytes());
+            }
+            out.extend_from_slice(&(self.correction.len() as u32).to_le_bytes());
+            out.extend_from_slice(&self.correction);
+        }
         out
     }
 
-    /// The reason in words when the payload is no header.
-    pub(crate) fn decode(payload: &[u8]) -> Result<Self, &'static str> {
-        let header = Self::fields(payload)?;
+    /// The version of a file with this header.
+    pub(crate) fn version(&self) -> u16 {
+        match self.calibration.correction {
+            None => UNCORRECTED,
+            Some(_) => CORRECTED,
+        }
+    }
+
+    /// Whether files of this version are read.
+    pub(crate) fn knows(version: u16) -> bool {
+        matches!(version, UNCORRECTED | CORRECTED)
+    }
+
+    /// The reason in words when the payload is no header of this version.
+    pub(crate) fn decode(payload: &[u8], version: u16) -> Result<Self, &'static str> {
+        let header = Self::fields(payload, version == CORRECTED)?;
         let calibration = &header.calibration;
         let scale = match calibration.head {
             Head::Polar {
@@ -86,10 +115,13 @@ impl Header {
         if !spacing(header.column_pitch_mm) || !spacing(header.sample_spacing_mm) {
             return Err("a nominal spacing is negative or not finite");
         }
+        if let Some(odd) = calibration.correction.and_then(|c| c.implausible()) {
+            return Err(odd);
+        }
         Ok(header)
     }
 
-    fn fields(payload: &[u8]) -> Result<Self, &'static str> {
+    fn fields(payload: &[u8], corrected: bool) -> Result<Self, &'static str> {
         const SHORT: &str = "it is too short";
         let mut fields = Fields(payload);
         let mut number = || fields.f64().ok_or(SHORT);
@@ -111,11 +143,12 @@ impl Header {
         };
         let (column_pitch_mm, sample_spacing_mm) = (number()?, number()?);
         let mut bytes = || fields.bytes().map(<[u8]>::to_vec).ok_or(SHORT);
-        let header = Self {
+        let mut header = Self {
             calibration: Calibration {
                 table_origin_mm,
                 table_count_mm,
                 head,
+                correction: None,
             },
             column_pitch_mm,
             sample_spacing_mm,
@@ -123,7 +156,16 @@ impl Header {
             plan: bytes()?,
             settings: bytes()?,
             metadata: bytes()?,
+            correction: Vec::new(),
         };
+        if corrected {
+            let mut deviations = [0.0; DEVIATIONS];
+            for deviation in &mut deviations {
+                *deviation = fields.f64().ok_or(SHORT)?;
+            }
+            header.calibration.correction = Some(Correction::from_array(deviations));
+            header.correction = fields.bytes().map(<[u8]>::to_vec).ok_or(SHORT)?;
+        }
         if !fields.is_empty() {
             return Err("it is too long");
         }

@@ -6,7 +6,12 @@
 //! counts, so that nothing the software does can spoil what was measured; the
 //! calibration that turns them into millimetres stands in its header as numbers.
 //!
-//! # File format, version 1 (`.scan`)
+//! The counts stay what the device sent, and the calibration what it announced, whatever is
+//! known of how the scanner deviates as it is mounted: a correction stands beside them, with the
+//! numbers that were used and where they came from. So a scan gives the same millimetres forever,
+//! and can still be calibrated anew.
+//!
+//! # File format, versions 1 and 2 (`.scan`)
 //!
 //! All integers are little-endian; `f64` is its IEEE 754 bits.
 //!
@@ -29,6 +34,13 @@
 //! count. Kind 1 is Cartesian: mm per count and three zeros. The four byte strings
 //! belong to the writer (the service keeps JSON there); readers of the geometry need
 //! none of them.
+//!
+//! Version 2 has a correction behind the header's four byte strings: ten f64 (angle offset rad,
+//! angle scale, range offset mm, range scale, camera x, y, z mm, table towards y rad, table
+//! towards z rad, table scale, as [`range_image::Correction`] has them), then a fifth byte string
+//! that says where it came from. A scan without a correction is written as version 1, byte for
+//! byte as ever. A program that knows version 1 alone refuses version 2 rather than to leave the
+//! correction out.
 //!
 //! # Durability
 //!

@@ -132,14 +132,14 @@ impl<R: Read> JournalReader<R> {
             return Err(ReadError::NotAJournal);
         }
         let found = u16::from_le_bytes([preamble[8], preamble[9]]);
-        if found != VERSION {
+        if !Header::knows(found) {
             return Err(ReadError::UnknownVersion { found });
         }
         let at_byte = PREAMBLE_BYTES as u64;
         let damaged = |what| ReadError::DamagedHeader { at_byte, what };
         let mut payload = Vec::new();
         let header = match read_record(&mut source, &mut payload)? {
-            Record::Sound(KIND_HEADER) => Header::decode(&payload).map_err(damaged)?,
+            Record::Sound(KIND_HEADER) => Header::decode(&payload, found).map_err(damaged)?,
             Record::Sound(_) => return Err(damaged("another record stands in its place")),
             Record::Nothing => return Err(damaged("the file ends there")),
             Record::Bad(what) => return Err(damaged(what)),

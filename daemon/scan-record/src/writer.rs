@@ -8,8 +8,8 @@ use storage::{Appender, Disk, LocalDisk};
 use crate::column::RawColumn;
 use crate::format::{
     COLUMN_HEAD_BYTES, END_HEAD_BYTES, KIND_COLUMN, KIND_END, KIND_HEADER, MAGIC, MAX_HEADER_BYTES,
-    MAX_REASON_BYTES, MAX_SAMPLES, PREAMBLE_BYTES, RECORD_HEAD_BYTES, SAMPLE_BYTES, VERSION,
-    checksum, record_head,
+    MAX_REASON_BYTES, MAX_SAMPLES, PREAMBLE_BYTES, RECORD_HEAD_BYTES, SAMPLE_BYTES, checksum,
+    record_head,
 };
 use crate::header::Header;
 use crate::reader::Continuation;
@@ -199,7 +199,7 @@ impl<S: Storage> JournalWriter<S> {
             bytes: PREAMBLE_BYTES as u64,
             failed: false,
         };
-        let [low, high] = VERSION.to_le_bytes();
+        let [low, high] = header.version().to_le_bytes();
         writer.storage.write_all(&MAGIC)?;
         writer.storage.write_all(&[low, high, 0, 0])?;
         writer.write_record(KIND_HEADER)?;

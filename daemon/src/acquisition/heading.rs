@@ -65,6 +65,7 @@ pub(super) fn header(
         plan: serde_json::to_vec(&plan).unwrap_or_default(),
         settings: serde_json::to_vec(processing).unwrap_or_default(),
         metadata: serde_json::to_vec(scan).unwrap_or_default(),
+        correction: Vec::new(),
     }
 }
 

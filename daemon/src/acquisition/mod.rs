@@ -55,10 +55,12 @@ pub(crate) fn calibration(wire: &scanner_protocol::Calibration) -> Calibration {
                 count_mm: f64::from(count_pm) / PM_PER_MM,
             },
         },
+        correction: None,
     }
 }
 
-/// What a device announced that gave this calibration; `None` if none can have.
+/// What a device announced that gave this calibration, whatever the correction; `None` if none
+/// can have.
 pub(crate) fn announced(known: &Calibration) -> Option<scanner_protocol::Calibration> {
     // Beyond what can be announced these saturate, and are found not to be the same.
     let nm = |mm: f64| (mm * NM_PER_MM).round() as i64;
@@ -83,7 +85,7 @@ pub(crate) fn announced(known: &Calibration) -> Option<scanner_protocol::Calibra
             },
         },
     };
-    (calibration(&wire) == *known).then_some(wire)
+    (calibration(&wire) == known.as_announced()).then_some(wire)
 }
 
 /// A request to end a scan early, and by whom.
@@ -152,6 +154,7 @@ mod tests {
             table_origin_mm: 0.0,
             table_count_mm,
             head: Head::Cartesian { count_mm: 0.01 },
+            correction: None,
         };
         assert!(announced(&known(0.01)).is_some());
         for odd in [0.010_000_000_1, -0.01, 5.0, f64::NAN, f64::INFINITY] {

@@ -11,6 +11,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
+use jiff::Timestamp;
 use relief_api::{Scan, ScanState, ScannerLink};
 use scan_record::JournalWriter;
 use scanner_driver::{ScanStream, Scanner, ScannerError};
@@ -23,6 +24,7 @@ use super::live::Live;
 use super::onlookers::Onlookers;
 use super::plan::ResolvedPlan;
 use super::taken_up::{TakeUp, take_up};
+use crate::calibration::InForce;
 use crate::config::Processing;
 use crate::error::panic_text;
 use crate::liveness::Pulse;
@@ -183,7 +185,16 @@ fn take_all(
     if let Some(scan) = scan {
         service.keep_scan(&scan).map_err(|e| e.to_string())?;
     }
-    let header = header(&ticket.scan, &ticket.processing, identity, plan, info);
+    let calibration = station.calibration(identity).map_err(|e| e.to_string())?;
+    let overdue = |own: &InForce| own.overdue(Timestamp::now());
+    if let Some(told) = station.calibration.as_deref().and_then(overdue) {
+        tracing::warn!(scan = %ticket.scan.id, scanner = station.name(), "{told}");
+    }
+    let mut header = header(&ticket.scan, &ticket.processing, identity, plan, info);
+    header.calibration = calibration;
+    if let Some(own) = &station.calibration {
+        header.correction = serde_json::to_vec(own).unwrap_or_default();
+    }
     // Dropped on the way out if there is no place to keep its columns, the stream itself
     // turns the laser off.
     let id = ticket.scan.id.as_str();

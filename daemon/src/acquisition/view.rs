@@ -127,6 +127,7 @@ mod tests {
                 angle_count_rad: 1e-6,
                 range_count_mm: 0.1,
             },
+            correction: None,
         };
         head(&mut calibration.head);
         let resolved = ResolvedPlan {

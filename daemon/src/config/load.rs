@@ -87,6 +87,15 @@ impl Config {
             // Whether it has the cutters.
             .and_then(|()| deliverables.further().map(drop))
             .map_err(|(section, message)| inconsistent(path, section, message))?;
+        config
+            .scanner
+            .read_calibration(path)
+            .map_err(|message| inconsistent(path, "scanner", message))?;
+        for (name, scanner) in &mut config.scanners {
+            scanner.read_calibration(path).map_err(|message| {
+                inconsistent(path, "scanners", format!("scanner {name}: {message}"))
+            })?;
+        }
         if !config.deliverables.edit.is_empty() {
             let told = "edit changes the features of one scan: give it with a rerun of that";
             return Err(inconsistent(path, "deliverables", told.to_owned()));

@@ -1,6 +1,6 @@
 //! The sections `[scanner]` and `[scanners.NAME]`: how a scanner is attached.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use relief_api::PlanRequest;
@@ -9,6 +9,7 @@ use scanner_protocol::usb;
 use serde::Deserialize;
 
 use super::value;
+use crate::calibration::{CalibrationFile, InForce, USUAL_DAYS};
 
 /// How a scanner is attached, and what it measures.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -59,6 +60,14 @@ pub struct ScannerConfig {
     /// Longest pause, in seconds, after which a scan may go on without a person's word.
     #[serde(deserialize_with = "value::seconds")]
     pub resume_unattended_s: Option<u32>,
+    /// File that says how the mounted scanner deviates, from the folder of the configuration.
+    pub calibration: Option<PathBuf>,
+    /// Days after which that counts as old.
+    #[serde(deserialize_with = "value::days")]
+    pub calibration_days: Option<u32>,
+    /// What the file says.
+    #[serde(skip)]
+    pub in_force: Option<Box<InForce>>,
     /// What a scan measures on this scanner; what is left out is as in `[scan]`.
     pub scan: PlanRequest,
 }
@@ -91,6 +100,9 @@ impl Default for ScannerConfig {
             credits: None,
             resume: true,
             resume_unattended_s: None,
+            calibration: None,
+            calibration_days: None,
+            in_force: None,
             scan: PlanRequest::default(),
         }
     }
@@ -104,6 +116,26 @@ impl ScannerConfig {
             Transport::Serial => self.port.display().to_string(),
             Transport::Usb => format!("USB {}", self.usb().place()),
         }
+    }
+
+    /// Reads the calibration that is named; `config` is the configuration's own file.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub(super) fn read_calibration(&mut self, config: &Path) -> Result<(), String> {
+        let Some(path) = &self.calibration else {
+            return match self.calibration_days {
+                Some(_) => Err("calibration_days does nothing without `calibration`".into()),
+                None => Ok(()),
+            };
+        };
+        let path = config.parent().unwrap_or(Path::new("")).join(path);
+        let file = CalibrationFile::read(&path).map_err(|error| format!("calibration: {error}"))?;
+        self.in_force = Some(Box::new(InForce {
+            file,
+            calibration_days: self.calibration_days.unwrap_or(USUAL_DAYS),
+        }));
+        Ok(())
     }
 
     /// What the driver of serial ports is told.

@@ -95,6 +95,7 @@ impl From<ServiceError> for Refusal {
                 let hint = hint.map(|hint| hint.replace(" scanner.", &format!(" {section}.")));
                 (status, kind, hint)
             }
+            ServiceError::Calibration(_) => (S::CONFLICT, "other-calibration", None),
             ServiceError::Plan(_) => (S::BAD_REQUEST, "impossible-scan", None),
             ServiceError::Setting(_) => (S::BAD_REQUEST, "wrong-setting", None),
             ServiceError::LongName { .. } => (S::BAD_REQUEST, "long-name", None),

@@ -9,7 +9,6 @@ use deliverables::{
     ScanReport, Schema, Stopwatch,
 };
 use pipeline::{Columns, Observer, PipelineError, ReadAgainError, Stage, View};
-use range_image::calibration::Head;
 use range_image::{Cancelled, Column, Lattice, Monitor, RangeImage};
 use relief_api::{Job, Scan};
 use scan_record::{Ending, Header, JournalReader, ReadError};
@@ -18,6 +17,7 @@ use super::kept_processing;
 use super::progress::Progress;
 use super::worker::JobOutcome;
 use crate::acquisition::grid_file;
+use crate::calibration::InForce;
 use crate::config::{PageChoice, Processing, StepChoice, StepUnits};
 use crate::fit::Fit;
 use crate::service::{KeptGrid, Service};
@@ -133,7 +133,7 @@ fn attempt(
     };
     let columns = KeptColumns {
         path: service.journal_path(&job.scan),
-        head: header.calibration.head,
+        camera_mm: header.calibration.camera_mm(),
     };
     let outcome = pipeline::process_in_view(&image, Some(&columns), &kept.view, &settings, &watch)
         .map_err(|error| explained(error, service, job, kept.samples))?;
@@ -142,6 +142,9 @@ fn attempt(
         .started_at
         .parse()
         .map_err(|error| Stop::failed(format!("the scan's time is damaged: {error}"), None))?;
+    let overdue = |own: InForce| own.overdue(timestamp);
+    kept.warnings
+        .extend(InForce::kept_with(&header).and_then(overdue));
     let cad = cad_options(&processing, &scan)?;
     let inputs = Inputs {
         name: &job.name,
@@ -171,7 +174,7 @@ fn attempt(
 /// The columns of a journal, read anew each time.
 struct KeptColumns {
     path: PathBuf,
-    head: Head,
+    camera_mm: Option<[f64; 2]>,
 }
 
 impl Columns for KeptColumns {
@@ -187,7 +190,7 @@ impl Columns for KeptColumns {
     }
 
     fn camera_mm(&self) -> Option<[f64; 2]> {
-        self.head.camera_mm()
+        self.camera_mm
     }
 }
 
@@ -433,6 +436,7 @@ fn scan_report(scan: &Scan, header: &Header, kept: &Kept) -> ScanReport {
         columns: kept.columns,
         samples: kept.samples,
         dropouts: Some(kept.dropouts),
+        calibration: InForce::kept_with(header).map(|own| own.report(scan.started_at.parse().ok())),
     }
 }
 

@@ -9,11 +9,17 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use relief_api::{Event, Scan, ScanState, ScannerLink, ScannerStatus, ScannerSummary, THE_SCANNER};
+use jiff::Timestamp;
+use range_image::Calibration;
+use relief_api::{
+    CalibrationStatus, Event, Scan, ScanState, ScannerLink, ScannerStatus, ScannerSummary,
+    THE_SCANNER,
+};
 use scanner_driver::{Scanner, ScannerError};
 use scanner_protocol::Identity;
 
-use crate::acquisition::{AbortRequest, describe_trouble};
+use crate::acquisition::{AbortRequest, calibration, describe_trouble};
+use crate::calibration::{CalibrationError, InForce};
 use crate::config::{NamedScanner, Transport};
 use crate::error::ServiceError;
 use crate::events::Hub;
@@ -49,6 +55,8 @@ pub(crate) struct Station {
     pub(crate) scanner: Arc<dyn Scanner>,
     /// What the scanner has to say that its own is.
     serial_number: Option<String>,
+    /// How it deviates as it is mounted, if that is known.
+    pub(crate) calibration: Option<Box<InForce>>,
     pub(crate) laser: Arc<Laser>,
     hub: Arc<Hub>,
     slot: Mutex<Slot>,
@@ -117,6 +125,7 @@ impl Station {
                 // The USB device is chosen by its own.
                 Transport::Usb => None,
             },
+            calibration: configured.config.in_force.clone(),
             laser,
             hub,
             slot: Mutex::new(Slot::Free),
@@ -129,6 +138,7 @@ impl Station {
                 serial: None,
                 firmware: None,
                 problem: None,
+                calibration: None,
             }),
         }
     }
@@ -294,7 +304,31 @@ impl Station {
 
     /// What is known of the scanner.
     pub(crate) fn status(&self) -> ScannerStatus {
-        lock(&self.status).clone()
+        let mut status = lock(&self.status).clone();
+        // Its age goes on while nothing else changes.
+        status.calibration = self.calibration.as_ref().map(|own| {
+            let now = Timestamp::now();
+            CalibrationStatus {
+                date: own.file.date.clone(),
+                age_days: own.file.age_days(now),
+                residual_mm: own.file.residual_after_mm,
+                overdue: own.overdue(now).is_some(),
+            }
+        });
+        status
+    }
+
+    /// From this scanner's counts to millimetres, corrected where that is known.
+    pub(crate) fn calibration(&self, identity: &Identity) -> Result<Calibration, CalibrationError> {
+        let mut calibration = calibration(&identity.calibration);
+        if let Some(own) = &self.calibration {
+            let (model, serial) = (identity.model.as_str(), identity.serial.as_str());
+            let correction = own
+                .file
+                .for_scanner(model, serial, &calibration, &self.section)?;
+            calibration.correction = Some(correction);
+        }
+        Ok(calibration)
     }
 
     /// The station at a glance.

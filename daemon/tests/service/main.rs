@@ -9,6 +9,7 @@
 mod access;
 mod ailing;
 mod api;
+mod calibration;
 mod client;
 mod config;
 mod cut_short;

@@ -18,7 +18,8 @@ use core::marker::PhantomData;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sensor;
 
-/// The part's right-handed frame: x along the slide table, y up, z towards the camera.
+/// The part's right-handed frame: x along the slide table, y up, z towards the camera. Of a scanner
+/// with a correction x is square to the laser plane, and the table travels nearly along it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Part;
 

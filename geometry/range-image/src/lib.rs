@@ -5,6 +5,7 @@
 
 pub mod calibration;
 pub mod column;
+pub mod correction;
 pub mod frame;
 pub mod image;
 pub mod monitor;
@@ -13,6 +14,7 @@ pub mod region_map;
 
 pub use calibration::Calibration;
 pub use column::{Column, Sample};
+pub use correction::Correction;
 pub use frame::{Part, Position, Sensor};
 pub use image::{GridColumn, Lattice, RangeImage, RangeImageBuilder};
 pub use monitor::{Cancelled, Monitor, Unmonitored};

@@ -1,6 +1,7 @@
 //! Scanners to be: presets after real ones, and the settings a user may change.
 
 use crate::mechanics::Mechanics;
+use crate::mount::Mount;
 use crate::noise::NoiseModel;
 use crate::optics::Optics;
 use crate::scanner::{Head, HeadKind, Scanner, Sweep};
@@ -68,6 +69,8 @@ pub struct Overrides {
     pub jitter_mm: Option<f64>,
     /// See [`Mechanics::backlash_mm`].
     pub backlash_mm: Option<f64>,
+    /// How the head is mounted.
+    pub mount: Mount,
 }
 
 /// Why a scanner cannot be made.
@@ -200,7 +203,7 @@ impl Preset {
         }
         let (low, high) = scene.object_extent_mm();
         let (view_low, view_high) = scene.view_extent_mm();
-        let middle = (low + high) / 2.0;
+        let middle = scene.middle_mm.unwrap_or((low + high) / 2.0);
         let standoff_mm = overrides.standoff_mm.unwrap_or(base.standoff_mm);
         // The object may take up to 4/5 of the way to the camera on the near side.
         let depth_mm = standoff_mm * 0.8;
@@ -263,6 +266,7 @@ impl Preset {
             // Table position 0 is at the home switch, left of the object.
             table_origin_nm: libm::round((middle.x - TABLE_MM / 2.0) * 1e3) as i64 * 1000,
             part_offset_mm: crate::Vec3::ZERO,
+            mount: overrides.mount,
             noise,
             seed,
         };
@@ -321,6 +325,7 @@ fn check(overrides: &Overrides) -> Result<(), SetupError> {
     within("pitch (mm)", overrides.pitch_mm, 0.01, 50.0)?;
     within("range count (mm)", overrides.range_count_mm, 1e-5, 1.0)?;
     within("standoff (mm)", overrides.standoff_mm, 50.0, 2_000.0)?;
+    overrides.mount.validate().map_err(SetupError::Setting)?;
     within("jitter (mm)", overrides.jitter_mm, 0.0, 10.0)?;
     within("backlash (mm)", overrides.backlash_mm, 0.0, 10.0)
 }

@@ -1,5 +1,6 @@
 //! What the laser meets: the object, and what stands around it.
 
+pub mod artefacts;
 pub mod benches;
 mod exact;
 pub mod figures;
@@ -78,6 +79,9 @@ pub struct Scene {
     pub object_bodies: usize,
     /// Lower and upper corner of what a proposed scan takes in, if more than the object.
     pub view_mm: Option<(Vec3, Vec3)>,
+    /// Middle of the measuring volume, where the scanner is set up; without one it is set up
+    /// before the middle of the object.
+    pub middle_mm: Option<Vec3>,
     /// Patches of the object that swallow light.
     pub stains: Vec<Stain>,
 }
@@ -90,6 +94,7 @@ impl Scene {
             object_bodies: object.len(),
             bodies: object.into_iter().map(|body| (body, material)).collect(),
             view_mm: None,
+            middle_mm: None,
             stains: Vec::new(),
         }
     }
@@ -110,6 +115,13 @@ impl Scene {
     #[must_use]
     pub fn with_view_mm(mut self, low: Vec3, high: Vec3) -> Self {
         self.view_mm = Some((low, high));
+        self
+    }
+
+    /// States where the middle of the scanner's measuring volume is.
+    #[must_use]
+    pub fn with_middle_mm(mut self, middle: Vec3) -> Self {
+        self.middle_mm = Some(middle);
         self
     }
 

@@ -19,6 +19,7 @@ impl Journal {
                 table_origin_mm: 0.0,
                 table_count_mm: 0.01,
                 head: Head::Cartesian { count_mm: 0.1 },
+                correction: None,
             },
             column_pitch_mm: 0.5,
             sample_spacing_mm: 0.5,
@@ -26,6 +27,7 @@ impl Journal {
             plan: Vec::new(),
             settings: Vec::new(),
             metadata: Vec::new(),
+            correction: Vec::new(),
         };
         Ok(Self(JournalWriter::new(Vec::new(), &header)?))
     }

@@ -212,6 +212,7 @@ pub(super) fn journal(dice: &mut Dice, wild: bool) -> Result<Vec<u8>> {
             head: Head::Cartesian {
                 count_mm: length(0.01),
             },
+            correction: None,
         },
         column_pitch_mm: length(0.5),
         sample_spacing_mm: length(0.5),
@@ -219,6 +220,7 @@ pub(super) fn journal(dice: &mut Dice, wild: bool) -> Result<Vec<u8>> {
         plan: b"{}".to_vec(),
         settings: Vec::new(),
         metadata: b"{}".to_vec(),
+        correction: Vec::new(),
     };
     let mut count = |usual: i32| match wild && dice.once_in(40) {
         true => dice.pick(&[i32::MIN, i32::MAX, 0, -1]).unwrap_or(usual),

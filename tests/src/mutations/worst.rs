@@ -381,6 +381,7 @@ fn scan(columns: usize, samples: usize) -> Result<Vec<u8>> {
             table_origin_mm: 0.0,
             table_count_mm: 1e-5,
             head: Head::Cartesian { count_mm: 1e-5 },
+            correction: None,
         },
         column_pitch_mm: 0.5,
         sample_spacing_mm: 0.5,
@@ -388,6 +389,7 @@ fn scan(columns: usize, samples: usize) -> Result<Vec<u8>> {
         plan: Vec::new(),
         settings: Vec::new(),
         metadata: Vec::new(),
+        correction: Vec::new(),
     };
     let sample = RawSample {
         lateral_counts: 1,

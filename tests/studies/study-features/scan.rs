@@ -143,6 +143,7 @@ fn header(scanner: &Scanner, sweep: &Sweep) -> Result<Header> {
                 angle_count_rad,
                 range_count_mm: f64::from(range_count_nm) * 1e-6,
             },
+            correction: None,
         },
         column_pitch_mm: f64::from(sweep.pitch_counts) * scanner.mechanics.count_mm(),
         sample_spacing_mm: f64::from(sweep.lateral_step_counts) * angle_count_rad * standoff_mm,
@@ -150,6 +151,7 @@ fn header(scanner: &Scanner, sweep: &Sweep) -> Result<Header> {
         plan: Vec::new(),
         settings: Vec::new(),
         metadata: Vec::new(),
+        correction: Vec::new(),
     })
 }
 

@@ -30,6 +30,7 @@ impl Bench {
             table_origin_mm: 0.0,
             table_count_mm: COUNT_MM,
             head: Head::Cartesian { count_mm: COUNT_MM },
+            correction: None,
         };
         header.column_pitch_mm = 0.5;
         header.sample_spacing_mm = 0.5;

@@ -1,6 +1,8 @@
 //! The commands, one small file each.
 
 pub(crate) mod abort;
+pub(crate) mod accept;
+pub(crate) mod calibrate;
 pub(crate) mod change;
 pub(crate) mod compare;
 pub(crate) mod config;
@@ -15,7 +17,7 @@ mod grid;
 pub(crate) mod jobs;
 pub(crate) mod laser;
 pub(crate) mod manual;
-mod named;
+pub(crate) mod named;
 mod pages;
 mod part;
 pub(crate) mod pause;
@@ -47,6 +49,8 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
     let json = invocation.json;
     match invocation.command {
         Command::Demo(args) => block_on(demo::run(args, json)),
+        Command::Accept(args) => block_on(accept::run(args, json)),
+        Command::Calibrate(args) => block_on(calibrate::run(args, json)),
         Command::Compare(args) => block_on(compare::run(args, json)),
         Command::Features(args) => block_on(features::run(args, json)),
         Command::Fill(args) => block_on(fill::run(args, json)),

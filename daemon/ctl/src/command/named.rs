@@ -11,7 +11,7 @@ const LATEST: &str = "latest";
 /// The identifier of the scan that a user means by its identifier, its name or `latest`.
 /// What no scan is called is given back, for the service to say so: the results of reruns
 /// have names of their own.
-pub(super) async fn scan_id(client: &Client, said: String) -> Result<String, Failure> {
+pub(crate) async fn scan_id(client: &Client, said: String) -> Result<String, Failure> {
     let list: ScanList = client.get(path::SCANS).await?;
     match meant(&list.scans, &said) {
         Some(scan) => Ok(scan.id.clone()),

@@ -78,6 +78,19 @@ fn scanner(
     if let Some(problem) = &scanner.problem {
         lines.push(format!("          {problem}"));
     }
+    if let Some(calibration) = &scanner.calibration {
+        let old = if calibration.overdue {
+            "; it is old: calibrate anew"
+        } else {
+            ""
+        };
+        lines.push(format!(
+            "          calibrated {}, {} ago, residual {:.4} mm{old}",
+            calibration.date,
+            counted(usize::try_from(calibration.age_days).unwrap_or(0), "day"),
+            calibration.residual_mm
+        ));
+    }
     lines.push(match laser {
         Some(laser) => format!(
             "laser     {} since {}: {}",

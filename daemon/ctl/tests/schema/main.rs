@@ -26,7 +26,8 @@ use serde_json::{Value, json};
 use sim_scanner::config::SimConfig;
 use sim_scanner::preset::Overrides;
 
-const FILES: [&str; 4] = [
+const FILES: [&str; 5] = [
+    "acceptance.schema.json",
     "comparison.schema.json",
     "report.schema.json",
     "manifest.schema.json",
@@ -51,6 +52,8 @@ fn the_schemas_are_schemas() {
         assert!(schema["$schema"].as_str().unwrap().contains("2020-12"));
     }
     for command in [
+        "accept",
+        "calibrate",
         "compare",
         "convert",
         "skin",

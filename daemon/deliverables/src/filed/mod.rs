@@ -1,5 +1,6 @@
 //! The page of a scan or a comparison that an engineer can file.
 
+mod acceptance;
 mod comparison;
 mod further;
 mod parameters;
@@ -12,10 +13,11 @@ use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use page::{Fact, Line, Page, Picture, number};
 
+pub use acceptance::acceptance_page;
 pub use comparison::comparison_page;
 pub use scan::scan_page;
 
-use crate::report::ScanReport;
+use crate::report::{CalibrationReport, ScanReport};
 
 /// A form in which a page is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -153,7 +155,27 @@ fn origin(scan: &ScanReport) -> Vec<Fact> {
         samples = samples.text(" rays without");
     }
     facts.push(Fact::new("Samples", samples));
+    facts.extend(
+        scan.calibration
+            .as_ref()
+            .map(|own| Fact::new("Calibrated", calibrated(own))),
+    );
     facts
+}
+
+/// When a scanner was calibrated, and how well.
+fn calibrated(own: &CalibrationReport) -> Line {
+    let mut line = Line::from(own.date.clone());
+    if let Some(days) = own.age_days {
+        let days = usize::try_from(days).unwrap_or(0);
+        line = line
+            .text(", ")
+            .line(of_a_kind(days, "day", "days"))
+            .text(" before");
+    }
+    line.text(", residual ")
+        .line(figure(Some(own.residual_mm), 4))
+        .text(" mm")
 }
 
 fn picture(caption: &str, alternative: String, png: Vec<u8>) -> Picture {

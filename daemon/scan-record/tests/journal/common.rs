@@ -19,6 +19,7 @@ pub(crate) fn header() -> Header {
                 angle_count_rad: 1e-6,
                 range_count_mm: 0.1,
             },
+            correction: None,
         },
         column_pitch_mm: 0.5,
         sample_spacing_mm: 0.4,
@@ -26,6 +27,7 @@ pub(crate) fn header() -> Header {
         plan: b"plan".to_vec(),
         settings: Vec::new(),
         metadata: b"m".to_vec(),
+        correction: Vec::new(),
     }
 }
 

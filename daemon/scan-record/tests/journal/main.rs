@@ -6,3 +6,4 @@ mod durability;
 mod hostile;
 mod round_trip;
 mod version_1;
+mod version_2;

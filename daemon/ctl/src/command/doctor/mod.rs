@@ -10,6 +10,7 @@ mod usb;
 
 use std::path::{Path, PathBuf};
 
+use jiff::Timestamp;
 use reliefd::Config;
 use reliefd::config::{ScannerConfig, Transport};
 use serde::Serialize;
@@ -88,6 +89,8 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
     for named in config.each_scanner() {
         let found = scanner(named.config).into_iter();
         findings.extend(found.map(|finding| finding.of(&named)));
+        let found = calibration(named.config).into_iter();
+        findings.extend(found.map(|finding| finding.of(&named)));
     }
     findings.push(port::present());
     findings.push(usb::present());
@@ -132,6 +135,29 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
             counted(bad, "trouble")
         )))
     }
+}
+
+/// The calibration that is named, and how old it is.
+fn calibration(config: &ScannerConfig) -> Option<Finding> {
+    let own = config.in_force.as_ref()?;
+    let now = Timestamp::now();
+    Some(match own.overdue(now) {
+        None => Finding::good(
+            "calibration",
+            format!(
+                "of {}, {} ago, for {} {}",
+                own.file.date,
+                counted(usize::try_from(own.file.age_days(now)).unwrap_or(0), "day"),
+                own.file.scanner_model,
+                own.file.scanner_serial
+            ),
+        ),
+        Some(told) => Finding::doubtful(
+            "calibration",
+            told,
+            "scan the reference sphere, run relief calibrate, and name its file as `calibration`",
+        ),
+    })
 }
 
 /// The way to the scanner, by its kind.
