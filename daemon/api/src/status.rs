@@ -107,7 +107,7 @@ pub struct ScannerStatus {
 }
 
 /// A calibration in force.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct CalibrationStatus {
     /// When the scanner was calibrated, RFC 3339 in UTC.
     pub date: String,

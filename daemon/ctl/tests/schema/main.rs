@@ -12,19 +12,12 @@ mod common;
 mod service;
 
 use std::fs;
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::TcpListener;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use common::schema::{check, published, validator};
 use common::{relief, roof, text};
-use reliefd::config::{DeliverablesConfig, WebhookConfig};
-use reliefd::{Config, Daemon};
 use serde_json::{Value, json};
-use sim_scanner::config::SimConfig;
-use sim_scanner::preset::Overrides;
 
 const FILES: [&str; 5] = [
     "acceptance.schema.json",

@@ -102,6 +102,15 @@ fn gathered(scans: &[AcceptedScan], reference: &Reference) -> Vec<Series> {
     all
 }
 
+/// A figure's key, its name, its unit, its limit, and its values.
+type Row = (
+    &'static str,
+    &'static str,
+    &'static str,
+    Option<f64>,
+    Vec<f64>,
+);
+
 /// The worst value of each figure against its limit; what has a limit but no value is named in
 /// the error.
 pub(super) fn figures(
@@ -114,7 +123,7 @@ pub(super) fn figures(
     let steps = scans
         .iter()
         .flat_map(|scan| scan.step_errors_mm.iter().skip(1).flatten());
-    let rows: [(&str, &str, &str, Option<f64>, Vec<f64>); 7] = [
+    let rows: [Row; 7] = [
         (
             "probing_form_mm",
             "probing error, form PF",
