@@ -27,9 +27,9 @@ const CORRECTION: &[u8] = &[
 ];
 
 fn written(header: &Header) -> Vec<u8> {
-    let mut writer = JournalWriter::new(Vec::new(), header).unwrap();
-    writer.append(&column(0, 2)).unwrap();
-    writer.finish(&EndCause::Complete).unwrap()
+    let mut writer = JournalWriter::new(Vec::new(), header).expect("memory takes it");
+    writer.append(&column(0, 2)).expect("memory takes it");
+    writer.finish(&EndCause::Complete).expect("memory takes it")
 }
 
 #[test]
