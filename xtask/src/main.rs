@@ -218,6 +218,7 @@ fn full() -> anyhow::Result<()> {
     web::run(&web::Options {
         seconds: 300,
         seed: 1,
+        pictures: false,
     })?;
     vm::run(&vm::Vm::Usb(vm::Options::default()))?;
     fuzz::run(&fuzz::Options {

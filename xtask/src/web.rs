@@ -1,6 +1,6 @@
 //! Lets a browser and other clients that are not ours judge the web page and the API.
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::{apt, judge, shell, study};
@@ -20,7 +20,13 @@ pub(crate) struct Options {
     /// What schemathesis asks follows from it.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u32,
+    /// Put the operator's guide's pictures of the page anew.
+    #[arg(long)]
+    pub(crate) pictures: bool,
 }
+
+/// Pictures of the page in the operator's guide.
+const IN_THE_GUIDE: [&str; 3] = ["machine-scanning.png", "result.png", "preview.png"];
 
 /// The page's own modules, the integrator's examples, the API by its description, and the whole
 /// story of a scan in a browser.
@@ -44,6 +50,14 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     judge("examples", &[])?;
     let (seconds, seed) = (options.seconds.to_string(), options.seed.to_string());
     judge("api", &["--seconds", &seconds, "--seed", &seed])?;
-    let pictures = place.join("pictures").display().to_string();
-    judge("story", &[&pictures])
+    let pictures = place.join("pictures");
+    judge("story", &[&pictures.display().to_string()])?;
+    if options.pictures {
+        for name in IN_THE_GUIDE {
+            let guide = shell::root().join("docs/pictures/page").join(name);
+            std::fs::copy(pictures.join(name), &guide)
+                .with_context(|| format!("cannot write {}", guide.display()))?;
+        }
+    }
+    Ok(())
 }
