@@ -114,6 +114,7 @@ fn what_is_told_is_one_line() {
             serial: None,
             firmware: None,
             problem: Some("it says \"a\nMAINPID=1\"".into()),
+            calibration: None,
         },
         scan: None,
         storage: None,

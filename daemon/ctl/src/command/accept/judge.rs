@@ -13,6 +13,15 @@ struct Series {
     values: Vec<(Option<f64>, f64)>,
 }
 
+/// A figure's key, name, unit, limit and values.
+type Row = (
+    &'static str,
+    &'static str,
+    &'static str,
+    Option<f64>,
+    Vec<f64>,
+);
+
 /// How figures repeat and drift.
 pub(super) fn series(
     scans: &[AcceptedScan],
@@ -114,7 +123,7 @@ pub(super) fn figures(
     let steps = scans
         .iter()
         .flat_map(|scan| scan.step_errors_mm.iter().skip(1).flatten());
-    let rows: [(&str, &str, &str, Option<f64>, Vec<f64>); 7] = [
+    let rows: [Row; 7] = [
         (
             "probing_form_mm",
             "probing error, form PF",
