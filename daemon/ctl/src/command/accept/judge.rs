@@ -13,6 +13,15 @@ struct Series {
     values: Vec<(Option<f64>, f64)>,
 }
 
+/// A figure's key, name, unit, limit and values.
+type Row = (
+    &'static str,
+    &'static str,
+    &'static str,
+    Option<f64>,
+    Vec<f64>,
+);
+
 /// How figures repeat and drift.
 pub(super) fn series(
     scans: &[AcceptedScan],
