@@ -111,15 +111,6 @@ fn gathered(scans: &[AcceptedScan], reference: &Reference) -> Vec<Series> {
     all
 }
 
-/// A figure's key, its name, its unit, its limit, and its values.
-type Row = (
-    &'static str,
-    &'static str,
-    &'static str,
-    Option<f64>,
-    Vec<f64>,
-);
-
 /// The worst value of each figure against its limit; what has a limit but no value is named in
 /// the error.
 pub(super) fn figures(
