@@ -134,6 +134,8 @@ pub(crate) fn build() -> Result<String> {
             ("CARGO_TARGET_DIR", home().display().to_string()),
             ("CARGO_PROFILE_RELEASE_DEBUG_ASSERTIONS", off()),
             ("CARGO_PROFILE_RELEASE_OVERFLOW_CHECKS", off()),
+            // As it is without being asked for: within each crate.
+            ("CARGO_PROFILE_RELEASE_LTO", off()),
         ],
     )?;
     Ok(home().join("release/bench").display().to_string())
