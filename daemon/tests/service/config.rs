@@ -51,7 +51,7 @@ fn faults_are_told_with_their_line_and_a_way_out() {
             "relief.toml, line 3, column 1: in [scanner] unknown key `serial`; known are: \
              name, transport, port, baud, vendor_id, product_id, serial_number, request_timeout_ms, \
              request_attempts, motion_timeout_ms, column_timeout_ms, dead_man_ms, credits, \
-             resume, resume_unattended_s, scan",
+             resume, resume_unattended_s, calibration, calibration_days, scan",
         ),
         (
             "[service]\nlisten = \"0.0.0.0:80\"\n",
