@@ -234,6 +234,9 @@ class Story:
             const said = at.getAttribute('aria-label') ?? at.textContent;
             return at.closest({within!r}) && at.tagName === 'BUTTON' && said.includes({name!r});
         }}"""
+        # What it is for may have to come first.
+        button = page.locator(within).get_by_role("button", name=name).first
+        expect(button).to_be_enabled()
         for _ in range(60):
             if page.evaluate(focused):
                 return
