@@ -154,8 +154,9 @@ fn attempt(
             job.hint = hint;
         }
     }
-    service.keep_job(&job)?;
+    // Before anybody can see it.
     service.metrics.job_ended(&job);
+    service.keep_job(&job)?;
     if let Some(event) = published {
         service.hub.tell(event);
     }
