@@ -173,7 +173,7 @@ impl Service {
             },
             nodes: image.valid_nodes() as u64,
             noise_mm: image.noise_mm(),
-            inlier_share: median(image.qualities().map(|quality| quality.inlier_share())),
+            inlier_share: image.inlier_share(),
             seconds: begun.elapsed().as_secs_f64(),
         })
     }
@@ -195,10 +195,4 @@ fn thinned(image: &RangeImage, step: i64) -> Vec<LiveColumn> {
         Some(grid_file::thinned(i, j, &z_mm, step))
     };
     columns.filter_map(of).collect()
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

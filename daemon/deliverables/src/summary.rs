@@ -115,18 +115,12 @@ fn range_image(inputs: &Inputs<'_>) -> RangeImageReport {
         nodes: image.valid_nodes(),
         z_min_mm: extent.map(|(low, _)| low),
         z_max_mm: extent.map(|(_, high)| high),
-        inlier_share: median(image.qualities().map(|quality| quality.inlier_share())),
+        inlier_share: image.inlier_share(),
         noise_mm: image.noise_mm(),
         claimed_nodes: inputs.outcome.claimed_nodes,
         dropped_nodes: settled.map_or(0, |settled| settled.dropped),
         filled_nodes: settled.map_or(0, |settled| settled.filled),
     }
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 fn regions(outcome: &Outcome) -> RegionsReport {

@@ -210,6 +210,15 @@ impl RangeImage {
             .then(|| f64::from(*scales.select_nth_unstable_by(middle, f32::total_cmp).1))
     }
 
+    /// Median share of the samples at a node that agree with it, 0 to 1; `None` where nothing is
+    /// known of it.
+    #[must_use]
+    pub fn inlier_share(&self) -> Option<f64> {
+        let mut shares: Vec<f64> = self.qualities().map(|own| own.inlier_share()).collect();
+        let middle = shares.len() / 2;
+        (!shares.is_empty()).then(|| *shares.select_nth_unstable_by(middle, f64::total_cmp).1)
+    }
+
     /// Number of nodes that have a value.
     #[must_use]
     pub fn valid_nodes(&self) -> usize {
