@@ -59,8 +59,8 @@ pub struct RegridImage {
     pub image: ScanImage,
     /// Nodes that have a value.
     pub nodes: u64,
-    /// Standard deviation of the noise about the surface, millimetres; absent where it cannot be
-    /// told.
+    /// Median of what the inliers at nodes stray by, millimetres: the noise of single samples;
+    /// absent where the estimator does not tell.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise_mm: Option<f64>,
     /// Median share of the samples at a node that agree with it, 0 to 1; absent where the
