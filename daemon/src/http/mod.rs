@@ -34,6 +34,7 @@ use axum::routing::any;
 use relief_api::{Status, path};
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
+use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 pub use listen::ListenError;
@@ -71,10 +72,7 @@ impl Context {
 
 /// All endpoints, as they are offered on the socket, whose file mode tells who may ask.
 pub(crate) fn on_socket(service: &Arc<Service>, stop: &CancellationToken) -> Router {
-    let all = openapi::described()
-        .routes(routes!(tokens::list, tokens::create))
-        .routes(routes!(tokens::revoke));
-    let (router, document) = openapi::split(all);
+    let (router, document) = openapi::split(with_tokens());
     let context = Context::new(service, stop, document);
     complete(router, &context).merge(page::router())
 }
@@ -82,11 +80,8 @@ pub(crate) fn on_socket(service: &Arc<Service>, stop: &CancellationToken) -> Rou
 /// The endpoints for bearers of a token, as they are offered on a loopback address. Places for
 /// listeners are their own: bearers of tokens must not take those of the socket.
 pub(crate) fn on_loopback(service: &Arc<Service>, stop: &CancellationToken) -> Router {
-    let (_, document) = openapi::split(
-        openapi::described()
-            .routes(routes!(tokens::list, tokens::create))
-            .routes(routes!(tokens::revoke)),
-    );
+    // Described all the same: where they are, and that they are refused here.
+    let (_, document) = openapi::split(with_tokens());
     let (router, _) = openapi::split(openapi::described());
     let router = router
         .route(path::TOKENS, any(tokens::only_on_the_socket))
@@ -95,6 +90,13 @@ pub(crate) fn on_loopback(service: &Arc<Service>, stop: &CancellationToken) -> R
     complete(router, &context)
         .layer(from_fn_with_state(context.clone(), guard::bearers_only))
         .merge(page::router().layer(from_fn_with_state(context, guard::this_machine_only)))
+}
+
+/// All endpoints.
+fn with_tokens() -> OpenApiRouter<Context> {
+    openapi::described()
+        .routes(routes!(tokens::list, tokens::create))
+        .routes(routes!(tokens::revoke))
 }
 
 fn complete(router: Router<Context>, context: &Context) -> Router {
