@@ -50,7 +50,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     judge("examples", &[])?;
     let (seconds, seed) = (options.seconds.to_string(), options.seed.to_string());
     judge("api", &["--seconds", &seconds, "--seed", &seed])?;
-    judge("watchers", &[])?;
+    judge("watchers", &["--rounds", "1"])?;
     let pictures = place.join("pictures");
     judge("story", &[&pictures.display().to_string()])?;
     if options.pictures {
