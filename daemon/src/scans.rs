@@ -362,15 +362,14 @@ impl Service {
     ) {
         station.laser.scan_ended(state, reason.as_deref());
         self.metrics.scan_ended(station.name(), state);
-        let scan = station.update_active(|scan| {
-            scan.state = state;
-            scan.reason = reason;
-            scan.needs_person = false;
-            scan.ended_at = Some(now());
-        });
-        let Some(mut scan) = scan.filter(|scan| scan.id == id) else {
+        let Some(mut scan) = station.active_scan().filter(|scan| scan.id == id) else {
             return;
         };
+        scan.state = state;
+        scan.reason = reason;
+        scan.needs_person = false;
+        scan.ended_at = Some(now());
+        // Whoever sees it complete is to find its job: it is seen as it was until that is kept.
         if let Err(error) = self.keep_ended(&mut scan) {
             tracing::error!(scan = id, %error, "cannot keep the record of a scan now; its columns are safe");
             lock(&self.unkept).push(scan.clone());

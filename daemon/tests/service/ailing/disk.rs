@@ -22,7 +22,9 @@ struct Ailment {
     refusals: u32,
     /// It does not say what is free until it is healed.
     hangs: bool,
-    /// How many wait for it to say so.
+    /// It does not write files whose names end so until it is healed.
+    stalls: Option<&'static str>,
+    /// How many wait for it.
     waiting: u32,
 }
 
@@ -63,6 +65,16 @@ impl Ailing {
     /// From now on nobody is told what is free. Returns once somebody waits to be told.
     pub(crate) async fn hang(&self) {
         self.0.lock().unwrap().hangs = true;
+        self.is_waited_for().await;
+    }
+
+    /// From now on writing to files whose names end so takes until the disk is healed.
+    pub(crate) fn stall(&self, ending: &'static str) {
+        self.0.lock().unwrap().stalls = Some(ending);
+    }
+
+    /// Returns once somebody waits for the disk.
+    pub(crate) async fn is_waited_for(&self) {
         while self.0.lock().unwrap().waiting == 0 {
             tokio::time::sleep(std::time::Duration::from_millis(1)).await;
         }
@@ -78,6 +90,13 @@ impl Ailing {
 impl Hindrance for Ailing {
     fn before(&self, deed: Deed, path: &Path) -> io::Result<()> {
         let mut ailment = self.0.lock().unwrap();
+        if deed == Deed::Write {
+            let name = path.to_string_lossy();
+            ailment.waiting += 1;
+            let stalls = |ailment: &mut Ailment| ailment.stalls.is_some_and(|e| name.ends_with(e));
+            ailment = self.1.wait_while(ailment, stalls).unwrap();
+            ailment.waiting = ailment.waiting.saturating_sub(1);
+        }
         let in_spool = path
             .parent()
             .is_some_and(|folder| folder.ends_with("spool"));

@@ -91,6 +91,26 @@ async fn a_read_only_disk_refuses_work_and_nothing_else() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_scan_is_not_complete_before_its_job_is_there() {
+    let (rig, disk) = rig(|_| {}).await;
+    rig.scanner.allow(30);
+    let mut events = rig.client.events().await;
+    let scan = rig.start_scan("a").await;
+    events
+        .until(|event| matches!(event, Event::Column { columns: 30, .. }).then_some(()))
+        .await;
+    disk.stall(".redb");
+    rig.scanner.allow_all();
+    disk.is_waited_for().await;
+    let seen: Scan = rig.client.get(&path::scan(&scan.id)).await;
+    assert_eq!(seen.state, ScanState::Scanning);
+    disk.heal();
+    let over = ended(&mut events, &scan.id).await;
+    assert_eq!((over.state, over.jobs.len()), (ScanState::Complete, 1));
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_scan_whose_record_is_refused_is_kept_and_processed_later() {
     let (rig, disk) = rig(|_| {}).await;
     rig.scanner.allow(30);
