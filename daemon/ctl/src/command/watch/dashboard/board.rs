@@ -138,6 +138,17 @@ impl Board {
                     .map(|job| Work { stage: None, job })
                     .collect();
             }
+            Word::Image(image) => {
+                let is_of = |station: &&mut Station| {
+                    let scan = station.scan.as_ref();
+                    scan.is_some_and(|scan| scan.id == image.scan)
+                };
+                if let Some(station) = self.stations.iter_mut().find(is_of) {
+                    station.is_at(&image.scan);
+                    let (columns, planned) = station.progress();
+                    station.picture.lay(&image, columns, planned);
+                }
+            }
             Word::Answer(answer) => self.note = Some(answer),
         }
     }
@@ -295,6 +306,12 @@ impl Station {
             self.rate = Rate::default();
             self.last_column = None;
         }
+    }
+
+    /// Columns of the scan that is shown, and how many it is to have.
+    fn progress(&self) -> (u32, u32) {
+        let scan = self.scan.as_ref();
+        scan.map_or((0, 0), |scan| (scan.columns, scan.columns_planned))
     }
 
     /// Whether its picture is of the scan that is shown.

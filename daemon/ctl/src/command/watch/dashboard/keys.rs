@@ -44,7 +44,7 @@ impl Board {
         }
         if self.shows_help {
             self.shows_help = false;
-            return (key.code == KeyCode::Char('q')).then_some(Wish::Quit);
+            return None;
         }
         self.note = None;
         match key.code {

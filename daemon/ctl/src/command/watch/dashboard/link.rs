@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use relief_api::{Event, Job, JobList, Status, path};
+use relief_api::{Event, Job, JobList, ScanImage, Status, path};
 use tokio::sync::mpsc::Sender;
 use tokio::sync::mpsc::error::SendError;
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
@@ -19,6 +19,9 @@ const WAITS_MS: [u64; 4] = [250, 500, 1000, 2000];
 /// Jobs that are asked for.
 const JOBS: usize = 50;
 
+/// Most nodes of a range image that are asked for: more than most terminals have dots.
+const NODES: usize = 100_000;
+
 /// What is heard of the service.
 #[derive(Debug)]
 pub(super) enum Word {
@@ -32,6 +35,8 @@ pub(super) enum Word {
     Status(Box<Status>),
     /// Its latest jobs, newest first.
     Jobs(Vec<Job>),
+    /// The range image of a scan under way as far as it has come.
+    Image(Box<ScanImage>),
     /// What came of something that was asked of it.
     Answer(Result<String, String>),
 }
@@ -77,6 +82,8 @@ async fn listen(
     let mut asking = interval(ASK_EVERY);
     asking.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut wants_jobs = true;
+    // Scans whose columns of before are known.
+    let mut pictured = Vec::new();
     loop {
         if wants_jobs {
             match ask::<JobList>(client, &format!("{}?limit={JOBS}", path::JOBS)).await {
@@ -92,17 +99,44 @@ async fn listen(
             event = events.next() => match event {
                 Ok(Some(event)) => {
                     wants_jobs = matches!(event, Event::Lagged { .. });
+                    if wants_jobs {
+                        pictured.clear();
+                    }
                     words.send(Word::Event(Box::new(event))).await?;
                 }
                 Ok(None) => return Ok("the service has ended".to_owned()),
                 Err(error) => return Ok(with_causes(&error)),
             },
             _ = asking.tick() => match ask(client, path::STATUS).await {
-                Ok(status) => words.send(Word::Status(Box::new(status))).await?,
+                Ok(status) => {
+                    let scans = under_way(&status);
+                    words.send(Word::Status(Box::new(status))).await?;
+                    pictured.retain(|id| scans.contains(id));
+                    for id in scans {
+                        // Where it has none yet, it is asked for once more.
+                        let image = format!("{}?most_nodes={NODES}", path::scan_image(&id));
+                        if !pictured.contains(&id) && let Ok(image) = ask(client, &image).await {
+                            words.send(Word::Image(Box::new(image))).await?;
+                            pictured.push(id);
+                        }
+                    }
+                }
                 Err(why) => return Ok(why),
             },
         }
     }
+}
+
+/// Ids of the scans under way.
+fn under_way(status: &Status) -> Vec<String> {
+    let scans = status.scanners.iter().map(|scanner| scanner.scan.as_ref());
+    let mut ids: Vec<String> = scans
+        .chain([status.scan.as_ref()])
+        .flatten()
+        .map(|scan| scan.id.clone())
+        .collect();
+    ids.dedup();
+    ids
 }
 
 async fn ask<T: serde::de::DeserializeOwned>(client: &Client, path: &str) -> Result<T, String> {

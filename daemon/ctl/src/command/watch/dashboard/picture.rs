@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
-use relief_api::LiveColumn;
+use relief_api::{LiveColumn, ScanImage};
 
 use super::colours::Depth;
 
@@ -22,8 +22,8 @@ pub(super) struct Picture {
     /// Every so many columns and rows are kept.
     step: i64,
     columns: BTreeMap<i64, BTreeMap<i64, i32>>,
-    /// The first column seen.
-    first: Option<i64>,
+    /// The latest column: the scan grows to where it is.
+    latest: Option<i64>,
     /// Columns of the scan before it, those of now, and all of them.
     progress: Option<[u32; 3]>,
 }
@@ -35,22 +35,48 @@ impl Picture {
         let [before, ..] = self.progress.unwrap_or([columns.saturating_sub(1); 3]);
         self.progress = Some([before, columns, planned]);
         for column in live {
-            self.first.get_or_insert(column.i);
-            if column.i.rem_euclid(self.step) != 0 {
-                continue;
-            }
-            let nodes = (column.j_first..).zip(&column.z_um);
-            let kept = nodes.filter(|(j, _)| j.rem_euclid(self.step) == 0);
-            let kept = kept.filter_map(|(j, um)| um.map(|um| (j, um))).collect();
-            self.columns.insert(column.i, kept);
+            self.latest = Some(column.i);
+            self.put(column, 1);
         }
+        self.shrink();
+    }
+
+    /// Adds a range image of the scan, which is newer than what is there.
+    pub(super) fn lay(&mut self, image: &ScanImage, columns: u32, planned: u32) {
+        self.progress = Some([0, columns, planned]);
+        let step = i64::from(image.step.max(1));
+        self.step = self.step.max(1);
+        if self.step % step != 0 {
+            self.thin(self.step * step);
+        }
+        for column in &image.columns {
+            self.put(column, step);
+        }
+        self.shrink();
+    }
+
+    /// Keeps of a column what is to be kept.
+    fn put(&mut self, column: &LiveColumn, spacing: i64) {
+        if column.i.rem_euclid(self.step) != 0 {
+            return;
+        }
+        let nodes = column.z_um.iter().enumerate();
+        let nodes = nodes.filter_map(|(k, um)| Some((column.j_first + k as i64 * spacing, (*um)?)));
+        let kept = nodes.filter(|(j, _)| j.rem_euclid(self.step) == 0);
+        self.columns.insert(column.i, kept.collect());
+    }
+
+    fn shrink(&mut self) {
         while self.is_too_large() {
-            self.step *= 2;
-            let step = self.step;
-            self.columns.retain(|i, _| i.rem_euclid(step) == 0);
-            for column in self.columns.values_mut() {
-                column.retain(|j, _| j.rem_euclid(step) == 0);
-            }
+            self.thin(self.step * 2);
+        }
+    }
+
+    fn thin(&mut self, step: i64) {
+        self.step = step;
+        self.columns.retain(|i, _| i.rem_euclid(step) == 0);
+        for column in self.columns.values_mut() {
+            column.retain(|j, _| j.rem_euclid(step) == 0);
         }
     }
 
@@ -104,7 +130,7 @@ impl Picture {
         let seen = f64::from(columns.saturating_sub(before).max(1));
         let left = f64::from(planned.saturating_sub(columns));
         let rest = ((high - low + self.step) as f64 * left / seen) as i64;
-        let columns = if self.first.is_some_and(|first| first - low > high - first) {
+        let columns = if self.latest.is_some_and(|i| i - low < high - i) {
             [low - rest, high]
         } else {
             [low, high + rest]

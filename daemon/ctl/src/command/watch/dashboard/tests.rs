@@ -134,6 +134,42 @@ fn a_laser_that_is_on_fills_a_red_line() {
     );
 }
 
+/// A range image of the first columns, every `step`th of them.
+fn image(scanner: &str, columns: i64, step: i64) -> Word {
+    let of = |i: i64| LiveColumn {
+        i,
+        j_first: -20,
+        z_um: vec![Some(1000 * i as i32); (40 / step) as usize],
+    };
+    Word::Image(Box::new(relief_api::ScanImage {
+        scan: format!("scan-{scanner}"),
+        pitch_mm: 0.5,
+        step: step as u32,
+        columns: (0..columns).filter(|i| i % step == 0).map(of).collect(),
+    }))
+}
+
+fn nodes(board: &Board) -> usize {
+    board.selected().unwrap().picture.nodes()
+}
+
+#[test]
+fn what_was_scanned_before_is_shown_too() {
+    let under_way = || status(vec![scanner("left", "on", Some(scan("left", "scanning")))]);
+    let late = told([under_way(), column("left", 10)]);
+    assert_eq!(nodes(&late), 40);
+    let mut board = told([under_way(), column("left", 10), image("left", 10, 1)]);
+    assert_eq!(nodes(&board), 11 * 40);
+    board.hear(column("left", 11), &at(1.0));
+    assert_eq!(nodes(&board), 12 * 40);
+    // A thinned one makes all of it as coarse: columns 0, 4 and 8, and 8 again of the events'.
+    let coarse = told([under_way(), column("left", 8), image("left", 10, 4)]);
+    assert_eq!(nodes(&coarse), 3 * 10);
+    // Of another scan it is not.
+    let other = told([under_way(), column("left", 10), image("right", 10, 1)]);
+    assert_eq!(nodes(&other), 40);
+}
+
 #[test]
 fn nothing_is_certain_without_a_connection() {
     let mut board = told([Word::Connected, status(vec![scanner("left", "on", None)])]);
