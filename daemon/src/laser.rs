@@ -11,13 +11,14 @@ mod watched;
 use std::collections::VecDeque;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use relief_api::{LaserEntry, LaserState, ScanState};
+use relief_api::{Event, LaserEntry, LaserState, ScanState};
 use scanner_driver::ScannerError;
 use storage::Disk;
 
+use crate::events::Hub;
 use crate::ids::now;
 use crate::service::lock;
 use log::Log;
@@ -71,6 +72,8 @@ struct Known {
     starting: bool,
     /// Counts what may have turned it on, so that an answer to an older request to pause is told.
     lit: u64,
+    /// Who is told of changes.
+    hub: Option<Arc<Hub>>,
 }
 
 impl Laser {
@@ -104,6 +107,7 @@ impl Laser {
                 acts: 0,
                 starting: false,
                 lit: 0,
+                hub: None,
             }),
         };
         if laser.state() == Some(LaserState::On) {
@@ -114,6 +118,11 @@ impl Laser {
             );
         }
         Ok(laser)
+    }
+
+    /// Has subscribers told of every change from now on.
+    pub(crate) fn tell(&self, hub: Arc<Hub>) {
+        lock(&self.known).hub = Some(hub);
     }
 
     /// The latest entry.
@@ -317,6 +326,9 @@ impl Known {
                 cause,
                 "the log of the laser cannot be written now; its next line brings this one along"
             );
+        }
+        if let Some(hub) = &self.hub {
+            hub.tell(Event::Laser(entry.clone()));
         }
         self.entries.push_back(entry);
         if self.entries.len() > MOST_SHOWN {

@@ -44,8 +44,7 @@ export function tell(topic, value) {
 let asking;
 
 /**
- * Asks for the status soon: events tell of scans and scanners, and only the status tells what the
- * laser does.
+ * Asks for the status soon: what has changed since the page was last told, and what no event tells.
  * @param {number} [afterMs]
  */
 export function askStatus(afterMs = 120) {

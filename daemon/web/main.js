@@ -8,7 +8,6 @@ import { Feed } from './feed.js';
 import { LANGUAGES, Words, choose } from './i18n.js';
 import { openJobs } from './jobs.js';
 import { openMachine } from './machine.js';
-import { underWay } from './model.js';
 import { openPreview } from './preview.js';
 import { openResult } from './result.js';
 import { openRoom } from './room.js';
@@ -96,13 +95,10 @@ function listen() {
     }
   });
   setInterval(() => tell('tick'), 1000);
-  // Nobody tells when the laser of an idle scanner changes, so that it has to be asked for.
-  let beats = 0;
+  // Services of before told of no laser, and no event tells of room and waiting jobs.
   setInterval(() => {
-    beats += 1;
-    const busy = [...model.scanners.values()].some((scanner) => underWay(scanner.scan));
-    if (model.connected && !document.hidden && (busy || beats % 3 === 0)) askStatus(0);
-  }, 1500);
+    if (model.connected && !document.hidden) askStatus(0);
+  }, 4500);
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => tell('theme'));
   start();
 }

@@ -167,7 +167,7 @@ export class Model {
    * @returns {string} its kind
    */
   take(event, nowMs) {
-    if (event.kind === 'scan' || event.kind === 'scanner' || event.kind === 'status') this.changes += 1;
+    if (['scan', 'scanner', 'laser', 'status'].includes(event.kind)) this.changes += 1;
     switch (event.kind) {
       case 'status': {
         const { kind, ...status } = event;
@@ -180,6 +180,12 @@ export class Model {
         // What is absent from this one is so because it is over: the problem above all.
         const { laser, scan } = this.scanners.get(name) ?? {};
         this.scanners.set(name, { ...status, name, laser, scan });
+        break;
+      }
+      case 'laser': {
+        const { kind, ...laser } = event;
+        const scanner = this.scanners.get(this.named(laser.scanner));
+        if (scanner) scanner.laser = laser;
         break;
       }
       case 'scan': {

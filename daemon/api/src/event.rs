@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::job::{Job, JobId};
+use crate::laser::LaserEntry;
 use crate::scan::Scan;
 use crate::status::{ScannerStatus, Status};
 
@@ -14,6 +15,8 @@ pub enum Event {
     Status(Box<Status>),
     /// A scanner was reached, lost, or got into trouble.
     Scanner(ScannerStatus),
+    /// A laser was turned on or off, or it is not known any more which of the two it is.
+    Laser(LaserEntry),
     /// A scan began or changed its state.
     Scan(Scan),
     /// A column is on disk.
@@ -88,6 +91,7 @@ impl Event {
         match self {
             Self::Status(_) => "status",
             Self::Scanner(_) => "scanner",
+            Self::Laser(_) => "laser",
             Self::Scan(_) => "scan",
             Self::Column { .. } => "column",
             Self::Job(_) => "job",

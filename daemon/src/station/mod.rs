@@ -115,6 +115,7 @@ impl Station {
         hub: Arc<Hub>,
     ) -> Self {
         let laser = Arc::new(laser);
+        laser.tell(Arc::clone(&hub));
         Self {
             name: configured.name.to_owned(),
             section: configured.section(),

@@ -1,4 +1,4 @@
-use relief_api::{Event, PlanRequest, Scan, ScanState, StartScan, path};
+use relief_api::{Event, LaserState, PlanRequest, Scan, ScanState, StartScan, path};
 use scanner_driver::{Pause, ScannerError};
 use scanner_protocol::Faults;
 
@@ -36,6 +36,24 @@ async fn the_stream_tells_the_whole_story_in_order() {
             ScanState::Scanning,
             ScanState::Complete
         ]
+    );
+
+    let lasers: Vec<(LaserState, &str)> = story
+        .iter()
+        .filter_map(|event| match event {
+            Event::Laser(entry) => Some((entry.laser, entry.cause.as_str())),
+            _ => None,
+        })
+        .collect();
+    let off = (LaserState::Off, "the scan is complete");
+    assert_eq!(lasers, [(LaserState::On, "a scan begins"), off]);
+    let first = story.iter().find(|event| {
+        let is_on = |event: &Event| matches!(event, Event::Laser(e) if e.laser == LaserState::On);
+        is_on(event) || matches!(event, Event::Column { .. })
+    });
+    assert!(
+        matches!(first, Some(Event::Laser(_))),
+        "on before the first column"
     );
 
     let mut counts = Vec::new();

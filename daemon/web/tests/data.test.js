@@ -205,6 +205,10 @@ test('events change what is known, and a status is the whole of it', () => {
   model.take({ kind: 'scanner', name: 'left', link: 'trouble', endpoint: 'left', problem: 'interlock open' }, 600);
   assert.equal(model.scanners.get('left').problem, 'interlock open');
   assert.equal(model.scanners.get('left').laser.laser, 'off');
+  model.take({ kind: 'laser', scanner: 'left', laser: 'on', at: '', cause: 'a scan begins' }, 650);
+  assert.equal(model.scanners.get('left').laser.laser, 'on');
+  assert.equal(model.scanners.get('left').laser.kind, undefined);
+  assert.equal(model.scanners.get('right').laser.laser, 'off');
   model.take({ kind: 'scanner', name: 'left', link: 'ready', endpoint: 'left' }, 700);
   assert.equal(model.scanners.get('left').problem, undefined);
   model.take(scan('complete', { columns: 10 }), 800);

@@ -137,6 +137,10 @@ pub(super) fn line(event: &Event) -> String {
                 .map_or(String::new(), |problem| format!(": {problem}"));
             format!("{}: {}{problem}", at(scanner), scanner.link.as_str())
         }
+        Event::Laser(laser) => {
+            let on = output::on_scanner(&laser.scanner);
+            format!("laser{on}: {}: {}", laser.laser.as_str(), laser.cause)
+        }
         Event::Unknown => "(an event this program does not know)".to_owned(),
     }
 }

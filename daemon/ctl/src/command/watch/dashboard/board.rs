@@ -166,6 +166,11 @@ impl Board {
                     station.status = status;
                 }
             }
+            Event::Laser(entry) => {
+                if let Some(station) = self.station(&entry.scanner) {
+                    station.laser = Some(entry);
+                }
+            }
             Event::Scan(scan) => {
                 if let Some(station) = self.station(&scan.scanner) {
                     station.scan = Some(scan);
@@ -332,6 +337,7 @@ impl Station {
 fn is_bad(event: &Event) -> bool {
     match event {
         Event::Scanner(scanner) => scanner.problem.is_some(),
+        Event::Laser(entry) => entry.laser == LaserState::Unknown,
         Event::Scan(scan) => scan.reason.is_some(),
         Event::Job(job) => job.error.is_some(),
         Event::Lagged { .. } => true,

@@ -10,7 +10,8 @@ use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 use crate::failure::with_causes;
 use crate::service::{Client, Events, ServiceError};
 
-/// How often the service is asked for its status: no event tells of the laser.
+/// How often the service is asked for its status: no event tells of room and waiting jobs, and a
+/// service that is silent may hang.
 const ASK_EVERY: Duration = Duration::from_secs(1);
 /// A service that says nothing for so long does not work.
 const PATIENCE: Duration = Duration::from_secs(5);

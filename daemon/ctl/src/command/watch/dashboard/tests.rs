@@ -121,6 +121,13 @@ fn a_laser_that_is_on_fills_a_red_line() {
     let off = seen(&told([status(vec![scanner("left", "off", None)])]));
     assert_eq!(lines(&off)[0].trim(), "Laser off");
     assert_eq!(off[(0, 0)].bg, Color::Green);
+    // An event says so before the next status does.
+    let entry = json!({"kind": "laser", "at": "t", "laser": "on", "cause": "c", "scanner": "left"});
+    let lit = seen(&told([
+        status(vec![scanner("left", "off", None)]),
+        event(entry),
+    ]));
+    assert_eq!(lines(&lit)[0].trim(), "LASER ON");
     let unknown = seen(&told([status(vec![scanner("left", "unknown", None)])]));
     assert_eq!(lines(&unknown)[0].trim(), "LASER STATE NOT KNOWN");
     // On the smallest screen, too.
