@@ -8,7 +8,10 @@ service, or by what the description does not have.
 """
 
 import argparse
+import base64
+import json
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -72,14 +75,38 @@ def schemathesis(bench, seconds, seed):
     subprocess.run(command, check=True, env=environment, cwd=bench.folder)
 
 
+def expressions(part):
+    """Everything that a dashboard asks Prometheus."""
+    if isinstance(part, dict):
+        if isinstance(part.get("expr"), str):
+            yield part["expr"]
+        part = list(part.values())
+    if isinstance(part, list):
+        for one in part:
+            yield from expressions(one)
+
+
 def promtool(bench):
     text = bench.request("GET", "/v1/metrics").read().decode()
     assert text.endswith("# EOF\n"), text
+    monitoring = HERE.parents[2] / "config/monitoring"
+    rules = monitoring / "relief.rules.yml"
+    asked = list(expressions(json.loads((monitoring / "relief.dashboard.json").read_text())))
+    assert asked
+    # What they ask for is there; a counter is known from its start, a histogram by its parts.
+    known = set(re.findall(r"^# TYPE (\w+)", text, re.M))
+    for name in re.findall(r"\brelief_\w+", "\n".join([rules.read_text(), *asked])):
+        stem = re.sub(r"_(total|bucket|count|sum)$", "", name)
+        assert {name, stem} & known, f"no metric is named {name}"
     if not shutil.which("promtool"):
         print("promtool is not there: the metrics are not judged")
         return
-    rules = HERE.parents[2] / "config/monitoring/relief.rules.yml"
     subprocess.run(["promtool", "check", "rules", str(rules)], check=True)
+    # The dashboard's, as rules that record them.
+    recorded = [{"record": f"panel:{k}", "expr": expr} for k, expr in enumerate(asked)]
+    panels = bench.folder / "panels.json"
+    panels.write_text(json.dumps({"groups": [{"name": "dashboard", "rules": recorded}]}))
+    subprocess.run(["promtool", "check", "rules", str(panels)], check=True)
     # It reads the older of the two formats, which has no unit and no end.
     older = [line for line in text.splitlines() if not line.startswith(("# UNIT", "# EOF"))]
     older = "\n".join(older) + "\n"
@@ -95,7 +122,17 @@ def main():
     options = parser.parse_args()
     scanner = ["--columns", "40", "--samples", "64", "--line-rate", "400"]
     with tempfile.TemporaryDirectory() as folder:
-        with Bench(options.programs.resolve(), folder, scanner) as bench:
+        secret = pathlib.Path(folder) / "secret"
+        secret.touch(mode=0o600)
+        secret.write_text("whsec_" + base64.b64encode(bytes(range(32))).decode())
+        # Nobody listens there.
+        webhook = f"""
+[[webhooks]]
+name = "away"
+url = "http://127.0.0.1:9/"
+secret_file = "{secret}"
+"""
+        with Bench(options.programs.resolve(), folder, scanner, webhook) as bench:
             # Something to ask for.
             bench.scan("part")
             promtool(bench)
