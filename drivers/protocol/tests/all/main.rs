@@ -1,0 +1,5 @@
+//! All tests of the wire protocol.
+
+mod page;
+mod properties;
+mod versioning;

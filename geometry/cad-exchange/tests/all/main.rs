@@ -1,0 +1,21 @@
+//! All tests of IGES and STEP files.
+
+#[path = "../../examples/sample/mod.rs"]
+#[allow(dead_code)]
+mod sample;
+
+mod analytic;
+mod boundary;
+mod foreign;
+mod hostile;
+mod layout;
+mod refusals;
+mod round_trip;
+mod solids;
+mod step_analytic;
+mod step_hostile;
+mod step_layout;
+mod step_refusals;
+mod step_round_trip;
+mod step_solid;
+mod swept;

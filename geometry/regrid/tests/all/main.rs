@@ -1,0 +1,7 @@
+//! All tests of regridding.
+
+mod common;
+mod estimator;
+mod masks;
+mod order;
+mod settings;

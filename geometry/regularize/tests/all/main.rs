@@ -1,0 +1,6 @@
+//! All tests of regularities.
+
+mod common;
+mod exact;
+mod monte_carlo;
+mod tangent;

@@ -1,0 +1,7 @@
+//! All tests of shapes.
+
+mod evidence;
+mod fit;
+mod known;
+mod several;
+mod swept;
