@@ -127,7 +127,7 @@ fn a_laser_that_is_on_fills_a_red_line() {
         status(vec![scanner("left", "off", None)]),
         event(entry),
     ]));
-    assert_eq!(lines(&lit)[0].trim(), "LASER ON");
+    assert_eq!(lines(&lit)[0].trim(), "\u{26a0} LASER ON \u{26a0}");
     let unknown = seen(&told([status(vec![scanner("left", "unknown", None)])]));
     assert_eq!(lines(&unknown)[0].trim(), "LASER STATE NOT KNOWN");
     // On the smallest screen, too.
