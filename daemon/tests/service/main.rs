@@ -9,6 +9,7 @@
 mod access;
 mod ailing;
 mod api;
+mod brokers;
 mod calibration;
 mod client;
 mod config;
