@@ -4,9 +4,10 @@ use std::sync::{Mutex, MutexGuard, TryLockError};
 
 use deliverables::hexadecimal;
 use relief_api::{
-    Delivery, DeliveryState, Event, Job, JobState, Scan, ScannerLink, ScannerStatus, Webhook,
-    WebhookData, WebhookEvent, WebhookMessage,
+    Delivery, DeliveryState, DiskRoom, Event, Job, JobState, Scan, ScannerLink, ScannerStatus,
+    Webhook, WebhookData, WebhookEvent, WebhookMessage,
 };
+use scanner_protocol::Faults;
 use sha2::{Digest, Sha256};
 
 use super::receiver::Verdict;
@@ -61,6 +62,16 @@ fn message(receiver: &str, news: &News<'_>, data: WebhookData) -> Message {
         // Messages serialise whatever they hold.
         body: serde_json::to_string(&told).unwrap_or_default(),
     }
+}
+
+/// Whether this trouble is that somebody, or an open door, has stopped the scanner: what is wrong
+/// is told in the words that the protocol has for faults.
+fn is_stopped(problem: Option<&str>) -> bool {
+    let stops = Faults::INTERLOCK | Faults::EMERGENCY_STOP;
+    let mut named = Faults::NAMED.iter();
+    problem.is_some_and(|problem| {
+        named.any(|(fault, words)| stops.contains(*fault) && problem.contains(words))
+    })
 }
 
 /// Makes sure that only one at a time goes on. Whoever ended by a panic does not go on.
@@ -144,14 +155,19 @@ impl Receivers {
     }
 
     /// Messages that tell of a scanner's trouble, as of now.
-    fn of_trouble(&self, scanner: &str, status: &ScannerStatus) -> Vec<Outgoing> {
+    fn of_trouble(
+        &self,
+        event: WebhookEvent,
+        scanner: &str,
+        status: &ScannerStatus,
+    ) -> Vec<Outgoing> {
         // Other trouble may come at the same time.
         let of = format!(
             "{scanner}\n{}",
             status.problem.as_deref().unwrap_or_default()
         );
         let news = News {
-            event: WebhookEvent::ScannerTrouble,
+            event,
             of: &of,
             at: &now(),
             about: Some(scanner),
@@ -159,6 +175,20 @@ impl Receivers {
         self.outgoing(&news, || WebhookData {
             scanner: Some(scanner.to_owned()),
             status: Some(status.clone()),
+            ..WebhookData::default()
+        })
+    }
+
+    /// Messages that tell of a disk that gets full, as of now.
+    fn of_disk(&self, disk: &DiskRoom) -> Vec<Outgoing> {
+        let news = News {
+            event: WebhookEvent::DiskLow,
+            of: &disk.folder,
+            at: &now(),
+            about: None,
+        };
+        self.outgoing(&news, || WebhookData {
+            disk: Some(disk.clone()),
             ..WebhookData::default()
         })
     }
@@ -207,11 +237,15 @@ impl Service {
         link: ScannerLink,
         problem: Option<String>,
     ) {
-        let Some(status) = station.note(link, problem) else {
+        let Some((before, status)) = station.note(link, problem) else {
             return;
         };
         if status.link == ScannerLink::Trouble {
-            let outgoing = self.receivers.of_trouble(station.name(), &status);
+            let told = |event| self.receivers.of_trouble(event, station.name(), &status);
+            let mut outgoing = told(WebhookEvent::ScannerTrouble);
+            if is_stopped(status.problem.as_deref()) && !is_stopped(before.as_deref()) {
+                outgoing.extend(told(WebhookEvent::Interlock));
+            }
             match self.store.put_messages(&outgoing) {
                 Ok(added) => self.receivers.added(added),
                 Err(error) => {
@@ -220,6 +254,18 @@ impl Service {
             }
         }
         self.hub.tell(Event::Scanner(status));
+    }
+
+    /// Tells of a disk that gets full.
+    ///
+    /// # Errors
+    /// The disk does not keep the messages; nobody is told.
+    pub(crate) fn tell_of_disk(&self, disk: &DiskRoom) -> Result<(), StoreError> {
+        let outgoing = self.receivers.of_disk(disk);
+        if !outgoing.is_empty() {
+            self.receivers.added(self.store.put_messages(&outgoing)?);
+        }
+        Ok(())
     }
 
     /// The receivers, and how they do.

@@ -175,6 +175,8 @@ async fn trouble_is_told_to_those_who_want_to_hear_of_it() {
         let trouble = told(WebhookEvent::ScannerTrouble).status.unwrap();
         assert_eq!(trouble.link, ScannerLink::Trouble);
         assert!(trouble.problem.unwrap().contains("interlock open"));
+        let stopped = told(WebhookEvent::Interlock).status.unwrap();
+        assert!(stopped.problem.unwrap().contains("interlock open"));
         if needs_person {
             let paused = told(WebhookEvent::ScanPaused).scan.unwrap();
             assert_eq!((&paused.id, paused.state), (&scan.id, ScanState::Paused));
