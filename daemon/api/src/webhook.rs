@@ -16,6 +16,8 @@ pub enum WebhookKind {
     Webhook,
     /// Messages are published to a broker, by MQTT.
     Mqtt,
+    /// People are written to.
+    Mail,
     /// Of a kind that this version does not know; never sent.
     #[serde(other)]
     Unknown,
@@ -28,6 +30,7 @@ impl WebhookKind {
         match self {
             Self::Webhook => "webhook",
             Self::Mqtt => "mqtt",
+            Self::Mail => "mail",
             Self::Unknown => "unknown",
         }
     }
@@ -181,7 +184,8 @@ pub struct Webhook {
     #[serde(default)]
     pub kind: WebhookKind,
     /// Where messages go: of a webhook scheme, host and port, and `/...` for a path or query, which
-    /// may be secret; of a broker its address and what every topic begins with.
+    /// may be secret; of a broker its address and what every topic begins with; of mail the
+    /// server.
     pub url: String,
     /// What it is told of.
     pub events: Vec<WebhookEvent>,

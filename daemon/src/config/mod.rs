@@ -8,6 +8,7 @@ mod formats;
 mod further;
 mod http;
 mod load;
+mod mail;
 mod mqtt;
 mod network;
 mod overrides;
@@ -36,6 +37,7 @@ pub use further::{
 };
 pub use http::HttpConfig;
 pub use load::ConfigError;
+pub use mail::{MailConfig, MailSecurity};
 pub use mqtt::MqttConfig;
 pub(crate) use mqtt::Place;
 pub use network::{NetworkChoice, NetworkContent};
@@ -85,6 +87,8 @@ pub struct Config {
     pub webhooks: Vec<WebhookConfig>,
     /// Brokers that are told, too.
     pub mqtt: Vec<MqttConfig>,
+    /// People who are written to.
+    pub mail: Vec<MailConfig>,
     /// What is logged.
     pub log: LogConfig,
 }
@@ -104,6 +108,9 @@ pub struct ServiceConfig {
     /// Loopback address on which the API is offered to bearers of a token; none unless set.
     #[serde(deserialize_with = "value::loopback")]
     pub listen: Option<SocketAddr>,
+    /// Where people find the service's page, through whatever leads there: mails link to it.
+    #[serde(deserialize_with = "value::public_url")]
+    pub public_url: Option<String>,
     /// Folder of the kept scans and of the job queue.
     pub state_dir: PathBuf,
     /// Folder in which results appear.
@@ -117,6 +124,7 @@ impl Default for ServiceConfig {
             socket_group: None,
             socket_mode: 0o660,
             listen: None,
+            public_url: None,
             state_dir: "/var/lib/relief".into(),
             spool_dir: "/var/spool/relief".into(),
         }

@@ -42,7 +42,8 @@ impl Config {
             reconstruct,
             deliverables,
             webhooks,
-            mqtt
+            mqtt,
+            mail
         );
         leave!(service, http, queue);
         merged.scanner = reloaded_scanner("scanner", &self.scanner, &new.scanner, &mut outcome);

@@ -17,6 +17,7 @@
 mod backoff;
 mod deliver;
 mod files;
+mod mail;
 mod mqtt;
 mod receiver;
 mod show;
@@ -36,6 +37,7 @@ use crate::config::Config;
 use crate::service::{Service, lock};
 use crate::store::{Added, Store, StoreError};
 pub(crate) use files::FileError;
+pub(crate) use mail::check_files as check_mail_files;
 pub(crate) use mqtt::check_files as check_broker_files;
 use receiver::Receiver;
 pub(crate) use show::show;
@@ -74,6 +76,11 @@ fn make_all(config: &Config) -> Result<Vec<Receiver>, ReceiverError> {
     for config in &config.mqtt {
         let receiver = mqtt::receiver(config);
         made.push(receiver.map_err(failed(WebhookKind::Mqtt, &config.name))?);
+    }
+    let public_url = config.service.public_url.as_deref();
+    for config in &config.mail {
+        let receiver = mail::receiver(config, public_url);
+        made.push(receiver.map_err(failed(WebhookKind::Mail, &config.name))?);
     }
     Ok(made)
 }

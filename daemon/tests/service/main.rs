@@ -20,6 +20,7 @@ mod further;
 mod hostile;
 mod jobs;
 mod laser;
+mod mail;
 mod old_state;
 mod pause;
 mod power;

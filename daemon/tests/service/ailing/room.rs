@@ -6,7 +6,8 @@ use std::time::{Duration, SystemTime};
 
 use redb::ReadableTable;
 use relief_api::{
-    Event, Job, JobState, PlanRequest, Scan, ScanState, SpoolEntry, StartScan, Status, WebhookEvent, path,
+    Event, Job, JobState, PlanRequest, Scan, ScanState, SpoolEntry, StartScan, Status,
+    WebhookEvent, path,
 };
 use rustix::io::Errno;
 

@@ -2,7 +2,7 @@
 
 mod failures;
 pub(crate) mod receiver;
-mod tls;
+pub(crate) mod tls;
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -313,7 +313,7 @@ async fn a_test_tells_what_came_back() {
         (problem.status, problem.kind.as_str()),
         (404, "no-such-webhook")
     );
-    assert_eq!(problem.detail, "there is no webhook bal; there is lab");
+    assert_eq!(problem.detail, "there is no receiver bal; there is lab");
     let problem = ask("GET", path::webhook_deliveries("bal")).await;
     assert_eq!(problem.status, 404);
 
