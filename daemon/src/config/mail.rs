@@ -8,7 +8,7 @@ use lettre::message::Mailbox;
 use relief_api::WebhookEvent;
 use serde::{Deserialize, Deserializer, de::Error};
 
-use super::receivers::{KeyFault, Retry, default_events, default_timeout_ms};
+use super::receivers::{KeyFault, Retry, default_events};
 use super::value;
 
 /// People whom one section writes to.
@@ -62,15 +62,20 @@ pub struct MailConfig {
     /// Of what.
     #[serde(default = "default_events", deserialize_with = "value::webhook_events")]
     pub events: Vec<WebhookEvent>,
-    /// How long the server may take for an answer.
+    /// How long an attempt may take, with all that belongs to it.
     #[serde(
-        default = "default_timeout_ms",
+        default = "patient_ms",
         deserialize_with = "value::webhook_milliseconds"
     )]
     pub timeout_ms: u32,
     /// When a message is tried again; no key of the file.
     #[serde(skip)]
     pub retry: Retry,
+}
+
+/// Many servers keep those waiting whom they do not know.
+fn patient_ms() -> u32 {
+    25_000
 }
 
 impl MailConfig {
@@ -88,7 +93,7 @@ impl MailConfig {
             from: from.to_owned(),
             to: to.iter().map(|&to| to.to_owned()).collect(),
             events: default_events(),
-            timeout_ms: default_timeout_ms(),
+            timeout_ms: patient_ms(),
             retry: Retry::default(),
         }
     }
@@ -103,7 +108,7 @@ impl MailConfig {
         })
     }
 
-    /// How long the server may take for an answer.
+    /// How long an attempt may take.
     #[must_use]
     pub fn timeout(&self) -> Duration {
         Duration::from_millis(self.timeout_ms.into())

@@ -244,13 +244,18 @@ impl Receivers {
         let known: Vec<&str> = known.iter().map(String::as_str).collect();
         let earlier = self.all();
         let mut outboxes = Vec::new();
+        // Given up at the end, and not while others wait: a connection may have to be ended.
+        let mut replaced = Vec::new();
         for receiver in receivers {
             let same = earlier
                 .iter()
                 .find(|outbox| outbox.name == receiver.settings.name);
             match same {
                 Some(outbox) => {
-                    outbox.change(|state| state.receiver = Arc::new(receiver));
+                    let receiver = Arc::new(receiver);
+                    outbox.change(|state| {
+                        replaced.push(std::mem::replace(&mut state.receiver, receiver));
+                    });
                     outboxes.push(Arc::clone(outbox));
                 }
                 None => outboxes.push(Arc::new(Outbox::new(receiver))),

@@ -3,6 +3,9 @@
 mod letter;
 mod words;
 
+use std::sync::Arc;
+use std::sync::mpsc::{self, RecvTimeoutError};
+
 use lettre::message::header::ContentType;
 use lettre::message::{Mailbox, MessageBuilder};
 use lettre::transport::smtp::authentication::Credentials;
@@ -19,7 +22,11 @@ use super::words::host_name;
 use crate::config::{MailConfig, MailSecurity};
 use crate::store::Message;
 use letter::letter;
-use words::told;
+use words::{silent, told};
+
+/// Attempts that may be under way: one that a test asked for beside one of the receiver's thread, and
+/// two that were given up and have not ended yet.
+const MOST_UNDER_WAY: usize = 4;
 
 /// A mail server, and whom it is given mails for.
 struct Mail {
@@ -27,6 +34,8 @@ struct Mail {
     machine: String,
     public_url: Option<String>,
     transport: SmtpTransport,
+    /// Cloned by each attempt that has not come to an end.
+    under_way: Arc<()>,
 }
 
 /// What stands in the files that a section names.
@@ -67,7 +76,7 @@ pub(super) fn receiver(
     let settings = Settings {
         name: config.name.clone(),
         kind: WebhookKind::Mail,
-        shown: format!("{}:{}", config.server, config.port()),
+        shown: shown(config),
         events: config.events.clone(),
         timeout: config.timeout(),
         retry: config.retry,
@@ -77,6 +86,7 @@ pub(super) fn receiver(
         machine,
         public_url: public_url.map(str::to_owned),
         transport: transport.build(),
+        under_way: Arc::new(()),
     };
     Ok(Receiver::new(settings, mail))
 }
@@ -122,6 +132,41 @@ impl Mail {
         let mail = mail.body(letter.text);
         mail.map_err(|error| format!("the mail cannot be written: {error}"))
     }
+
+    /// Gives a mail to the server, and waits for what comes of it, for no longer than the timeout.
+    /// Gives the status of the server's answer.
+    ///
+    /// The library bounds each answer, but not how many there are. So it has a thread of its own,
+    /// which goes on for as long as the server plays with it, and nobody waits for it any more.
+    fn send(&self, mail: lettre::Message) -> Result<u16, String> {
+        let (timeout, server) = (self.config.timeout(), shown(&self.config));
+        // Held by the thread until it ends, however it does.
+        let place = Arc::clone(&self.under_way);
+        // The receiver itself holds one, too.
+        if Arc::strong_count(&self.under_way) > MOST_UNDER_WAY + 1 {
+            return Err(format!(
+                "{server} has not come to an end with earlier mails: is it a mail server?"
+            ));
+        }
+        let (sender, sent) = mpsc::channel();
+        let transport = self.transport.clone();
+        let thread = std::thread::Builder::new().name(format!("send {}", self.config.name));
+        let begun = thread.spawn(move || {
+            let _place = place;
+            // Nobody may be waiting any more.
+            let _ = sender.send(transport.send(&mail));
+        });
+        begun.map_err(|error| format!("cannot start a thread: {error}"))?;
+        match sent.recv_timeout(timeout) {
+            Ok(Ok(answer)) => Ok(answer.code().into()),
+            Ok(Err(error)) => Err(told(&error, &server, timeout)),
+            Err(RecvTimeoutError::Timeout) => Err(silent(&server, timeout)),
+            Err(RecvTimeoutError::Disconnected) => Err(format!(
+                "the attempt to tell {server} ended unexpectedly; this is a defect of the \
+                 program: please report it"
+            )),
+        }
+    }
 }
 
 /// The configuration was checked when it was read.
@@ -130,16 +175,15 @@ fn mailbox(address: &str) -> Result<Mailbox, String> {
     read.map_err(|error| format!("{address:?} is no address: {error}"))
 }
 
+fn shown(config: &MailConfig) -> String {
+    format!("{}:{}", config.server, config.port())
+}
+
 impl Way for Mail {
     fn deliver(&self, message: &Message, attempt: &mut DeliveryAttempt) -> Verdict {
-        let sent = self.mail(message).and_then(|mail| {
-            let server = format!("{}:{}", self.config.server, self.config.port());
-            let sent = self.transport.send(&mail);
-            sent.map_err(|error| told(&error, &server, self.config.timeout()))
-        });
-        match sent {
-            Ok(answer) => {
-                attempt.status = u16::from(answer.code()).into();
+        match self.mail(message).and_then(|mail| self.send(mail)) {
+            Ok(status) => {
+                attempt.status = Some(status);
                 Verdict::Delivered
             }
             Err(why) => {

@@ -11,10 +11,7 @@ use crate::receivers::words::{of_io, of_tls, printable};
 /// Why this server has not taken a mail.
 pub(super) fn told(error: &Error, server: &str, timeout: Duration) -> String {
     if error.is_timeout() {
-        return format!(
-            "{server} did not answer within {} ms (timeout_ms)",
-            timeout.as_millis()
-        );
+        return silent(server, timeout);
     }
     if let Some(code) = error.status() {
         let (code, said) = (u16::from(code), said(error));
@@ -50,6 +47,14 @@ pub(super) fn told(error: &Error, server: &str, timeout: Duration) -> String {
         );
     }
     format!("{server}: {text}")
+}
+
+/// Why a server that says nothing, or no end of it, was not told.
+pub(super) fn silent(server: &str, timeout: Duration) -> String {
+    format!(
+        "{server} had not taken the mail within {} ms (timeout_ms)",
+        timeout.as_millis()
+    )
 }
 
 /// What lies behind an error, in one line.

@@ -150,3 +150,34 @@ async fn what_a_mail_server_refuses_is_told() {
     server.is_quiet();
     rig.daemon.shutdown().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_that_comes_to_no_end_holds_up_nobody() {
+    let lab = authority();
+    let server = Server::new(Some(server_config(&lab, "localhost")));
+    server.refuse("");
+    let folder = tempfile::tempdir().unwrap();
+    let mut lab = section(folder.path(), "lab", &server, &lab);
+    lab.timeout_ms = 3_000;
+    let rig = Rig::start(folder, |config| config.mail = vec![lab]).await;
+    let test = async || -> Delivery { rig.client.ask(&path::webhook_test("lab")).await };
+    let endless = test().await;
+    assert_eq!(endless.state, DeliveryState::GivenUp);
+    assert_eq!(
+        endless.tried[0].error,
+        Some(format!(
+            "localhost:{} had not taken the mail within 3000 ms (timeout_ms)",
+            server.port
+        ))
+    );
+    // The next is taken while that still goes on; on a machine with much to do, one after it.
+    let mut next = test().await;
+    for _ in 0..20 {
+        if next.state == DeliveryState::Delivered {
+            break;
+        }
+        next = test().await;
+    }
+    assert_eq!(next.state, DeliveryState::Delivered, "{next:?}");
+    rig.daemon.shutdown().await;
+}

@@ -80,7 +80,7 @@ impl Server {
         }
     }
 
-    /// Refuses the next mail so.
+    /// Refuses the next mail so; nothing is a beginning without end.
     pub(super) fn refuse(&self, answer: &'static str) {
         self.script.lock().unwrap().push_back(answer);
     }
@@ -157,6 +157,12 @@ fn serve(
                 }
             }
             "MAIL" => match script.lock().unwrap().pop_front() {
+                // No end of lines of one answer.
+                Some("") => loop {
+                    write!(stream, "250-wait\r\n")?;
+                    stream.flush()?;
+                    std::thread::sleep(Duration::from_millis(20));
+                },
                 Some(refusal) => refusal,
                 None => {
                     mail.from = rest.to_owned();

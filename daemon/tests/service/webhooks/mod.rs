@@ -219,6 +219,8 @@ async fn trouble_is_told_to_those_who_want_to_hear_of_it() {
     assert_eq!((scan.state, scan.columns), (ScanState::Failed, 3));
     let status = told(WebhookEvent::ScannerTrouble).status.unwrap();
     assert!(status.problem.unwrap().contains("table stalled"));
+    // That is no interlock.
+    all.is_quiet();
     jobs.is_quiet();
 
     let few = serde_json::json!({"settings": {"regrid.roi_x_mm": [900, 901]}});
