@@ -189,8 +189,8 @@ pub enum ServiceError {
         /// Bytes of these that scans under way may still take.
         promised_bytes: u64,
     },
-    /// There is no such webhook.
-    #[error("there is no webhook {name}; there {}", match .known.as_slice() {
+    /// Nobody who is told has this name.
+    #[error("there is no receiver {name}; there {}", match .known.as_slice() {
         [] => "are none".to_owned(),
         known => format!("{} {}", are(known), known.join(", ")),
     })]
@@ -201,9 +201,9 @@ pub enum ServiceError {
         known: Vec<String>,
     },
     /// Somebody else is at it.
-    #[error("the webhook {name} is just being tested")]
+    #[error("{name} is just being tested")]
     WebhookBusy {
-        /// The webhook.
+        /// The receiver.
         name: String,
     },
     /// The same request is just being done.

@@ -3,8 +3,38 @@
 use serde::{Deserialize, Serialize};
 
 use crate::job::Job;
+use crate::laser::LaserState;
 use crate::scan::Scan;
-use crate::status::ScannerStatus;
+use crate::status::{ScannerLink, ScannerStatus};
+
+/// How a receiver of messages is reached.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, utoipa::ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum WebhookKind {
+    /// Messages are posted to a URL, signed.
+    #[default]
+    Webhook,
+    /// Messages are published to a broker, by MQTT.
+    Mqtt,
+    /// People are written to.
+    Mail,
+    /// Of a kind that this version does not know; never sent.
+    #[serde(other)]
+    Unknown,
+}
+
+impl WebhookKind {
+    /// As it is spelt in JSON.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Webhook => "webhook",
+            Self::Mqtt => "mqtt",
+            Self::Mail => "mail",
+            Self::Unknown => "unknown",
+        }
+    }
+}
 
 /// What a webhook can be told of.
 #[derive(
@@ -32,6 +62,10 @@ pub enum WebhookEvent {
     JobFailed,
     /// A scanner got into trouble: an open interlock, a fault of the laser, a lost line.
     ScannerTrouble,
+    /// An interlock was opened, or the emergency stop pressed; `scanner-trouble` tells of it, too.
+    Interlock,
+    /// Little room is left on the disk.
+    DiskLow,
     /// Somebody has asked for a test; every webhook is told.
     Test,
     /// Of a kind that this version does not know; never sent.
@@ -41,12 +75,14 @@ pub enum WebhookEvent {
 
 impl WebhookEvent {
     /// Those that a webhook can be set to.
-    pub const CHOICES: [Self; 5] = [
+    pub const CHOICES: [Self; 7] = [
         Self::ScanEnded,
         Self::ScanPaused,
         Self::JobDone,
         Self::JobFailed,
         Self::ScannerTrouble,
+        Self::Interlock,
+        Self::DiskLow,
     ];
 
     /// As it is spelt in JSON.
@@ -58,6 +94,8 @@ impl WebhookEvent {
             Self::JobDone => "job-done",
             Self::JobFailed => "job-failed",
             Self::ScannerTrouble => "scanner-trouble",
+            Self::Interlock => "interlock",
+            Self::DiskLow => "disk-low",
             Self::Test => "test",
             Self::Unknown => "unknown",
         }
@@ -80,7 +118,7 @@ pub struct WebhookMessage {
 /// What a message is about; each event has its own part of it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct WebhookData {
-    /// Name of the scanner, of all but `test`.
+    /// Name of the scanner, of all but `disk-low` and `test`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scanner: Option<String>,
     /// The scan, as it was then; of a job the scan that it processes.
@@ -89,12 +127,52 @@ pub struct WebhookData {
     /// The job, as it was then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub job: Option<Job>,
-    /// How the scanner does, of `scanner-trouble`.
+    /// How the scanner does, of `scanner-trouble` and `interlock`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub status: Option<ScannerStatus>,
-    /// Name of the webhook, of `test`.
+    /// The disk, of `disk-low`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub disk: Option<DiskRoom>,
+    /// Name of the receiver, of `test`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub webhook: Option<String>,
+}
+
+/// What is left of a disk.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
+pub struct DiskRoom {
+    /// The folder on it: that of the kept scans, or of the results.
+    pub folder: String,
+    /// Bytes free there.
+    pub free_bytes: u64,
+    /// With fewer, this is told (`storage.low_mb`).
+    pub low_bytes: u64,
+    /// Bytes that are to stay free; a scan that would need them is refused.
+    pub reserve_bytes: u64,
+}
+
+/// How a scanner is, as brokers keep it (`PREFIX/scanners/NAME/state`).
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
+pub struct ScannerState {
+    /// Its name.
+    pub name: String,
+    /// How the service stands with it.
+    pub link: ScannerLink,
+    /// Its laser; absent until the scanner was first asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub laser: Option<LaserState>,
+    /// What is wrong, when something is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub problem: Option<String>,
+    /// Id of the scan under way.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scan: Option<String>,
+    /// Its columns on disk.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub columns: Option<u32>,
+    /// Its columns in all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub columns_planned: Option<u32>,
 }
 
 /// A webhook, as it is configured and as it does. Its secret is never told.
@@ -102,8 +180,12 @@ pub struct WebhookData {
 pub struct Webhook {
     /// Its name.
     pub name: String,
-    /// Where messages are posted to: scheme, host and port, and `/...` for a path or query, which
-    /// may be secret.
+    /// What it is; services that told only webhooks left it out.
+    #[serde(default)]
+    pub kind: WebhookKind,
+    /// Where messages go: of a webhook scheme, host and port, and `/...` for a path or query, which
+    /// may be secret; of a broker its address and what every topic begins with; of mail the
+    /// server.
     pub url: String,
     /// What it is told of.
     pub events: Vec<WebhookEvent>,

@@ -8,9 +8,12 @@ mod formats;
 mod further;
 mod http;
 mod load;
+mod mail;
+mod mqtt;
 mod network;
 mod overrides;
 mod processing;
+mod receivers;
 mod regularities;
 mod reload;
 mod scanner;
@@ -34,17 +37,21 @@ pub use further::{
 };
 pub use http::HttpConfig;
 pub use load::ConfigError;
+pub use mail::{MailConfig, MailSecurity};
+pub use mqtt::MqttConfig;
+pub(crate) use mqtt::Place;
 pub use network::{NetworkChoice, NetworkContent};
 pub use overrides::OverrideError;
 pub use processing::{
     DeliverablesConfig, Estimator, Method, PageChoice, Processing, ReconstructConfig, RegridConfig,
     SegmentConfig, StepChoice, StepUnits,
 };
+pub use receivers::Retry;
 pub use regularities::{Regularize, RegularizeUnits};
 pub use reload::Reloaded;
 pub use scanner::{ScannerConfig, Transport};
 pub use storage::{Limits, StorageConfig};
-pub use webhooks::{Retry, WebhookConfig};
+pub use webhooks::WebhookConfig;
 
 /// The whole configuration.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
@@ -78,6 +85,10 @@ pub struct Config {
     pub queue: QueueConfig,
     /// Who is told when something is done.
     pub webhooks: Vec<WebhookConfig>,
+    /// Brokers that are told, too.
+    pub mqtt: Vec<MqttConfig>,
+    /// People who are written to.
+    pub mail: Vec<MailConfig>,
     /// What is logged.
     pub log: LogConfig,
 }
@@ -97,6 +108,9 @@ pub struct ServiceConfig {
     /// Loopback address on which the API is offered to bearers of a token; none unless set.
     #[serde(deserialize_with = "value::loopback")]
     pub listen: Option<SocketAddr>,
+    /// Where people find the service's page, through whatever leads there: mails link to it.
+    #[serde(deserialize_with = "value::public_url")]
+    pub public_url: Option<String>,
     /// Folder of the kept scans and of the job queue.
     pub state_dir: PathBuf,
     /// Folder in which results appear.
@@ -110,6 +124,7 @@ impl Default for ServiceConfig {
             socket_group: None,
             socket_mode: 0o660,
             listen: None,
+            public_url: None,
             state_dir: "/var/lib/relief".into(),
             spool_dir: "/var/spool/relief".into(),
         }

@@ -41,7 +41,9 @@ impl Config {
             fill,
             reconstruct,
             deliverables,
-            webhooks
+            webhooks,
+            mqtt,
+            mail
         );
         leave!(service, http, queue);
         merged.scanner = reloaded_scanner("scanner", &self.scanner, &new.scanner, &mut outcome);

@@ -9,6 +9,7 @@
 mod access;
 mod ailing;
 mod api;
+mod brokers;
 mod calibration;
 mod client;
 mod config;
@@ -19,6 +20,7 @@ mod further;
 mod hostile;
 mod jobs;
 mod laser;
+mod mail;
 mod old_state;
 mod pause;
 mod power;

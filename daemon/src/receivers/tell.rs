@@ -1,16 +1,17 @@
-//! What webhooks are told: from what happens to messages, and to the answers of the API.
+//! What receivers are told: from what happens to messages, and to the answers of the API.
 
 use std::sync::{Mutex, MutexGuard, TryLockError};
 
 use deliverables::hexadecimal;
 use relief_api::{
-    Delivery, DeliveryState, Event, Job, JobState, Scan, ScannerLink, ScannerStatus, Webhook,
-    WebhookData, WebhookEvent, WebhookMessage,
+    Delivery, DeliveryState, DiskRoom, Event, Job, JobState, Scan, ScannerLink, ScannerStatus,
+    Webhook, WebhookData, WebhookEvent, WebhookMessage,
 };
+use scanner_protocol::Faults;
 use sha2::{Digest, Sha256};
 
 use super::receiver::Verdict;
-use super::{Hook, Webhooks, shown_url};
+use super::{Outbox, Receivers};
 use crate::error::ServiceError;
 use crate::ids::now;
 use crate::service::{Service, lock};
@@ -31,7 +32,7 @@ struct News<'a> {
     about: Option<&'a str>,
 }
 
-fn message(webhook: &str, news: &News<'_>, data: WebhookData) -> Message {
+fn message(receiver: &str, news: &News<'_>, data: WebhookData) -> Message {
     let &News {
         event,
         of,
@@ -45,7 +46,7 @@ fn message(webhook: &str, news: &News<'_>, data: WebhookData) -> Message {
     };
     // Not of all that it says: when a record is kept once more, what goes with it, such as the
     // numbers of jobs, may have changed.
-    let hash = Sha256::digest(format!("{webhook}\n{}\n{at}\n{of}", event.as_str()));
+    let hash = Sha256::digest(format!("{receiver}\n{}\n{at}\n{of}", event.as_str()));
     Message {
         delivery: Delivery {
             id: format!("msg_{}", hexadecimal(&hash[..ID_BYTES])),
@@ -61,6 +62,16 @@ fn message(webhook: &str, news: &News<'_>, data: WebhookData) -> Message {
         // Messages serialise whatever they hold.
         body: serde_json::to_string(&told).unwrap_or_default(),
     }
+}
+
+/// Whether this trouble is that somebody, or an open door, has stopped the scanner: what is wrong
+/// is told in the words that the protocol has for faults.
+fn is_stopped(problem: Option<&str>) -> bool {
+    let stops = Faults::INTERLOCK | Faults::EMERGENCY_STOP;
+    let mut named = Faults::NAMED.iter();
+    problem.is_some_and(|problem| {
+        named.any(|(fault, words)| stops.contains(*fault) && problem.contains(words))
+    })
 }
 
 /// Makes sure that only one at a time goes on. Whoever ended by a panic does not go on.
@@ -80,24 +91,24 @@ fn latest(mut deliveries: Vec<Delivery>) -> Option<Delivery> {
     deliveries.into_iter().rev().max_by_key(last_try)
 }
 
-impl Hook {
+impl Outbox {
     fn hears(&self, event: WebhookEvent) -> bool {
-        self.receiver().config.events.contains(&event)
+        self.receiver().settings.events.contains(&event)
     }
 }
 
-impl Webhooks {
-    /// A message to each webhook that hears of this.
+impl Receivers {
+    /// A message to each receiver that hears of this.
     fn outgoing(&self, news: &News<'_>, data: impl FnOnce() -> WebhookData) -> Vec<Outgoing> {
-        let mut hooks = self.all();
-        hooks.retain(|hook| hook.hears(news.event));
-        if hooks.is_empty() {
+        let mut outboxes = self.all();
+        outboxes.retain(|outbox| outbox.hears(news.event));
+        if outboxes.is_empty() {
             return Vec::new();
         }
         let data = data();
-        let told = hooks.iter().map(|hook| Outgoing {
-            webhook: hook.name.clone(),
-            message: message(&hook.name, news, data.clone()),
+        let told = outboxes.iter().map(|outbox| Outgoing {
+            receiver: outbox.name.clone(),
+            message: message(&outbox.name, news, data.clone()),
         });
         told.collect()
     }
@@ -144,14 +155,19 @@ impl Webhooks {
     }
 
     /// Messages that tell of a scanner's trouble, as of now.
-    fn of_trouble(&self, scanner: &str, status: &ScannerStatus) -> Vec<Outgoing> {
+    fn of_trouble(
+        &self,
+        event: WebhookEvent,
+        scanner: &str,
+        status: &ScannerStatus,
+    ) -> Vec<Outgoing> {
         // Other trouble may come at the same time.
         let of = format!(
             "{scanner}\n{}",
             status.problem.as_deref().unwrap_or_default()
         );
         let news = News {
-            event: WebhookEvent::ScannerTrouble,
+            event,
             of: &of,
             at: &now(),
             about: Some(scanner),
@@ -163,12 +179,26 @@ impl Webhooks {
         })
     }
 
-    fn hook(&self, name: &str) -> Result<std::sync::Arc<Hook>, ServiceError> {
+    /// Messages that tell of a disk that gets full, as of now.
+    fn of_disk(&self, disk: &DiskRoom) -> Vec<Outgoing> {
+        let news = News {
+            event: WebhookEvent::DiskLow,
+            of: &disk.folder,
+            at: &now(),
+            about: None,
+        };
+        self.outgoing(&news, || WebhookData {
+            disk: Some(disk.clone()),
+            ..WebhookData::default()
+        })
+    }
+
+    fn outbox(&self, name: &str) -> Result<std::sync::Arc<Outbox>, ServiceError> {
         let all = self.all();
-        let found = all.iter().find(|hook| hook.name == name).cloned();
+        let found = all.iter().find(|outbox| outbox.name == name).cloned();
         found.ok_or_else(|| ServiceError::NoSuchWebhook {
             name: name.to_owned(),
-            known: all.iter().map(|hook| hook.name.clone()).collect(),
+            known: all.iter().map(|outbox| outbox.name.clone()).collect(),
         })
     }
 }
@@ -180,9 +210,9 @@ impl Service {
         scan: &Scan,
         event: WebhookEvent,
     ) -> Result<(), StoreError> {
-        let outgoing = self.webhooks.of_scan(event, scan);
+        let outgoing = self.receivers.of_scan(event, scan);
         let added = self.store.put_scan_telling(scan, &outgoing)?;
-        self.webhooks.added(added);
+        self.receivers.added(added);
         Ok(())
     }
 
@@ -194,45 +224,62 @@ impl Service {
             _ => return self.store.put_job(job),
         };
         let scan = || self.store.scan(&job.scan).ok().flatten();
-        let outgoing = self.webhooks.of_job(event, job, scan);
+        let outgoing = self.receivers.of_job(event, job, scan);
         let added = self.store.put_job_telling(job, &outgoing)?;
-        self.webhooks.added(added);
+        self.receivers.added(added);
         Ok(())
     }
 
-    /// Notes how a scanner does, and tells the webhooks if that is new trouble.
+    /// Notes how a scanner does, and tells the receivers if that is new trouble.
     pub(crate) fn note_scanner(
         &self,
         station: &Station,
         link: ScannerLink,
         problem: Option<String>,
     ) {
-        let Some(status) = station.note(link, problem) else {
+        let Some((before, status)) = station.note(link, problem) else {
             return;
         };
         if status.link == ScannerLink::Trouble {
-            let outgoing = self.webhooks.of_trouble(station.name(), &status);
+            let told = |event| self.receivers.of_trouble(event, station.name(), &status);
+            let mut outgoing = told(WebhookEvent::ScannerTrouble);
+            if is_stopped(status.problem.as_deref()) && !is_stopped(before.as_deref()) {
+                outgoing.extend(told(WebhookEvent::Interlock));
+            }
             match self.store.put_messages(&outgoing) {
-                Ok(added) => self.webhooks.added(added),
+                Ok(added) => self.receivers.added(added),
                 Err(error) => {
-                    tracing::error!(scanner = station.name(), %error, "webhooks are not told");
+                    tracing::error!(scanner = station.name(), %error, "receivers are not told");
                 }
             }
         }
         self.hub.tell(Event::Scanner(status));
     }
 
-    /// The webhooks, and how they do.
+    /// Tells of a disk that gets full.
+    ///
+    /// # Errors
+    /// The disk does not keep the messages; nobody is told.
+    pub(crate) fn tell_of_disk(&self, disk: &DiskRoom) -> Result<(), StoreError> {
+        let outgoing = self.receivers.of_disk(disk);
+        if !outgoing.is_empty() {
+            self.receivers.added(self.store.put_messages(&outgoing)?);
+        }
+        Ok(())
+    }
+
+    /// The receivers, and how they do.
     pub(crate) fn list_webhooks(&self) -> Result<Vec<Webhook>, ServiceError> {
         let mut list = Vec::new();
-        for hook in self.webhooks.all() {
-            let latest = latest(self.store.deliveries(&hook.name)?);
-            let config = &hook.receiver().config;
-            let state = lock(&hook.state);
+        for outbox in self.receivers.all() {
+            let latest = latest(self.store.deliveries(&outbox.name)?);
+            let settings = &outbox.receiver().settings;
+            let state = lock(&outbox.state);
             list.push(Webhook {
-                name: hook.name.clone(),
-                url: shown_url(&config.url),
-                events: config.events.clone(),
+                name: outbox.name.clone(),
+                kind: settings.kind,
+                url: settings.shown.clone(),
+                events: settings.events.clone(),
                 waiting: state.due.len(),
                 dropped: state.dropped,
                 latest,
@@ -241,17 +288,17 @@ impl Service {
         Ok(list)
     }
 
-    /// The log of a webhook, newest first.
-    pub(crate) fn deliveries(&self, webhook: &str) -> Result<Vec<Delivery>, ServiceError> {
-        let hook = self.webhooks.hook(webhook)?;
-        Ok(self.store.deliveries(&hook.name)?)
+    /// The log of a receiver, newest first.
+    pub(crate) fn deliveries(&self, name: &str) -> Result<Vec<Delivery>, ServiceError> {
+        let outbox = self.receivers.outbox(name)?;
+        Ok(self.store.deliveries(&outbox.name)?)
     }
 
     /// Sends a test at once, once, and waits for what comes back.
     pub(crate) fn test_webhook(&self, name: &str) -> Result<Delivery, ServiceError> {
         self.check_running()?;
-        let hook = self.webhooks.hook(name)?;
-        let Some(_alone) = alone(&hook.testing) else {
+        let outbox = self.receivers.outbox(name)?;
+        let Some(_alone) = alone(&outbox.testing) else {
             return Err(ServiceError::WebhookBusy {
                 name: name.to_owned(),
             });
@@ -266,8 +313,9 @@ impl Service {
             at: &now(),
             about: None,
         };
-        let Message { mut delivery, body } = message(name, &news, data);
-        let (tried, verdict) = hook.receiver().post(&delivery.id, &body);
+        let message = message(name, &news, data);
+        let (tried, verdict) = outbox.receiver().attempt(&message);
+        let mut delivery = message.delivery;
         delivery.attempts = 1;
         delivery.tried.push(tried);
         delivery.state = match verdict {
@@ -276,7 +324,7 @@ impl Service {
         };
         // Who asked for it hears of it anyway.
         if let Err(error) = self.store.log_delivery(name, &delivery) {
-            tracing::warn!(webhook = name, %error, "cannot keep the outcome of a test");
+            tracing::warn!(receiver = name, %error, "cannot keep the outcome of a test");
         }
         Ok(delivery)
     }
@@ -291,11 +339,11 @@ mod tests {
     use storage::LocalDisk;
 
     use super::*;
-    use crate::config::WebhookConfig;
+    use crate::config::{Config, WebhookConfig};
     use crate::store::Store;
 
-    /// Webhooks of which one is told of everything, and a store.
-    fn webhooks() -> (tempfile::TempDir, Webhooks, Store) {
+    /// Receivers of which one is told of everything, and a store.
+    fn webhooks() -> (tempfile::TempDir, Receivers, Store) {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("secret");
         fs::write(&file, "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw").unwrap();
@@ -303,7 +351,11 @@ mod tests {
         let store = Store::open(Arc::new(LocalDisk), &folder.path().join("store")).unwrap();
         let mut config = WebhookConfig::new("lab", "http://127.0.0.1:9/", file);
         config.events = WebhookEvent::CHOICES.to_vec();
-        let webhooks = Webhooks::open(&[config], &store).unwrap();
+        let config = Config {
+            webhooks: vec![config],
+            ..Config::default()
+        };
+        let webhooks = Receivers::open(&config, &store).unwrap();
         (folder, webhooks, store)
     }
 
