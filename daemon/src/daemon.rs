@@ -27,6 +27,7 @@ use crate::station::{OpenScanner, make_all, open_all, open_attached, stop_all};
 use crate::store::{Store, StoreError};
 use crate::systemd::{Health, Inherited};
 use crate::tokens::{TokenError, Tokens};
+use crate::traces::{Traces, TracesError};
 
 /// How long connections may take to end once the service stops.
 const DRAIN: Duration = Duration::from_secs(5);
@@ -61,6 +62,9 @@ pub enum StartError {
     /// Those who are told cannot be.
     #[error(transparent)]
     Receivers(#[from] ReceiverError),
+    /// The collector of traces cannot be.
+    #[error(transparent)]
+    Traces(#[from] TracesError),
     /// The log of the laser does not work.
     #[error(transparent)]
     Laser(#[from] LaserLogError),
@@ -176,6 +180,7 @@ impl Daemon {
             &config.service.state_dir.join("tokens.json"),
         )?;
         let receivers = Receivers::open(&config, &store)?;
+        let traces = Traces::start(&config.traces)?;
         let hub = Arc::new(Hub::default());
         let stations = make_all(&config, scanners, &hub, &*disk)?;
         let offered = inherited.or_bind(&config.service).await?;
@@ -189,6 +194,8 @@ impl Daemon {
             receivers,
         };
         let service = Arc::new(Service::new(config, stations, hub, kept, scans_dir));
+        // It is new: there are none yet.
+        let _ = service.traces.set(traces);
         let cut_short = service.recover_scans().map_err(StartError::Recover)?;
         service.adopt_journals().map_err(StartError::Recover)?;
         service.recover_jobs().map_err(StartError::Recover)?;
@@ -314,6 +321,9 @@ impl Daemon {
                 }
             }
             service.receivers.join();
+            if let Some(traces) = service.traces.get() {
+                traces.end();
+            }
         })
         .await;
         if ended.is_err() {

@@ -41,6 +41,7 @@ mod starts;
 mod station;
 mod store;
 mod tokens;
+mod traces;
 
 pub use acquisition::PlanError;
 pub use arguments::Arguments;

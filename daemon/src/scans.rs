@@ -374,6 +374,9 @@ impl Service {
             tracing::error!(scan = id, %error, "cannot keep the record of a scan now; its columns are safe");
             lock(&self.unkept).push(scan.clone());
         }
+        if let Some(traces) = self.traces.get() {
+            traces.scan_ended(&scan);
+        }
         station.free();
         match (state, &scan.reason) {
             (ScanState::Failed, Some(reason)) => {

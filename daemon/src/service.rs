@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, RwLock};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError, RwLock};
 use std::time::Duration;
 
 use regrid::RegridSettings;
@@ -25,6 +25,7 @@ use crate::starts::UnderWay;
 use crate::station::Station;
 use crate::store::Store;
 use crate::tokens::Tokens;
+use crate::traces::Traces;
 
 /// What outlives the process, and where it is kept.
 pub(crate) struct Kept {
@@ -59,6 +60,8 @@ pub(crate) struct Service {
     pub(crate) unkept: Mutex<Vec<Scan>>,
     /// What is counted.
     pub(crate) metrics: Metrics,
+    /// Who is told how long things took; nobody until the service has set it up.
+    pub(crate) traces: OnceLock<Traces>,
     /// Held by whoever regrids for showing.
     pub(crate) regridding: Mutex<()>,
     /// Keyed requests that are just being done.
@@ -109,6 +112,7 @@ impl Service {
             grids: Mutex::default(),
             unkept: Mutex::default(),
             metrics: Metrics::default(),
+            traces: OnceLock::new(),
             regridding: Mutex::default(),
             starts: UnderWay::default(),
             measured: Mutex::default(),

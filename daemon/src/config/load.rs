@@ -73,6 +73,8 @@ impl Config {
         let config = Self::parse_file(&text, path)?;
         receivers::check_all_files(&text, &config)
             .map_err(|(start, message)| wrong(&text, path, start, message))?;
+        let traces = config.traces.check_files();
+        traces.map_err(|error| inconsistent(path, "traces", error.to_string()))?;
         Ok(config)
     }
 
@@ -132,6 +134,8 @@ impl Config {
         scanners::check(text, &config, port)
             .and_then(|()| receivers::check(text, &config))
             .map_err(|(start, message)| wrong(start, message))?;
+        let traces = config.traces.check();
+        traces.map_err(|message| inconsistent(path, "traces", message))?;
         config
             .processing()
             .check()

@@ -19,6 +19,7 @@ mod reload;
 mod scanner;
 mod scanners;
 mod storage;
+mod traces;
 mod value;
 mod webhooks;
 
@@ -51,6 +52,7 @@ pub use regularities::{Regularize, RegularizeUnits};
 pub use reload::Reloaded;
 pub use scanner::{ScannerConfig, Transport};
 pub use storage::{Limits, StorageConfig};
+pub use traces::TracesConfig;
 pub use webhooks::WebhookConfig;
 
 /// The whole configuration.
@@ -89,6 +91,8 @@ pub struct Config {
     pub mqtt: Vec<MqttConfig>,
     /// People who are written to.
     pub mail: Vec<MailConfig>,
+    /// Who is told how long things took.
+    pub traces: TracesConfig,
     /// What is logged.
     pub log: LogConfig,
 }

@@ -45,7 +45,7 @@ impl Config {
             mqtt,
             mail
         );
-        leave!(service, http, queue);
+        leave!(service, http, queue, traces);
         merged.scanner = reloaded_scanner("scanner", &self.scanner, &new.scanner, &mut outcome);
         for (name, scanner) in &self.scanners {
             let section = format!("scanners.{name}");

@@ -82,11 +82,6 @@ pub(super) fn public_url<'de, D: Deserializer<'de>>(
 ) -> Result<Option<String>, D::Error> {
     let text = String::deserialize(deserializer)?;
     let uri = text.parse::<Uri>().ok();
-    let is_plain = |uri: &Uri| {
-        let has_scheme = matches!(uri.scheme_str(), Some("http" | "https"));
-        let host = uri.authority().map(|authority| authority.as_str());
-        has_scheme && host.is_some_and(|host| !host.contains('@')) && uri.query().is_none()
-    };
     if uri.as_ref().is_some_and(is_plain) && !text.contains('#') {
         return Ok(Some(text));
     }
@@ -95,6 +90,28 @@ pub(super) fn public_url<'de, D: Deserializer<'de>>(
          without a name or password, and nothing behind `?` or `#`",
         shown_url(&text)
     )))
+}
+
+/// Where an OpenTelemetry collector takes what it is told.
+pub(super) fn collector<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<String>, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    if text.parse::<Uri>().as_ref().is_ok_and(is_plain) {
+        return Ok(Some(text));
+    }
+    Err(D::Error::custom(format!(
+        "{:?} is no address of a collector: one such as \"http://localhost:4318\" is needed, \
+         without a name or password, which belong into `headers_file`",
+        shown_url(&text)
+    )))
+}
+
+/// Whether it is one of HTTP without anything secret in it.
+fn is_plain(uri: &Uri) -> bool {
+    let has_scheme = matches!(uri.scheme_str(), Some("http" | "https"));
+    let host = uri.authority().map(|authority| authority.as_str());
+    has_scheme && host.is_some_and(|host| !host.contains('@')) && uri.query().is_none()
 }
 
 /// Where to post to. What is refused is told without what may be secret in it: others see the log.

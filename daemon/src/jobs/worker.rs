@@ -156,6 +156,9 @@ fn attempt(
     }
     // Before anybody can see it.
     service.metrics.job_ended(&job);
+    if let Some(traces) = service.traces.get() {
+        traces.job_ended(&job);
+    }
     service.keep_job(&job)?;
     if let Some(event) = published {
         service.hub.tell(event);

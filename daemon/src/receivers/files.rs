@@ -23,13 +23,17 @@ pub(crate) struct FileError {
 }
 
 impl FileError {
+    pub(crate) fn new(key: &'static str, message: String) -> Self {
+        Self { key, message }
+    }
+
     pub(crate) fn key(&self) -> &'static str {
         self.key
     }
 }
 
 /// Reads a secret from a file that is the service's own. `what` says in a word what it is.
-pub(super) fn read_secret(key: &'static str, what: &str, path: &Path) -> Result<String, FileError> {
+pub(crate) fn read_secret(key: &'static str, what: &str, path: &Path) -> Result<String, FileError> {
     let failed = |message: String| FileError { key, message };
     let shown = path.display();
     let refused = |error: io::Error| {

@@ -14,6 +14,7 @@
 //! [`receiver::Way`] in a module of its own, which [`make_all`] makes of its sections of the
 //! configuration.
 
+mod agent;
 mod backoff;
 mod deliver;
 mod files;
@@ -36,12 +37,14 @@ use relief_api::WebhookKind;
 use crate::config::Config;
 use crate::service::{Service, lock};
 use crate::store::{Added, Store, StoreError};
-pub(crate) use files::FileError;
+pub(crate) use agent::agent;
+pub(crate) use files::{FileError, read_secret};
 pub(crate) use mail::check_files as check_mail_files;
 pub(crate) use mqtt::check_files as check_broker_files;
 use receiver::Receiver;
 pub(crate) use show::show;
 pub(crate) use webhook::{check_files, shown_url};
+pub(crate) use words::host_name;
 use words::warn_without_network;
 
 /// How long the end of the service waits for an attempt that is under way. Its message is tried

@@ -95,7 +95,7 @@ pub(super) fn printable(bytes: &[u8]) -> String {
 }
 
 /// The machine's name, with nothing in it that topics or headers give a meaning to.
-pub(super) fn host_name() -> String {
+pub(crate) fn host_name() -> String {
     let name = rustix::system::uname();
     let plain = |c: char| match c {
         c if c.is_ascii_alphanumeric() || "-._".contains(c) => c,

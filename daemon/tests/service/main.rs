@@ -29,4 +29,5 @@ mod refusals;
 mod rig;
 mod scanners;
 mod scans;
+mod traces;
 mod webhooks;

@@ -8,13 +8,11 @@ use std::io::Read;
 
 use jiff::Timestamp;
 use relief_api::{DeliveryAttempt, WebhookKind};
-use rustls::crypto::ring;
-use rustls::pki_types::CertificateDer;
 use ureq::http::{Request, Response, header};
-use ureq::tls::{Certificate, RootCerts, TlsConfig};
 use ureq::{Agent, Body};
 
-use super::files::{FileError, authorities_in, authorities_of_the_machine};
+use super::agent::agent;
+use super::files::{FileError, authorities_in};
 use super::receiver::{Receiver, Settings, Verdict, Way};
 use super::words::printable;
 use crate::config::WebhookConfig;
@@ -22,7 +20,7 @@ use crate::store::Message;
 use secret::Secret;
 pub(crate) use shown::shown_url;
 use shown::{shown_host, shown_location, without_path};
-use words::{GONE, MOST_HEAD_BYTES, refusal, told};
+use words::{GONE, refusal, told};
 
 /// Bytes of an answer that are looked at, where it is a refusal; of others none is.
 const MOST_ANSWER_BYTES: u64 = 1024;
@@ -45,49 +43,19 @@ struct Webhook {
     carrier: Box<dyn Carrier>,
 }
 
-/// Reads the files that the webhook names: the secret, and whose certificates are trusted if
-/// not those that the machine trusts.
-fn read_files(
-    config: &WebhookConfig,
-) -> Result<(Secret, Option<Vec<CertificateDer<'static>>>), FileError> {
-    let secret = Secret::read(&config.secret_file)?;
-    let own = config.ca_file.as_deref().map(authorities_in).transpose()?;
-    Ok((secret, own))
-}
-
 /// Looks at the files that a webhook names.
 pub(crate) fn check_files(config: &WebhookConfig) -> Result<(), FileError> {
-    read_files(config).map(drop)
+    Secret::read(&config.secret_file)?;
+    config
+        .ca_file
+        .as_deref()
+        .map_or(Ok(()), |path| authorities_in(path).map(drop))
 }
 
 /// A receiver that is reached as the webhook says.
 pub(super) fn receiver(config: &WebhookConfig) -> Result<Receiver, FileError> {
-    let (secret, own) = read_files(config)?;
-    // Where another part of the process has chosen one, that will do.
-    let _ = ring::default_provider().install_default();
-    let authorities = match own {
-        Some(own) => own,
-        None if config.url.starts_with("https:") => authorities_of_the_machine(),
-        None => Vec::new(),
-    };
-    let authorities: Vec<Certificate<'static>> = authorities
-        .iter()
-        .map(|certificate| Certificate::from_der(certificate).to_owned())
-        .collect();
-    let tls = TlsConfig::builder().root_certs(RootCerts::from(authorities));
-    let agent = Agent::config_builder()
-        .tls_config(tls.build())
-        .timeout_global(Some(config.timeout()))
-        .http_status_as_error(false)
-        .max_redirects(0)
-        .max_redirects_will_error(false)
-        .max_response_header_size(MOST_HEAD_BYTES)
-        // Messages are far between, and no connection is kept open for the next.
-        .max_idle_connections(0)
-        .proxy(None)
-        .user_agent(concat!("reliefd/", env!("CARGO_PKG_VERSION")))
-        .build()
-        .new_agent();
+    let secret = Secret::read(&config.secret_file)?;
+    let agent = agent(&config.url, config.ca_file.as_deref(), config.timeout())?;
     let settings = Settings {
         name: config.name.clone(),
         kind: WebhookKind::Webhook,

@@ -2,12 +2,11 @@
 
 use std::time::Duration;
 
+use crate::receivers::agent::MOST_HEAD_BYTES;
 use crate::receivers::words::{of_io, of_tls};
 
 /// What a receiver answers that wants no more messages.
 pub(super) const GONE: u16 = 410;
-/// Bytes of the head of an answer.
-pub(super) const MOST_HEAD_BYTES: usize = 16 * 1024;
 
 /// Why the receiver was not reached, and what to do about it.
 pub(super) fn told(error: &ureq::Error, host: &str, timeout: Duration) -> String {
