@@ -223,12 +223,17 @@ impl Shared {
     fn keep(&self) {
         let mut wait = FIRST_WAIT;
         loop {
+            let begun = Instant::now();
             // A defect that a broker sets off costs one connection and nothing else.
             let ended = catch_unwind(AssertUnwindSafe(|| self.connect()));
             let why = ended.unwrap_or_else(|panic| Some(defect(&*panic)));
             let mut state = lock(&self.state);
             if state.client.take().is_some() {
-                wait = FIRST_WAIT;
+                // One that is lost at once each time, as where two services have one name there, is
+                // not made again each second.
+                if begun.elapsed() >= LONGEST_WAIT {
+                    wait = FIRST_WAIT;
+                }
                 if let Some(why) = &why {
                     tracing::warn!(broker = self.broker(), %why, "connection to a broker lost");
                 }
