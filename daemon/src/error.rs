@@ -167,6 +167,12 @@ pub enum ServiceError {
         /// The folder or file.
         what: String,
     },
+    /// Nothing could be noted of it.
+    #[error("no job is known that made {result}, so that nothing can be noted of it")]
+    NoRecordOfResult {
+        /// The folder.
+        result: String,
+    },
     /// The disk would get full.
     #[error(
         "there is no room in {folder}: the scan takes up to {}, and {} are to stay free \

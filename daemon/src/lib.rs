@@ -14,6 +14,7 @@
 
 pub mod calibration;
 pub mod config;
+pub mod discovery;
 pub mod logging;
 pub mod systemd;
 

@@ -48,6 +48,8 @@ pub const JOB_CANCEL: &str = "/v1/jobs/{job}/cancel";
 pub const SPOOL: &str = "/v1/spool/{result}";
 /// Pattern of one file of the spool.
 pub const SPOOL_FILE: &str = "/v1/spool/{result}/{file}";
+/// Pattern of acknowledging a result.
+pub const SPOOL_ACK: &str = "/v1/spool/{result}/ack";
 /// The log of the lasers.
 pub const LASER: &str = "/v1/laser";
 /// The tokens; on the socket only.
@@ -179,6 +181,12 @@ pub fn spool(result: &str) -> String {
 #[must_use]
 pub fn spool_file(result: &str, file: &str) -> String {
     format!("{}/{}", spool(result), segment(file))
+}
+
+/// Acknowledgement of one result.
+#[must_use]
+pub fn spool_ack(result: &str) -> String {
+    spool(result) + "/ack"
 }
 
 /// Revocation of one token.

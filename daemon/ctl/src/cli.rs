@@ -6,9 +6,9 @@ use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    abort, accept, calibrate, change, compare, config, convert, demo, doctor, features, fetch,
-    fill, jobs, laser, manual, pause, rerun, resume, scan, scans, skin, status, surface, token,
-    toolpath, watch, webhooks,
+    abort, accept, calibrate, change, compare, config, convert, demo, discover, doctor, features,
+    fetch, fill, jobs, laser, manual, pause, rerun, resume, scan, scans, skin, status, surface,
+    token, toolpath, watch, webhooks,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
@@ -59,6 +59,7 @@ pub(crate) enum Command {
     Token(token::Args),
     Webhooks(webhooks::Args),
     Config(config::Args),
+    Discover(discover::Args),
     Doctor(doctor::Args),
     Manual(manual::Args),
 }

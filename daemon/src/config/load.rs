@@ -133,6 +133,14 @@ impl Config {
             .and_then(|()| webhooks::check(text, &config))
             .map_err(|(start, message)| wrong(start, message))?;
         config
+            .storage
+            .check()
+            .map_err(|message| inconsistent(path, "storage", message))?;
+        config
+            .discovery
+            .check(&config.http.hosts)
+            .map_err(|message| inconsistent(path, "discovery", message))?;
+        config
             .processing()
             .check()
             .map_err(|(section, message)| inconsistent(path, section, message))?;

@@ -3,6 +3,7 @@
 //! A key that does not exist, or a value that cannot be, is refused with its line and a
 //! way out; nothing is silently ignored.
 
+mod discovery;
 mod fill;
 mod formats;
 mod further;
@@ -27,6 +28,7 @@ use std::time::Duration;
 use relief_api::{PlanRequest, THE_SCANNER};
 use serde::{Deserialize, Serialize};
 
+pub use discovery::DiscoveryConfig;
 pub use fill::{FillConfig, FillMode};
 pub use further::{
     KnotsChoice, MachineChoice, OfChoice, PatternChoice, SkinConfig, SkinMethod, SurfaceConfig,
@@ -43,7 +45,8 @@ pub use processing::{
 pub use regularities::{Regularize, RegularizeUnits};
 pub use reload::Reloaded;
 pub use scanner::{ScannerConfig, Transport};
-pub use storage::{Limits, StorageConfig};
+pub use storage::{Acknowledged, Limits, StorageConfig, Unacknowledged};
+pub(crate) use value::is_host_name;
 pub use webhooks::{Retry, WebhookConfig};
 
 /// The whole configuration.
@@ -64,6 +67,8 @@ pub struct Config {
     pub journal: JournalConfig,
     /// Room on the disk.
     pub storage: StorageConfig,
+    /// Whether others on the network are told of the service.
+    pub discovery: DiscoveryConfig,
     /// From samples to the uniform range image.
     pub regrid: RegridConfig,
     /// From the range image to regions.

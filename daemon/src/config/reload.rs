@@ -43,7 +43,7 @@ impl Config {
             deliverables,
             webhooks
         );
-        leave!(service, http, queue);
+        leave!(service, http, discovery, queue);
         merged.scanner = reloaded_scanner("scanner", &self.scanner, &new.scanner, &mut outcome);
         for (name, scanner) in &self.scanners {
             let section = format!("scanners.{name}");

@@ -87,6 +87,7 @@ pub(super) fn described() -> OpenApiRouter<Context> {
         .routes(routes!(jobs::cancel))
         .routes(routes!(files::entry))
         .routes(routes!(files::file))
+        .routes(routes!(files::acknowledge))
         .routes(routes!(tickets::create))
         .routes(routes!(webhooks::list))
         .routes(routes!(webhooks::deliveries))

@@ -149,6 +149,14 @@ impl From<ServiceError> for Refusal {
                 Some("try again in a moment".into()),
             ),
             ServiceError::NotInSpool { .. } => (S::NOT_FOUND, "not-in-spool", None),
+            ServiceError::NoRecordOfResult { .. } => (
+                S::CONFLICT,
+                "no-record-of-result",
+                Some(
+                    "it is left by a job whose record was lost: remove the folder once you have it"
+                        .into(),
+                ),
+            ),
             ServiceError::NoRoom { .. } => (
                 S::INSUFFICIENT_STORAGE,
                 "no-room",

@@ -1,7 +1,8 @@
 //! Room on the disk: whether there is enough for a scan, and what goes to make some.
 //!
 //! Nothing goes that somebody still needs: a scan stays until it is over and none of its
-//! jobs waits, runs or has failed. Range images that were put aside go as soon as the
+//! jobs waits, runs or has failed; a result, if the configuration says so, until somebody has
+//! acknowledged it. Range images that were put aside go as soon as the
 //! reserve is touched, since a job can make them again.
 
 mod promise;
@@ -18,6 +19,7 @@ use jiff::Timestamp;
 use relief_api::{Event, Job, JobState, Scan, ScanState, StorageStatus};
 use storage::remove_file_if_there;
 
+use crate::config::Unacknowledged;
 use crate::error::ServiceError;
 use crate::ids::now;
 use crate::service::{Service, lock};
@@ -179,7 +181,9 @@ impl Service {
         let results = self.store.of_jobs(|job| {
             let folder = self.spool.directory(&job.result);
             let is_done = job.state == JobState::Done;
-            let result = is_done.then(|| kept_result(&folder, &job, at)).flatten();
+            let keep = limits.unacknowledged == Unacknowledged::Keep;
+            let kept = || kept_result(&folder, &job, at, keep);
+            let result = is_done.then(kept).flatten();
             if asks_for_columns(job.state) {
                 asked_for.insert(job.scan);
             }
@@ -196,6 +200,7 @@ impl Service {
             Some(Kept {
                 bytes: on_disk(&metadata),
                 age_s: age_s(since, at),
+                acknowledged_s: None,
                 needed: may_be_processed(&scan) || asked_for.contains(&scan.id),
                 id: scan.id,
             })
@@ -287,7 +292,8 @@ fn asks_for_columns(state: JobState) -> bool {
     !state.is_over() || state == JobState::Failed
 }
 
-fn kept_result(folder: &Path, job: &Job, at: Timestamp) -> Option<Kept> {
+/// Whether a result that nobody has acknowledged is one to keep, the configuration says.
+fn kept_result(folder: &Path, job: &Job, at: Timestamp, keep_unacknowledged: bool) -> Option<Kept> {
     let mut bytes = 0;
     for entry in fs::read_dir(folder).ok()? {
         bytes += on_disk(&entry.ok()?.metadata().ok()?);
@@ -296,7 +302,11 @@ fn kept_result(folder: &Path, job: &Job, at: Timestamp) -> Option<Kept> {
         id: job.result.clone(),
         bytes,
         age_s: age_s(job.ended_at.as_deref(), at),
-        needed: false,
+        acknowledged_s: job
+            .acknowledged_at
+            .as_deref()
+            .map(|since| age_s(Some(since), at)),
+        needed: keep_unacknowledged && job.acknowledged_at.is_none(),
     })
 }
 

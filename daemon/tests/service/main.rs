@@ -7,6 +7,7 @@
 )]
 
 mod access;
+mod acknowledge;
 mod ailing;
 mod api;
 mod calibration;

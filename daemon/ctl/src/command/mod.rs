@@ -8,6 +8,7 @@ pub(crate) mod compare;
 pub(crate) mod config;
 pub(crate) mod convert;
 pub(crate) mod demo;
+pub(crate) mod discover;
 pub(crate) mod doctor;
 pub(crate) mod features;
 pub(crate) mod fetch;
@@ -69,6 +70,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Rerun(args) => block_on(rerun::run(args, json)),
         Command::Surface(args) => block_on(surface::run(args, json)),
         Command::Watch(args) => block_on(watch::run(args, json)),
+        Command::Discover(args) => block_on(discover::run(args, json)),
         Command::Doctor(args) => block_on(doctor::run(args, json)),
         Command::Fetch(args) => block_on(fetch::run(args, json)),
         Command::Laser(args) => block_on(laser::run(args, json)),
