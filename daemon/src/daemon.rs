@@ -20,6 +20,7 @@ use crate::events::Hub;
 use crate::http::{ListenError, on_loopback, on_socket, serve};
 use crate::jobs::work;
 use crate::laser::LaserLogError;
+use crate::receivers::{self, ReceiverError, Receivers};
 use crate::service::{Kept, Service, remove_if_there};
 use crate::space::tidy;
 use crate::spool::{Spool, SpoolError};
@@ -27,7 +28,6 @@ use crate::station::{OpenScanner, make_all, open_all, open_attached, stop_all};
 use crate::store::{Store, StoreError};
 use crate::systemd::{Health, Inherited};
 use crate::tokens::{TokenError, Tokens};
-use crate::webhooks::{self, WebhookError, Webhooks};
 
 /// How long connections may take to end once the service stops.
 const DRAIN: Duration = Duration::from_secs(5);
@@ -59,9 +59,9 @@ pub enum StartError {
     /// The tokens do not work.
     #[error(transparent)]
     Tokens(#[from] TokenError),
-    /// The webhooks do not work.
+    /// Those who are told cannot be.
     #[error(transparent)]
-    Webhooks(#[from] WebhookError),
+    Receivers(#[from] ReceiverError),
     /// The log of the laser does not work.
     #[error(transparent)]
     Laser(#[from] LaserLogError),
@@ -177,7 +177,7 @@ impl Daemon {
             Arc::clone(&disk),
             &config.service.state_dir.join("tokens.json"),
         )?;
-        let webhooks = Webhooks::open(&config.webhooks, &store)?;
+        let receivers = Receivers::open(&config, &store)?;
         let hub = Arc::new(Hub::default());
         let stations = make_all(&config, scanners, &hub, &*disk)?;
         let offered = inherited.or_bind(&config.service).await?;
@@ -188,7 +188,7 @@ impl Daemon {
             store,
             spool,
             tokens,
-            webhooks,
+            receivers,
         };
         let service = Arc::new(Service::new(config, stations, hub, kept, scans_dir));
         let cut_short = service.recover_scans().map_err(StartError::Recover)?;
@@ -247,7 +247,7 @@ impl Daemon {
                     .spawn(move || watch(&service, &station))?,
             );
         }
-        webhooks::begin_all(&self.service)
+        receivers::begin_all(&self.service)
     }
 
     fn serve<L>(&mut self, listener: L, app: Router, limits: Arc<HttpConfig>)
@@ -288,7 +288,7 @@ impl Daemon {
     pub fn reload(&self, config: &Config) -> Reloaded {
         let outcome = self.service.reload(config);
         // Also where no key has changed: another secret may stand in the same file.
-        webhooks::reload(&self.service, &config.webhooks);
+        receivers::reload(&self.service, config);
         outcome
     }
 
@@ -300,7 +300,7 @@ impl Daemon {
         let service = Arc::clone(&self.service);
         service.begin_stop();
         service.queue.stop();
-        service.webhooks.stop();
+        service.receivers.stop();
         let threads = self.threads;
         let announcement = self.announcement;
         let ended = tokio::task::spawn_blocking(move || {
@@ -312,7 +312,7 @@ impl Daemon {
                     tracing::error!(thread = name, "a thread ended by a panic");
                 }
             }
-            service.webhooks.join();
+            service.receivers.join();
             if let Some(announcement) = announcement {
                 announcement.end();
             }

@@ -198,7 +198,7 @@ impl Service {
     pub(crate) fn keep_ended(&self, scan: &mut Scan) -> Result<(), ServiceError> {
         let event = WebhookEvent::ScanEnded;
         if scan.state == ScanState::Complete && scan.jobs.is_empty() {
-            let tell = |scan: &Scan| self.webhooks.of_scan(event, scan);
+            let tell = |scan: &Scan| self.receivers.of_scan(event, scan);
             self.queue_first_job(scan, tell).map(drop)
         } else {
             Ok(self.put_scan_telling(scan, event)?)

@@ -433,11 +433,11 @@ mod tests {
     use crate::config::Config;
     use crate::events::Hub;
     use crate::laser::Laser;
+    use crate::receivers::Receivers;
     use crate::service::Kept;
     use crate::spool::Spool;
     use crate::store::Store;
     use crate::tokens::Tokens;
-    use crate::webhooks::Webhooks;
     use range_image::{Calibration, calibration::Head};
     use relief_api::THE_SCANNER;
     use scan_record::{Header, JournalWriter, RawColumn};
@@ -484,7 +484,7 @@ mod tests {
                 spool: Spool::open(Arc::new(LocalDisk), &folder.path().join("spool")).unwrap(),
                 tokens: Tokens::open(Arc::new(LocalDisk), &folder.path().join("tokens.json"))
                     .unwrap(),
-                webhooks: Webhooks::default(),
+                receivers: Receivers::default(),
             },
             folder.path().to_owned(),
         );

@@ -18,13 +18,13 @@ use crate::jobs::Queue;
 use crate::laser::MOST_SHOWN;
 use crate::liveness::Liveness;
 use crate::metrics::Metrics;
+use crate::receivers::Receivers;
 use crate::space::{Measured, Promises};
 use crate::spool::Spool;
 use crate::starts::UnderWay;
 use crate::station::Station;
 use crate::store::Store;
 use crate::tokens::Tokens;
-use crate::webhooks::Webhooks;
 
 /// What outlives the process, and where it is kept.
 pub(crate) struct Kept {
@@ -33,7 +33,7 @@ pub(crate) struct Kept {
     pub(crate) spool: Spool,
     pub(crate) tokens: Tokens,
     /// With the messages that wait for them.
-    pub(crate) webhooks: Webhooks,
+    pub(crate) receivers: Receivers,
 }
 
 /// What all parts of the service share.
@@ -45,7 +45,7 @@ pub(crate) struct Service {
     pub(crate) store: Store,
     pub(crate) spool: Spool,
     pub(crate) tokens: Tokens,
-    pub(crate) webhooks: Webhooks,
+    pub(crate) receivers: Receivers,
     pub(crate) hub: Arc<Hub>,
     pub(crate) ids: Ids,
     pub(crate) queue: Queue,
@@ -90,7 +90,7 @@ impl Service {
             store,
             spool,
             tokens,
-            webhooks,
+            receivers,
         } = kept;
         Self {
             stations,
@@ -98,7 +98,7 @@ impl Service {
             store,
             spool,
             tokens,
-            webhooks,
+            receivers,
             hub,
             ids: Ids::default(),
             queue: Queue::default(),

@@ -83,5 +83,5 @@ pub use ticket::{CreateTicket, Ticket};
 pub use token::{CreateToken, MAX_TOKEN_NAME_CHARS, NewToken, Token, TokenList};
 pub use webhook::{
     Delivery, DeliveryAttempt, DeliveryList, DeliveryState, Webhook, WebhookData, WebhookEvent,
-    WebhookList, WebhookMessage,
+    WebhookKind, WebhookList, WebhookMessage,
 };

@@ -6,6 +6,29 @@ use crate::job::Job;
 use crate::scan::Scan;
 use crate::status::ScannerStatus;
 
+/// How a receiver of messages is reached.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, utoipa::ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum WebhookKind {
+    /// Messages are posted to a URL, signed.
+    #[default]
+    Webhook,
+    /// Of a kind that this version does not know; never sent.
+    #[serde(other)]
+    Unknown,
+}
+
+impl WebhookKind {
+    /// As it is spelt in JSON.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Webhook => "webhook",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
 /// What a webhook can be told of.
 #[derive(
     Debug,
@@ -102,6 +125,9 @@ pub struct WebhookData {
 pub struct Webhook {
     /// Its name.
     pub name: String,
+    /// What it is; services that told only webhooks left it out.
+    #[serde(default)]
+    pub kind: WebhookKind,
     /// Where messages are posted to: scheme, host and port, and `/...` for a path or query, which
     /// may be secret.
     pub url: String,

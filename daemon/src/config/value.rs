@@ -6,7 +6,7 @@ use axum::http::Uri;
 use relief_api::WebhookEvent;
 use serde::{Deserialize, Deserializer, de::Error};
 
-use crate::webhooks::shown_url;
+use crate::receivers::shown_url;
 
 /// A whole number within bounds; the text names what is counted.
 fn bounded<'de, D: Deserializer<'de>>(

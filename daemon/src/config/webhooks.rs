@@ -10,7 +10,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::load::line_and_column;
 use super::{Config, value};
-use crate::webhooks::check_files;
+use crate::receivers::check_files;
 
 /// A webhook: who is told of what.
 #[derive(Debug, Clone, PartialEq, Deserialize)]

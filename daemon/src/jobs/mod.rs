@@ -88,7 +88,7 @@ impl Service {
         tell: impl FnOnce(&Scan) -> Vec<Outgoing>,
     ) -> Result<Job, ServiceError> {
         let (job, added) = self.store.add_job(job, scan, tell)?;
-        self.webhooks.added(added);
+        self.receivers.added(added);
         self.hub.tell(Event::Job(job.clone()));
         self.queue.add(job.id);
         Ok(job)

@@ -1,4 +1,5 @@
-//! Messages to webhooks: those that wait, and a log of the others.
+//! Messages to receivers: those that wait, and a log of the others. How a receiver is reached does
+//! not matter here; the tables have the name of the first kind there was.
 //!
 //! A message is kept with the record that it tells of, both or neither, so that nothing that
 //! has happened goes untold when the power fails.
@@ -13,7 +14,7 @@ use super::error::StoreError;
 use super::record::{decode, encode};
 use super::{JOBS, SCANS, Store};
 
-/// A webhook's name, and a number that ascends for each webhook.
+/// A receiver's name, and a number that ascends for each receiver.
 pub(super) type Key<'a> = (&'a str, u64);
 
 /// Messages that wait to be delivered.
@@ -22,9 +23,9 @@ pub(super) const WAITING: TableDefinition<'_, Key<'_>, &[u8]> =
 /// What became of the others, in the order in which that was settled.
 pub(super) const LOG: TableDefinition<'_, Key<'_>, &[u8]> = TableDefinition::new("webhook_log");
 
-/// Messages that wait for one webhook at most: days of work of a scanner.
+/// Messages that wait for one receiver at most: days of work of a scanner.
 pub(crate) const MOST_WAITING: usize = 256;
-/// Entries of a webhook's log.
+/// Entries of a receiver's log.
 pub(crate) const MOST_LOGGED: usize = 100;
 
 /// A message as it is kept until it is delivered.
@@ -32,29 +33,29 @@ pub(crate) const MOST_LOGGED: usize = 100;
 pub(crate) struct Message {
     /// What became of it so far.
     pub(crate) delivery: Delivery,
-    /// What is signed and posted, to the letter.
+    /// What it says, to the letter: JSON of a `WebhookMessage`.
     pub(crate) body: String,
 }
 
 /// A message that is about to be kept.
 #[derive(Debug, Clone)]
 pub(crate) struct Outgoing {
-    pub(crate) webhook: String,
+    pub(crate) receiver: String,
     pub(crate) message: Message,
 }
 
 /// A message that is kept, from now on or since earlier.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Added {
-    pub(crate) webhook: String,
+    pub(crate) receiver: String,
     pub(crate) number: u64,
     /// Numbers of those that had to make room for it.
     pub(crate) dropped: Vec<u64>,
 }
 
-/// All keys of a webhook.
-fn all_of(webhook: &str) -> RangeInclusive<Key<'_>> {
-    (webhook, 0)..=(webhook, u64::MAX)
+/// All keys of a receiver.
+fn all_of(receiver: &str) -> RangeInclusive<Key<'_>> {
+    (receiver, 0)..=(receiver, u64::MAX)
 }
 
 /// Where a message is kept.
@@ -79,8 +80,8 @@ struct Known {
 
 type Rows<'a> = Table<'a, Key<'static>, &'static [u8]>;
 
-fn last(table: &Rows<'_>, webhook: &str) -> Result<u64, redb::Error> {
-    let row = table.range(all_of(webhook))?.next_back().transpose()?;
+fn last(table: &Rows<'_>, receiver: &str) -> Result<u64, redb::Error> {
+    let row = table.range(all_of(receiver))?.next_back().transpose()?;
     Ok(row.map_or(0, |(key, _)| key.value().1))
 }
 
@@ -88,17 +89,17 @@ fn last(table: &Rows<'_>, webhook: &str) -> Result<u64, redb::Error> {
 fn log(
     log: &mut Rows<'_>,
     waiting: &Rows<'_>,
-    webhook: &str,
+    receiver: &str,
     delivery: &Delivery,
 ) -> Result<(), redb::Error> {
-    let number = 1 + last(log, webhook)?.max(last(waiting, webhook)?);
-    log.insert((webhook, number), encode(delivery).as_slice())?;
+    let number = 1 + last(log, receiver)?.max(last(waiting, receiver)?);
+    log.insert((receiver, number), encode(delivery).as_slice())?;
     let numbers: Vec<u64> = log
-        .range(all_of(webhook))?
+        .range(all_of(receiver))?
         .map(|row| Ok(row?.0.value().1))
         .collect::<Result<_, redb::Error>>()?;
     for number in &numbers[..numbers.len().saturating_sub(MOST_LOGGED)] {
-        log.remove((webhook, *number))?;
+        log.remove((receiver, *number))?;
     }
     Ok(())
 }
@@ -109,18 +110,18 @@ impl Store {
         &self,
         waiting: &Rows<'_>,
         logged: &Rows<'_>,
-        webhook: &str,
+        receiver: &str,
         id: &str,
     ) -> Result<Option<Place>, redb::Error> {
         // What cannot be read is no reason to keep nothing more.
-        for row in waiting.range(all_of(webhook))? {
+        for row in waiting.range(all_of(receiver))? {
             let (key, bytes) = row?;
             let waits = decode::<Waits>(&self.path, bytes.value());
             if waits.is_ok_and(|waits| waits.delivery.id == id) {
                 return Ok(Some(Place::Waits(key.value().1)));
             }
         }
-        for row in logged.range(all_of(webhook))? {
+        for row in logged.range(all_of(receiver))? {
             let known = decode::<Known>(&self.path, row?.1.value());
             if known.is_ok_and(|known| known.id == id) {
                 return Ok(Some(Place::Logged));
@@ -129,16 +130,16 @@ impl Store {
         Ok(None)
     }
 
-    /// Whether this very message waits under this number, and not a later one of a webhook that
+    /// Whether this very message waits under this number, and not a later one of a receiver that
     /// was taken out and put in again.
     fn waits(
         &self,
         waiting: &Rows<'_>,
-        webhook: &str,
+        receiver: &str,
         number: u64,
         id: &str,
     ) -> Result<bool, redb::Error> {
-        let row = waiting.get((webhook, number))?;
+        let row = waiting.get((receiver, number))?;
         Ok(row.is_some_and(|bytes| {
             let waits = decode::<Waits>(&self.path, bytes.value());
             waits.is_ok_and(|waits| waits.delivery.id == id)
@@ -153,14 +154,14 @@ impl Store {
         outgoing: &[Outgoing],
     ) -> Result<Vec<Added>, redb::Error> {
         let mut added = Vec::new();
-        for Outgoing { webhook, message } in outgoing {
+        for Outgoing { receiver, message } in outgoing {
             let mut waiting = transaction.open_table(WAITING)?;
             let mut logged = transaction.open_table(LOG)?;
-            match self.place_of(&waiting, &logged, webhook, &message.delivery.id)? {
+            match self.place_of(&waiting, &logged, receiver, &message.delivery.id)? {
                 // The disk may have kept it, and said that it had not: nobody has heard of it.
                 Some(Place::Waits(number)) => {
                     added.push(Added {
-                        webhook: webhook.clone(),
+                        receiver: receiver.clone(),
                         number,
                         dropped: Vec::new(),
                     });
@@ -169,25 +170,25 @@ impl Store {
                 Some(Place::Logged) => continue,
                 None => {}
             }
-            let number = 1 + last(&logged, webhook)?.max(last(&waiting, webhook)?);
-            waiting.insert((webhook.as_str(), number), encode(message).as_slice())?;
+            let number = 1 + last(&logged, receiver)?.max(last(&waiting, receiver)?);
+            waiting.insert((receiver.as_str(), number), encode(message).as_slice())?;
             let numbers: Vec<u64> = waiting
-                .range(all_of(webhook))?
+                .range(all_of(receiver))?
                 .map(|row| Ok(row?.0.value().1))
                 .collect::<Result<_, redb::Error>>()?;
             let surplus = numbers.len().saturating_sub(MOST_WAITING);
             for number in &numbers[..surplus] {
-                let row = waiting.remove((webhook.as_str(), *number))?;
+                let row = waiting.remove((receiver.as_str(), *number))?;
                 let kept = row.map(|bytes| decode::<Message>(&self.path, bytes.value()));
                 // One that cannot be read is told when the service next starts.
                 if let Some(Ok(Message { mut delivery, .. })) = kept {
                     delivery.state = DeliveryState::Dropped;
                     delivery.next_attempt_at = None;
-                    log(&mut logged, &waiting, webhook, &delivery)?;
+                    log(&mut logged, &waiting, receiver, &delivery)?;
                 }
             }
             added.push(Added {
-                webhook: webhook.clone(),
+                receiver: receiver.clone(),
                 number,
                 dropped: numbers[..surplus].to_vec(),
             });
@@ -270,11 +271,11 @@ impl Store {
         Ok((job, added))
     }
 
-    /// Numbers of the messages that wait for a webhook, oldest first.
-    pub(crate) fn waiting(&self, webhook: &str) -> Result<Vec<u64>, StoreError> {
+    /// Numbers of the messages that wait for a receiver, oldest first.
+    pub(crate) fn waiting(&self, receiver: &str) -> Result<Vec<u64>, StoreError> {
         self.with(|database| {
             let table = database.begin_read()?.open_table(WAITING)?;
-            let rows = table.range(all_of(webhook))?;
+            let rows = table.range(all_of(receiver))?;
             rows.map(|row| Ok(row?.0.value().1)).collect()
         })
     }
@@ -282,12 +283,12 @@ impl Store {
     /// A message that waits; none if it does not any more.
     pub(crate) fn message(
         &self,
-        webhook: &str,
+        receiver: &str,
         number: u64,
     ) -> Result<Option<Message>, StoreError> {
         let read = |database: &Database| -> Result<Option<Vec<u8>>, redb::Error> {
             let table = database.begin_read()?.open_table(WAITING)?;
-            let row = table.get((webhook, number))?;
+            let row = table.get((receiver, number))?;
             Ok(row.map(|bytes| bytes.value().to_vec()))
         };
         let bytes = self.with(read)?;
@@ -298,7 +299,7 @@ impl Store {
     /// to make room, stays as it is.
     pub(crate) fn keep_attempt(
         &self,
-        webhook: &str,
+        receiver: &str,
         number: u64,
         message: &Message,
     ) -> Result<(), StoreError> {
@@ -306,19 +307,19 @@ impl Store {
             let transaction = database.begin_write()?;
             {
                 let mut waiting = transaction.open_table(WAITING)?;
-                if self.waits(&waiting, webhook, number, &message.delivery.id)? {
-                    waiting.insert((webhook, number), encode(message).as_slice())?;
+                if self.waits(&waiting, receiver, number, &message.delivery.id)? {
+                    waiting.insert((receiver, number), encode(message).as_slice())?;
                 }
             }
             Ok(transaction.commit()?)
         })
     }
 
-    /// Keeps how a message ended, which waits no more. One that had to make room, or whose webhook
+    /// Keeps how a message ended, which waits no more. One that had to make room, or whose receiver
     /// has gone, is told of already.
     pub(crate) fn end_message(
         &self,
-        webhook: &str,
+        receiver: &str,
         number: u64,
         delivery: &Delivery,
     ) -> Result<(), StoreError> {
@@ -326,10 +327,10 @@ impl Store {
             let transaction = database.begin_write()?;
             {
                 let mut waiting = transaction.open_table(WAITING)?;
-                if self.waits(&waiting, webhook, number, &delivery.id)? {
-                    waiting.remove((webhook, number))?;
+                if self.waits(&waiting, receiver, number, &delivery.id)? {
+                    waiting.remove((receiver, number))?;
                     let mut logged = transaction.open_table(LOG)?;
-                    log(&mut logged, &waiting, webhook, delivery)?;
+                    log(&mut logged, &waiting, receiver, delivery)?;
                 }
             }
             Ok(transaction.commit()?)
@@ -339,7 +340,7 @@ impl Store {
     /// Keeps what became of a message that never waited.
     pub(crate) fn log_delivery(
         &self,
-        webhook: &str,
+        receiver: &str,
         delivery: &Delivery,
     ) -> Result<(), StoreError> {
         self.with(|database| {
@@ -347,20 +348,20 @@ impl Store {
             {
                 let waiting = transaction.open_table(WAITING)?;
                 let mut logged = transaction.open_table(LOG)?;
-                log(&mut logged, &waiting, webhook, delivery)?;
+                log(&mut logged, &waiting, receiver, delivery)?;
             }
             Ok(transaction.commit()?)
         })
     }
 
-    /// All that is known of messages to a webhook, newest first.
-    pub(crate) fn deliveries(&self, webhook: &str) -> Result<Vec<Delivery>, StoreError> {
+    /// All that is known of messages to a receiver, newest first.
+    pub(crate) fn deliveries(&self, receiver: &str) -> Result<Vec<Delivery>, StoreError> {
         type Bytes = Vec<Vec<u8>>;
         let read = |database: &Database| -> Result<(Bytes, Bytes), redb::Error> {
             let transaction = database.begin_read()?;
             let rows = |table: TableDefinition<'_, Key<'static>, &'static [u8]>| {
                 let table = transaction.open_table(table)?;
-                let rows = table.range(all_of(webhook))?;
+                let rows = table.range(all_of(receiver))?;
                 rows.map(|row| Ok(row?.1.value().to_vec()))
                     .collect::<Result<Bytes, redb::Error>>()
             };
@@ -381,9 +382,9 @@ impl Store {
         Ok(found)
     }
 
-    /// Forgets what was kept for webhooks that are not among these. Gives the names of those
+    /// Forgets what was kept for receivers that are not among these. Gives the names of those
     /// that messages waited for, and how many.
-    pub(crate) fn forget_other_webhooks(
+    pub(crate) fn forget_other_receivers(
         &self,
         known: &[&str],
     ) -> Result<Vec<(String, usize)>, StoreError> {
@@ -435,12 +436,12 @@ mod tests {
         (folder, store)
     }
 
-    fn outgoing(webhook: &str, second: usize) -> Outgoing {
+    fn outgoing(receiver: &str, second: usize) -> Outgoing {
         Outgoing {
-            webhook: webhook.into(),
+            receiver: receiver.into(),
             message: Message {
                 delivery: Delivery {
-                    id: format!("msg_{webhook}_{second}"),
+                    id: format!("msg_{receiver}_{second}"),
                     event: WebhookEvent::JobDone,
                     about: None,
                     state: DeliveryState::Waiting,
@@ -495,7 +496,7 @@ mod tests {
         let added = store.put_messages(&[outgoing("a", 9)]).unwrap();
         assert_eq!(added[0].number, 5);
         assert_eq!(
-            store.forget_other_webhooks(&["b"]).unwrap(),
+            store.forget_other_receivers(&["b"]).unwrap(),
             [("a".to_owned(), 3)]
         );
         assert_eq!(store.deliveries("a").unwrap(), []);
@@ -513,7 +514,7 @@ mod tests {
                 },
                 body: "{}".into(),
             },
-            webhook: "lab".into(),
+            receiver: "lab".into(),
         });
         for ended in &of_one_time[..2] {
             store.log_delivery("lab", &ended.message.delivery).unwrap();
@@ -532,7 +533,7 @@ mod tests {
         // It waits for one of them, who may not have heard of it.
         let added = store.put_messages(&both).unwrap();
         assert_eq!(added[..1], first);
-        let numbers: Vec<_> = added.iter().map(|a| (&*a.webhook, a.number)).collect();
+        let numbers: Vec<_> = added.iter().map(|a| (&*a.receiver, a.number)).collect();
         assert_eq!(numbers, [("a", 1), ("b", 1)]);
         assert_eq!(store.waiting("a").unwrap(), [1]);
         store.put_messages(&[outgoing("a", 2)]).unwrap();
@@ -545,13 +546,13 @@ mod tests {
         assert_eq!(store.deliveries("a").unwrap()[1..], [delivery]);
     }
 
-    /// The webhook was taken out and put in again while a message of before was under way.
+    /// The receiver was taken out and put in again while a message of before was under way.
     #[test]
     fn what_becomes_of_one_message_is_not_taken_for_anothers() {
         let (_folder, store) = open();
         let [before, after] = [outgoing("a", 1), outgoing("a", 2)];
         store.put_messages(std::slice::from_ref(&before)).unwrap();
-        store.forget_other_webhooks(&[]).unwrap();
+        store.forget_other_receivers(&[]).unwrap();
         store.put_messages(std::slice::from_ref(&after)).unwrap();
         let (mut late, waits) = (before.message, after.message);
         late.delivery.attempts = 1;

@@ -73,8 +73,8 @@ fn read_table<K: Key, T: Ord>(
     found.into_iter().collect()
 }
 
-fn owned((webhook, number): (&str, u64)) -> (String, u64) {
-    (webhook.to_owned(), number)
+fn owned((receiver, number): (&str, u64)) -> (String, u64) {
+    (receiver.to_owned(), number)
 }
 
 impl Rows {
@@ -113,17 +113,14 @@ impl Rows {
             let error = decode::<Job>(path, bytes).err();
             sound(format!("the job {id}"), error)
         });
-        self.waiting.retain(|((webhook, number), bytes)| {
+        self.waiting.retain(|((receiver, number), bytes)| {
             let error = decode::<Message>(path, bytes).err();
-            sound(
-                format!("the message {number} to the webhook {webhook}"),
-                error,
-            )
+            sound(format!("the message {number} to {receiver}"), error)
         });
-        self.log.retain(|((webhook, number), bytes)| {
+        self.log.retain(|((receiver, number), bytes)| {
             let error = decode::<Delivery>(path, bytes).err();
             sound(
-                format!("the entry {number} of the log of the webhook {webhook}"),
+                format!("the entry {number} of the log of {receiver}"),
                 error,
             )
         });
@@ -179,8 +176,8 @@ pub(super) fn replace(disk: &dyn Disk, path: &Path, damage: &Damage) -> Result<(
             }
             for (definition, rows) in [(WAITING, &rows.waiting), (LOG, &rows.log)] {
                 let mut table = transaction.open_table(definition)?;
-                for ((webhook, number), bytes) in rows {
-                    table.insert((webhook.as_str(), *number), bytes.as_slice())?;
+                for ((receiver, number), bytes) in rows {
+                    table.insert((receiver.as_str(), *number), bytes.as_slice())?;
                 }
             }
         }

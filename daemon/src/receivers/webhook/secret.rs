@@ -2,9 +2,6 @@
 //! Webhooks specification (standardwebhooks.com), which receivers have libraries for.
 
 use std::fmt;
-use std::fs::{self, File};
-use std::io::{self, Read};
-use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use base64::Engine;
@@ -12,14 +9,12 @@ use base64::engine::general_purpose::STANDARD;
 use hmac::{Hmac, KeyInit, Mac};
 use sha2::Sha256;
 
-use super::FileError;
+use crate::receivers::files::{FileError, read_secret};
 
 /// Begins every secret, so that one that has got about is recognised.
 const PREFIX: &str = "whsec_";
 /// Fewer bytes could be guessed, and more gain nothing: as the specification has it.
 const BYTES: std::ops::RangeInclusive<usize> = 24..=64;
-/// A file with more is no file with a secret.
-const MOST_FILE_BYTES: u64 = 4096;
 
 /// A secret, which never gets into messages.
 #[derive(Clone)]
@@ -39,29 +34,7 @@ impl Secret {
             message: why,
         };
         let shown = path.display();
-        let refused = |error: io::Error| {
-            failed(format!(
-                "cannot read the secret in {shown}: {error}; it must be a file that the user of \
-                 reliefd may read: install -m 600 -o relief -g relief FILE {shown}"
-            ))
-        };
-        // Before it is opened: a pipe might keep whoever does so.
-        let metadata = fs::metadata(path).map_err(refused)?;
-        if !metadata.is_file() {
-            return Err(failed(format!("{shown} is no file")));
-        }
-        let mode = metadata.permissions().mode();
-        if mode & 0o077 != 0 {
-            return Err(failed(format!(
-                "the secret in {shown} may be used by others (mode {:04o}): chmod 600 {shown}, \
-                 and if others could have read it, make another one",
-                mode & 0o7777
-            )));
-        }
-        let mut text = String::new();
-        File::open(path)
-            .and_then(|file| file.take(MOST_FILE_BYTES).read_to_string(&mut text))
-            .map_err(refused)?;
+        let text = read_secret("secret_file", "secret", path)?;
         Self::parse(&text).map_err(|why| {
             failed(format!(
                 "{shown} holds no secret: {why}. Make one with: (umask 077; echo \
@@ -102,7 +75,8 @@ impl Secret {
 
 #[cfg(test)]
 mod tests {
-    use std::fs::Permissions;
+    use std::fs::{self, Permissions};
+    use std::os::unix::fs::PermissionsExt;
 
     use super::*;
 

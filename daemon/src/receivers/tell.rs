@@ -1,4 +1,4 @@
-//! What webhooks are told: from what happens to messages, and to the answers of the API.
+//! What receivers are told: from what happens to messages, and to the answers of the API.
 
 use std::sync::{Mutex, MutexGuard, TryLockError};
 
@@ -10,7 +10,7 @@ use relief_api::{
 use sha2::{Digest, Sha256};
 
 use super::receiver::Verdict;
-use super::{Hook, Webhooks, shown_url};
+use super::{Outbox, Receivers};
 use crate::error::ServiceError;
 use crate::ids::now;
 use crate::service::{Service, lock};
@@ -31,7 +31,7 @@ struct News<'a> {
     about: Option<&'a str>,
 }
 
-fn message(webhook: &str, news: &News<'_>, data: WebhookData) -> Message {
+fn message(receiver: &str, news: &News<'_>, data: WebhookData) -> Message {
     let &News {
         event,
         of,
@@ -45,7 +45,7 @@ fn message(webhook: &str, news: &News<'_>, data: WebhookData) -> Message {
     };
     // Not of all that it says: when a record is kept once more, what goes with it, such as the
     // numbers of jobs, may have changed.
-    let hash = Sha256::digest(format!("{webhook}\n{}\n{at}\n{of}", event.as_str()));
+    let hash = Sha256::digest(format!("{receiver}\n{}\n{at}\n{of}", event.as_str()));
     Message {
         delivery: Delivery {
             id: format!("msg_{}", hexadecimal(&hash[..ID_BYTES])),
@@ -80,24 +80,24 @@ fn latest(mut deliveries: Vec<Delivery>) -> Option<Delivery> {
     deliveries.into_iter().rev().max_by_key(last_try)
 }
 
-impl Hook {
+impl Outbox {
     fn hears(&self, event: WebhookEvent) -> bool {
-        self.receiver().config.events.contains(&event)
+        self.receiver().settings.events.contains(&event)
     }
 }
 
-impl Webhooks {
-    /// A message to each webhook that hears of this.
+impl Receivers {
+    /// A message to each receiver that hears of this.
     fn outgoing(&self, news: &News<'_>, data: impl FnOnce() -> WebhookData) -> Vec<Outgoing> {
-        let mut hooks = self.all();
-        hooks.retain(|hook| hook.hears(news.event));
-        if hooks.is_empty() {
+        let mut outboxes = self.all();
+        outboxes.retain(|outbox| outbox.hears(news.event));
+        if outboxes.is_empty() {
             return Vec::new();
         }
         let data = data();
-        let told = hooks.iter().map(|hook| Outgoing {
-            webhook: hook.name.clone(),
-            message: message(&hook.name, news, data.clone()),
+        let told = outboxes.iter().map(|outbox| Outgoing {
+            receiver: outbox.name.clone(),
+            message: message(&outbox.name, news, data.clone()),
         });
         told.collect()
     }
@@ -163,12 +163,12 @@ impl Webhooks {
         })
     }
 
-    fn hook(&self, name: &str) -> Result<std::sync::Arc<Hook>, ServiceError> {
+    fn outbox(&self, name: &str) -> Result<std::sync::Arc<Outbox>, ServiceError> {
         let all = self.all();
-        let found = all.iter().find(|hook| hook.name == name).cloned();
+        let found = all.iter().find(|outbox| outbox.name == name).cloned();
         found.ok_or_else(|| ServiceError::NoSuchWebhook {
             name: name.to_owned(),
-            known: all.iter().map(|hook| hook.name.clone()).collect(),
+            known: all.iter().map(|outbox| outbox.name.clone()).collect(),
         })
     }
 }
@@ -180,9 +180,9 @@ impl Service {
         scan: &Scan,
         event: WebhookEvent,
     ) -> Result<(), StoreError> {
-        let outgoing = self.webhooks.of_scan(event, scan);
+        let outgoing = self.receivers.of_scan(event, scan);
         let added = self.store.put_scan_telling(scan, &outgoing)?;
-        self.webhooks.added(added);
+        self.receivers.added(added);
         Ok(())
     }
 
@@ -194,13 +194,13 @@ impl Service {
             _ => return self.store.put_job(job),
         };
         let scan = || self.store.scan(&job.scan).ok().flatten();
-        let outgoing = self.webhooks.of_job(event, job, scan);
+        let outgoing = self.receivers.of_job(event, job, scan);
         let added = self.store.put_job_telling(job, &outgoing)?;
-        self.webhooks.added(added);
+        self.receivers.added(added);
         Ok(())
     }
 
-    /// Notes how a scanner does, and tells the webhooks if that is new trouble.
+    /// Notes how a scanner does, and tells the receivers if that is new trouble.
     pub(crate) fn note_scanner(
         &self,
         station: &Station,
@@ -211,28 +211,29 @@ impl Service {
             return;
         };
         if status.link == ScannerLink::Trouble {
-            let outgoing = self.webhooks.of_trouble(station.name(), &status);
+            let outgoing = self.receivers.of_trouble(station.name(), &status);
             match self.store.put_messages(&outgoing) {
-                Ok(added) => self.webhooks.added(added),
+                Ok(added) => self.receivers.added(added),
                 Err(error) => {
-                    tracing::error!(scanner = station.name(), %error, "webhooks are not told");
+                    tracing::error!(scanner = station.name(), %error, "receivers are not told");
                 }
             }
         }
         self.hub.tell(Event::Scanner(status));
     }
 
-    /// The webhooks, and how they do.
+    /// The receivers, and how they do.
     pub(crate) fn list_webhooks(&self) -> Result<Vec<Webhook>, ServiceError> {
         let mut list = Vec::new();
-        for hook in self.webhooks.all() {
-            let latest = latest(self.store.deliveries(&hook.name)?);
-            let config = &hook.receiver().config;
-            let state = lock(&hook.state);
+        for outbox in self.receivers.all() {
+            let latest = latest(self.store.deliveries(&outbox.name)?);
+            let settings = &outbox.receiver().settings;
+            let state = lock(&outbox.state);
             list.push(Webhook {
-                name: hook.name.clone(),
-                url: shown_url(&config.url),
-                events: config.events.clone(),
+                name: outbox.name.clone(),
+                kind: settings.kind,
+                url: settings.shown.clone(),
+                events: settings.events.clone(),
                 waiting: state.due.len(),
                 dropped: state.dropped,
                 latest,
@@ -241,17 +242,17 @@ impl Service {
         Ok(list)
     }
 
-    /// The log of a webhook, newest first.
-    pub(crate) fn deliveries(&self, webhook: &str) -> Result<Vec<Delivery>, ServiceError> {
-        let hook = self.webhooks.hook(webhook)?;
-        Ok(self.store.deliveries(&hook.name)?)
+    /// The log of a receiver, newest first.
+    pub(crate) fn deliveries(&self, name: &str) -> Result<Vec<Delivery>, ServiceError> {
+        let outbox = self.receivers.outbox(name)?;
+        Ok(self.store.deliveries(&outbox.name)?)
     }
 
     /// Sends a test at once, once, and waits for what comes back.
     pub(crate) fn test_webhook(&self, name: &str) -> Result<Delivery, ServiceError> {
         self.check_running()?;
-        let hook = self.webhooks.hook(name)?;
-        let Some(_alone) = alone(&hook.testing) else {
+        let outbox = self.receivers.outbox(name)?;
+        let Some(_alone) = alone(&outbox.testing) else {
             return Err(ServiceError::WebhookBusy {
                 name: name.to_owned(),
             });
@@ -266,8 +267,9 @@ impl Service {
             at: &now(),
             about: None,
         };
-        let Message { mut delivery, body } = message(name, &news, data);
-        let (tried, verdict) = hook.receiver().post(&delivery.id, &body);
+        let message = message(name, &news, data);
+        let (tried, verdict) = outbox.receiver().attempt(&message);
+        let mut delivery = message.delivery;
         delivery.attempts = 1;
         delivery.tried.push(tried);
         delivery.state = match verdict {
@@ -276,7 +278,7 @@ impl Service {
         };
         // Who asked for it hears of it anyway.
         if let Err(error) = self.store.log_delivery(name, &delivery) {
-            tracing::warn!(webhook = name, %error, "cannot keep the outcome of a test");
+            tracing::warn!(receiver = name, %error, "cannot keep the outcome of a test");
         }
         Ok(delivery)
     }
@@ -291,11 +293,11 @@ mod tests {
     use storage::LocalDisk;
 
     use super::*;
-    use crate::config::WebhookConfig;
+    use crate::config::{Config, WebhookConfig};
     use crate::store::Store;
 
-    /// Webhooks of which one is told of everything, and a store.
-    fn webhooks() -> (tempfile::TempDir, Webhooks, Store) {
+    /// Receivers of which one is told of everything, and a store.
+    fn webhooks() -> (tempfile::TempDir, Receivers, Store) {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("secret");
         fs::write(&file, "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw").unwrap();
@@ -303,7 +305,11 @@ mod tests {
         let store = Store::open(Arc::new(LocalDisk), &folder.path().join("store")).unwrap();
         let mut config = WebhookConfig::new("lab", "http://127.0.0.1:9/", file);
         config.events = WebhookEvent::CHOICES.to_vec();
-        let webhooks = Webhooks::open(&[config], &store).unwrap();
+        let config = Config {
+            webhooks: vec![config],
+            ..Config::default()
+        };
+        let webhooks = Receivers::open(&config, &store).unwrap();
         (folder, webhooks, store)
     }
 

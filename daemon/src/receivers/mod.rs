@@ -1,21 +1,25 @@
-//! Webhooks: messages to other programs when something is done.
+//! Receivers of messages: who is told when something is done, and how.
 //!
 //! ```text
-//! a scan's or job's record --one transaction--> message that waits --> thread of the webhook
+//! a scan's or job's record --one transaction--> message that waits --> thread of the receiver
 //!                                                      ^                       |
 //!                                                      '-- tried again later --+--> log
 //! ```
 //!
 //! A message is on disk before it is tried, so that it is delivered at least once, whatever
-//! becomes of the service meanwhile. Each webhook has a thread of its own, which alone waits for
-//! its receiver.
+//! becomes of the service meanwhile. Each receiver has a thread of its own, which alone waits for
+//! it.
+//!
+//! What keeps, tries again, logs and tests messages knows no kind of receiver. A kind is a
+//! [`receiver::Way`] in a module of its own, which [`make_all`] makes of its sections of the
+//! configuration.
 
 mod backoff;
 mod deliver;
+mod files;
 mod receiver;
-mod secret;
-mod shown;
 mod tell;
+mod webhook;
 mod words;
 
 use std::collections::BTreeMap;
@@ -24,44 +28,29 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, RwLock};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use crate::config::WebhookConfig;
+use relief_api::WebhookKind;
+
+use crate::config::Config;
 use crate::service::{Service, lock};
 use crate::store::{Added, Store, StoreError};
+pub(crate) use files::FileError;
 use receiver::Receiver;
-pub(crate) use shown::shown_url;
+pub(crate) use webhook::{check_files, shown_url};
 use words::warn_without_network;
 
 /// How long the end of the service waits for an attempt that is under way. Its message is tried
 /// again after the next start.
 const FAREWELL: Duration = Duration::from_secs(3);
 
-/// A file that a webhook names cannot be used.
+/// Those who are told cannot be.
 #[derive(Debug, thiserror::Error)]
-#[error("{message}")]
-pub(crate) struct FileError {
-    /// The key that names it.
-    key: &'static str,
-    message: String,
-}
-
-impl FileError {
-    pub(crate) fn key(&self) -> &'static str {
-        self.key
-    }
-}
-
-/// Looks at the files that a webhook names.
-pub(crate) fn check_files(config: &WebhookConfig) -> Result<(), FileError> {
-    Receiver::read_files(config).map(drop)
-}
-
-/// The webhooks cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum WebhookError {
+pub enum ReceiverError {
     /// A file does not work.
-    #[error("webhook {name}: {message}")]
+    #[error("{} {name}: {message}", .kind.as_str())]
     File {
-        /// The webhook.
+        /// What the receiver is.
+        kind: WebhookKind,
+        /// The receiver.
         name: String,
         /// What is wrong and what to do.
         message: String,
@@ -71,15 +60,35 @@ pub enum WebhookError {
     Store(#[from] StoreError),
 }
 
-/// The webhooks of the service.
-#[derive(Debug, Default)]
-pub(crate) struct Webhooks {
-    /// In the order of the configuration.
-    hooks: RwLock<Vec<Arc<Hook>>>,
+/// Makes the receivers of a configuration, in its order.
+fn make_all(config: &Config) -> Result<Vec<Receiver>, ReceiverError> {
+    let mut made = Vec::new();
+    for config in &config.webhooks {
+        let receiver = webhook::receiver(config);
+        made.push(receiver.map_err(failed(WebhookKind::Webhook, &config.name))?);
+    }
+    Ok(made)
 }
 
-/// A webhook.
-pub(crate) struct Hook {
+/// Says whose file it is that does not work.
+fn failed(kind: WebhookKind, name: &str) -> impl FnOnce(FileError) -> ReceiverError {
+    let name = name.to_owned();
+    move |error| ReceiverError::File {
+        kind,
+        name,
+        message: error.to_string(),
+    }
+}
+
+/// All who are told.
+#[derive(Debug, Default)]
+pub(crate) struct Receivers {
+    /// In the order of the configuration.
+    outboxes: RwLock<Vec<Arc<Outbox>>>,
+}
+
+/// A receiver, and what waits for it.
+pub(crate) struct Outbox {
     name: String,
     state: Mutex<State>,
     changed: Condvar,
@@ -95,24 +104,24 @@ struct State {
     due: BTreeMap<u64, Instant>,
     /// Messages that had to make room since the service started.
     dropped: u64,
-    /// The service ends, or the webhook is not configured any more.
+    /// The service ends, or the receiver is not configured any more.
     ended: bool,
     /// Its thread has ended.
     gone: bool,
 }
 
-impl fmt::Debug for Hook {
+impl fmt::Debug for Outbox {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Hook")
+        f.debug_struct("Outbox")
             .field("name", &self.name)
             .finish_non_exhaustive()
     }
 }
 
-impl Hook {
+impl Outbox {
     fn new(receiver: Receiver) -> Self {
         Self {
-            name: receiver.config.name.clone(),
+            name: receiver.settings.name.clone(),
             state: Mutex::new(State {
                 receiver: Arc::new(receiver),
                 due: BTreeMap::new(),
@@ -135,7 +144,7 @@ impl Hook {
         Arc::clone(&lock(&self.state).receiver)
     }
 
-    /// Waits for the message that is due next. None once the webhook has ended.
+    /// Waits for the message that is due next. None once the receiver has ended.
     fn next(&self) -> Option<u64> {
         let mut state = lock(&self.state);
         loop {
@@ -159,7 +168,7 @@ impl Hook {
         }
     }
 
-    /// Waits, and tells whether the webhook has ended.
+    /// Waits, and tells whether the receiver has ended.
     fn wait_for_end(&self, longest: Duration) -> bool {
         let state = lock(&self.state);
         self.wait_while(state, longest, |state| !state.ended).ended
@@ -186,80 +195,80 @@ impl Hook {
         let state = self.wait_while(lock(&self.state), longest, |state| !state.gone);
         if !state.gone {
             tracing::warn!(
-                webhook = self.name,
+                receiver = self.name,
                 "the receiver has not answered yet: the message is tried again after the next start"
             );
             return;
         }
         drop(state);
         if thread.join().is_err() {
-            tracing::error!(webhook = self.name, "a thread ended by a panic");
+            tracing::error!(receiver = self.name, "a thread ended by a panic");
         }
     }
 }
 
-impl Webhooks {
-    /// The webhooks as they are configured, with the messages that wait for them.
-    pub(crate) fn open(configs: &[WebhookConfig], store: &Store) -> Result<Self, WebhookError> {
-        let webhooks = Self::default();
-        webhooks.replace(configs, store)?;
-        if !configs.is_empty() {
+impl Receivers {
+    /// The receivers as they are configured, with the messages that wait for them.
+    pub(crate) fn open(config: &Config, store: &Store) -> Result<Self, ReceiverError> {
+        let receivers = Self::default();
+        receivers.replace(config, store)?;
+        if !receivers.all().is_empty() {
             warn_without_network();
         }
-        Ok(webhooks)
+        Ok(receivers)
     }
 
     /// Takes over a configuration. What waits is tried at once: somebody may have mended what
     /// was wrong.
-    fn replace(&self, configs: &[WebhookConfig], store: &Store) -> Result<(), WebhookError> {
-        let mut receivers = Vec::new();
-        for config in configs {
-            let receiver = Receiver::new(config).map_err(|error| WebhookError::File {
-                name: config.name.clone(),
-                message: error.to_string(),
-            })?;
-            receivers.push(receiver);
-        }
-        let known: Vec<&str> = configs.iter().map(|config| config.name.as_str()).collect();
+    fn replace(&self, config: &Config, store: &Store) -> Result<(), ReceiverError> {
+        let receivers = make_all(config)?;
+        let known: Vec<String> = receivers
+            .iter()
+            .map(|receiver| receiver.settings.name.clone())
+            .collect();
+        let known: Vec<&str> = known.iter().map(String::as_str).collect();
         let earlier = self.all();
-        let mut hooks = Vec::new();
+        let mut outboxes = Vec::new();
         for receiver in receivers {
             let same = earlier
                 .iter()
-                .find(|hook| hook.name == receiver.config.name);
+                .find(|outbox| outbox.name == receiver.settings.name);
             match same {
-                Some(hook) => {
-                    hook.change(|state| state.receiver = Arc::new(receiver));
-                    hooks.push(Arc::clone(hook));
+                Some(outbox) => {
+                    outbox.change(|state| state.receiver = Arc::new(receiver));
+                    outboxes.push(Arc::clone(outbox));
                 }
-                None => hooks.push(Arc::new(Hook::new(receiver))),
+                None => outboxes.push(Arc::new(Outbox::new(receiver))),
             }
         }
         // Before what waits is looked for, so that no message comes between the two.
-        *self.hooks.write().unwrap_or_else(PoisonError::into_inner) = hooks;
+        *self
+            .outboxes
+            .write()
+            .unwrap_or_else(PoisonError::into_inner) = outboxes;
         // Whatever the disk says next: nobody would find them again.
-        for hook in earlier {
-            if !known.contains(&hook.name.as_str()) {
-                hook.change(|state| state.ended = true);
+        for outbox in earlier {
+            if !known.contains(&outbox.name.as_str()) {
+                outbox.change(|state| state.ended = true);
             }
         }
-        for hook in self.all() {
-            let numbers = store.waiting(&hook.name)?;
+        for outbox in self.all() {
+            let numbers = store.waiting(&outbox.name)?;
             let now = Instant::now();
-            hook.change(|state| state.due.extend(numbers.into_iter().map(|n| (n, now))));
+            outbox.change(|state| state.due.extend(numbers.into_iter().map(|n| (n, now))));
         }
-        for (webhook, messages) in store.forget_other_webhooks(&known)? {
+        for (receiver, messages) in store.forget_other_receivers(&known)? {
             tracing::warn!(
-                webhook,
+                receiver,
                 messages,
-                "messages are given up, since their webhook is not configured any more"
+                "messages are given up, since their receiver is not configured any more"
             );
         }
         Ok(())
     }
 
-    fn all(&self) -> Vec<Arc<Hook>> {
-        self.hooks
+    fn all(&self) -> Vec<Arc<Outbox>> {
+        self.outboxes
             .read()
             .unwrap_or_else(PoisonError::into_inner)
             .clone()
@@ -267,19 +276,19 @@ impl Webhooks {
 
     /// Messages are on disk: their turn comes.
     pub(crate) fn added(&self, added: Vec<Added>) {
-        let hooks = self.all();
+        let outboxes = self.all();
         for added in added {
-            let Some(hook) = hooks.iter().find(|hook| hook.name == added.webhook) else {
+            let Some(outbox) = outboxes.iter().find(|outbox| outbox.name == added.receiver) else {
                 continue;
             };
-            hook.change(|state| {
+            outbox.change(|state| {
                 // One that was kept already may have to wait.
                 state.due.entry(added.number).or_insert_with(Instant::now);
                 for number in &added.dropped {
                     state.due.remove(number);
                     state.dropped += 1;
                     tracing::warn!(
-                        webhook = hook.name,
+                        receiver = outbox.name,
                         dropped = state.dropped,
                         "the oldest message had to make room: too many wait for the receiver"
                     );
@@ -290,29 +299,38 @@ impl Webhooks {
 
     /// No attempt is begun any more.
     pub(crate) fn stop(&self) {
-        for hook in self.all() {
-            hook.change(|state| state.ended = true);
+        for outbox in self.all() {
+            outbox.change(|state| state.ended = true);
         }
     }
 
     /// Waits for the end of all threads, unless that takes too long.
     pub(crate) fn join(&self) {
         let until = Instant::now() + FAREWELL;
-        for hook in self.all() {
-            hook.join(until);
+        for outbox in self.all() {
+            outbox.join(until);
         }
     }
 }
 
-/// Gives each webhook that has none its thread.
+/// Of a receiver's thread, and of its pulse.
+fn thread_name(outbox: &Outbox) -> String {
+    format!(
+        "{} {}",
+        outbox.receiver().settings.kind.as_str(),
+        outbox.name
+    )
+}
+
+/// Gives each receiver that has none its thread.
 pub(crate) fn begin_all(service: &Arc<Service>) -> std::io::Result<()> {
-    for hook in service.webhooks.all() {
-        let mut thread = lock(&hook.thread);
+    for outbox in service.receivers.all() {
+        let mut thread = lock(&outbox.thread);
         if thread.is_none() {
-            let (service, hook) = (Arc::clone(service), Arc::clone(&hook));
+            let (service, outbox) = (Arc::clone(service), Arc::clone(&outbox));
             let begun = std::thread::Builder::new()
-                .name(format!("webhook {}", hook.name))
-                .spawn(move || deliver::deliver(&service, &hook))?;
+                .name(thread_name(&outbox))
+                .spawn(move || deliver::deliver(&service, &outbox))?;
             *thread = Some(begun);
         }
     }
@@ -320,11 +338,11 @@ pub(crate) fn begin_all(service: &Arc<Service>) -> std::io::Result<()> {
 }
 
 /// Takes over a configuration that has been read again.
-pub(crate) fn reload(service: &Arc<Service>, configs: &[WebhookConfig]) {
-    if let Err(error) = service.webhooks.replace(configs, &service.store) {
-        tracing::error!(%error, "cannot take over the webhooks");
+pub(crate) fn reload(service: &Arc<Service>, config: &Config) {
+    if let Err(error) = service.receivers.replace(config, &service.store) {
+        tracing::error!(%error, "cannot take over who is told");
     }
     if let Err(error) = begin_all(service) {
-        tracing::error!(%error, "cannot start a thread: a webhook waits for the next reload");
+        tracing::error!(%error, "cannot start a thread: a receiver waits for the next reload");
     }
 }

@@ -1,4 +1,4 @@
-//! The thread of a webhook: it delivers message after message, until the webhook ends.
+//! The thread of a receiver: it delivers message after message, until the receiver ends.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use relief_api::{Delivery, DeliveryAttempt, DeliveryState};
 
 use super::receiver::Verdict;
-use super::{Hook, backoff};
+use super::{Outbox, backoff, thread_name};
 use crate::config::Retry;
 use crate::ids::at;
 use crate::liveness::Pulse;
@@ -22,7 +22,7 @@ const RESERVE: Duration = Duration::from_secs(60);
 const MOST_TRIED: usize = 30;
 
 /// Says that the thread has ended, however it does.
-struct Gone<'a>(&'a Hook);
+struct Gone<'a>(&'a Outbox);
 
 impl Drop for Gone<'_> {
     fn drop(&mut self) {
@@ -30,56 +30,61 @@ impl Drop for Gone<'_> {
     }
 }
 
-/// Delivers until the webhook ends. Runs on a thread of its own.
-pub(super) fn deliver(service: &Arc<Service>, hook: &Arc<Hook>) {
-    let _gone = Gone(hook);
-    let pulse = service.liveness.begin(format!("webhook {}", hook.name));
-    while let Some(number) = hook.next() {
-        let settled = attempt(service, hook, number, &pulse);
+/// Delivers until the receiver ends. Runs on a thread of its own.
+pub(super) fn deliver(service: &Arc<Service>, outbox: &Arc<Outbox>) {
+    let _gone = Gone(outbox);
+    let pulse = service.liveness.begin(thread_name(outbox));
+    while let Some(number) = outbox.next() {
+        let settled = attempt(service, outbox, number, &pulse);
         pulse.rest();
         let Err(error) = settled else { continue };
         tracing::error!(
-            webhook = hook.name,
+            receiver = outbox.name,
             %error,
             "cannot read or keep what becomes of a message; trying again"
         );
-        if hook.wait_for_end(DISK_RETRY) {
+        if outbox.wait_for_end(DISK_RETRY) {
             return;
         }
     }
 }
 
 /// Tries a message once, and keeps what became of it.
-fn attempt(service: &Service, hook: &Hook, number: u64, pulse: &Pulse) -> Result<(), StoreError> {
+fn attempt(
+    service: &Service,
+    outbox: &Outbox,
+    number: u64,
+    pulse: &Pulse,
+) -> Result<(), StoreError> {
     let forget = || {
-        hook.change(|state| {
+        outbox.change(|state| {
             state.due.remove(&number);
         });
     };
     pulse.work(RESERVE);
-    let Some(mut message) = service.store.message(&hook.name, number)? else {
+    let Some(mut message) = service.store.message(&outbox.name, number)? else {
         // It had to make room.
         forget();
         return Ok(());
     };
-    let receiver = hook.receiver();
-    pulse.work(receiver.config.timeout() + RESERVE);
-    let (tried, verdict) = receiver.post(&message.delivery.id, &message.body);
-    let again_in = settle(&mut message, tried, verdict, &receiver.config.retry);
-    tell(hook, &message.delivery);
+    let receiver = outbox.receiver();
+    pulse.work(receiver.settings.timeout + RESERVE);
+    let (tried, verdict) = receiver.attempt(&message);
+    let again_in = settle(&mut message, tried, verdict, &receiver.settings.retry);
+    tell(outbox, &message.delivery);
     // What came of an attempt is not forgotten because the disk refuses it: the receiver would be
     // told once more for each time that this is tried again.
-    while let Err(error) = keep(service, hook, number, &message) {
+    while let Err(error) = keep(service, outbox, number, &message) {
         // The disk may refuse for long, and no scan is to end for that.
         pulse.rest();
-        if matches!(error, StoreError::Closed { .. }) || hook.wait_for_end(DISK_RETRY) {
+        if matches!(error, StoreError::Closed { .. }) || outbox.wait_for_end(DISK_RETRY) {
             return Err(error);
         }
-        tracing::warn!(webhook = hook.name, %error, "cannot keep what became of a message yet");
+        tracing::warn!(receiver = outbox.name, %error, "cannot keep what became of a message yet");
         pulse.work(RESERVE);
     }
     match again_in {
-        Some(wait) => hook.change(|state| {
+        Some(wait) => outbox.change(|state| {
             // Unless it had to make room meanwhile.
             if let Some(due) = state.due.get_mut(&number) {
                 *due = Instant::now() + wait;
@@ -90,12 +95,17 @@ fn attempt(service: &Service, hook: &Hook, number: u64, pulse: &Pulse) -> Result
     Ok(())
 }
 
-fn keep(service: &Service, hook: &Hook, number: u64, message: &Message) -> Result<(), StoreError> {
+fn keep(
+    service: &Service,
+    outbox: &Outbox,
+    number: u64,
+    message: &Message,
+) -> Result<(), StoreError> {
     match message.delivery.state {
-        DeliveryState::Waiting => service.store.keep_attempt(&hook.name, number, message),
+        DeliveryState::Waiting => service.store.keep_attempt(&outbox.name, number, message),
         _ => service
             .store
-            .end_message(&hook.name, number, &message.delivery),
+            .end_message(&outbox.name, number, &message.delivery),
     }
 }
 
@@ -132,53 +142,49 @@ fn settle(
 }
 
 /// Puts the outcome into the service's log.
-fn tell(hook: &Hook, delivery: &Delivery) {
+fn tell(outbox: &Outbox, delivery: &Delivery) {
     let (event, attempts) = (delivery.event.as_str(), delivery.attempts);
     let error = delivery.tried.last().and_then(|tried| tried.error.clone());
     let error = error.unwrap_or_default();
     match delivery.state {
         DeliveryState::Delivered => {
-            tracing::info!(webhook = hook.name, event, attempts, "webhook told");
+            tracing::info!(receiver = outbox.name, event, attempts, "receiver told");
         }
         DeliveryState::Waiting => tracing::warn!(
-            webhook = hook.name,
+            receiver = outbox.name,
             event,
             attempts,
             %error,
             next = delivery.next_attempt_at,
-            "webhook not told yet"
+            "receiver not told yet"
         ),
         DeliveryState::GivenUp | DeliveryState::Dropped => tracing::error!(
-            webhook = hook.name,
+            receiver = outbox.name,
             event,
             attempts,
             %error,
-            "webhook not told, and given up"
+            "receiver not told, and given up"
         ),
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-    use std::os::unix::fs::PermissionsExt;
     use std::sync::atomic::{AtomicBool, Ordering};
     use std::sync::mpsc;
 
-    use relief_api::WebhookEvent;
+    use relief_api::{WebhookEvent, WebhookKind};
     use storage::LocalDisk;
-    use ureq::Body;
-    use ureq::http::{Request, Response};
 
     use super::*;
-    use crate::config::{Config, WebhookConfig};
+    use crate::config::{Config, Retry};
     use crate::events::Hub;
+    use crate::receivers::Receivers;
+    use crate::receivers::receiver::{Receiver, Settings, Way};
     use crate::service::Kept;
     use crate::spool::Spool;
     use crate::store::{Outgoing, Store};
     use crate::tokens::Tokens;
-    use crate::webhooks::Webhooks;
-    use crate::webhooks::receiver::{Carrier, Receiver};
 
     /// Far longer than anything takes that should happen.
     const LIMIT: Duration = Duration::from_secs(60);
@@ -189,14 +195,13 @@ mod tests {
         ids: mpsc::Sender<String>,
     }
 
-    impl Carrier for Defect {
-        fn carry(&self, request: Request<&str>) -> Result<Response<Body>, ureq::Error> {
-            let id = request.headers()["webhook-id"].to_str().unwrap();
-            self.ids.send(id.to_owned()).unwrap();
+    impl Way for Defect {
+        fn deliver(&self, message: &Message, _: &mut DeliveryAttempt) -> Verdict {
+            self.ids.send(message.delivery.id.clone()).unwrap();
             if !self.was_met.swap(true, Ordering::AcqRel) {
                 std::panic::resume_unwind(Box::new("on\npurpose"));
             }
-            Ok(Response::new(Body::builder().data("")))
+            Verdict::Delivered
         }
     }
 
@@ -206,7 +211,7 @@ mod tests {
             store: Store::open(Arc::new(LocalDisk), &folder.join("store")).unwrap(),
             spool: Spool::open(Arc::new(LocalDisk), &folder.join("spool")).unwrap(),
             tokens: Tokens::open(Arc::new(LocalDisk), &folder.join("tokens.json")).unwrap(),
-            webhooks: Webhooks::default(),
+            receivers: Receivers::default(),
         };
         let (config, hub) = (Config::default(), Arc::new(Hub::default()));
         Arc::new(Service::new(config, Vec::new(), hub, kept, folder.into()))
@@ -214,7 +219,7 @@ mod tests {
 
     fn outgoing(id: &str) -> Outgoing {
         Outgoing {
-            webhook: "lab".into(),
+            receiver: "lab".into(),
             message: Message {
                 delivery: Delivery {
                     id: id.into(),
@@ -235,29 +240,33 @@ mod tests {
     fn a_defect_costs_one_attempt_and_not_the_service() {
         let folder = tempfile::tempdir().unwrap();
         let service = service(folder.path());
-        let file = folder.path().join("secret");
-        fs::write(&file, "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw").unwrap();
-        fs::set_permissions(&file, fs::Permissions::from_mode(0o600)).unwrap();
-        let mut config = WebhookConfig::new("lab", "http://127.0.0.1:9/", file);
-        config.retry.first = Duration::ZERO;
         let (ids, told) = mpsc::channel();
         let was_met = AtomicBool::new(false);
-        let receiver = Receiver::new(&config)
-            .unwrap()
-            .over(Defect { was_met, ids });
-        let hook = Arc::new(Hook::new(receiver));
+        let settings = Settings {
+            name: "lab".into(),
+            kind: WebhookKind::Webhook,
+            shown: String::new(),
+            events: Vec::new(),
+            timeout: LIMIT,
+            retry: Retry {
+                first: Duration::ZERO,
+                ..Retry::default()
+            },
+        };
+        let receiver = Receiver::new(settings, Defect { was_met, ids });
+        let outbox = Arc::new(Outbox::new(receiver));
         let both = [outgoing("msg_1"), outgoing("msg_2")];
         for added in service.store.put_messages(&both).unwrap() {
-            hook.change(|state| {
+            outbox.change(|state| {
                 state.due.insert(added.number, Instant::now());
             });
         }
         let thread = std::thread::spawn({
-            let (service, hook) = (Arc::clone(&service), Arc::clone(&hook));
-            move || deliver(&service, &hook)
+            let (service, outbox) = (Arc::clone(&service), Arc::clone(&outbox));
+            move || deliver(&service, &outbox)
         });
         let mut ids: Vec<String> = (0..3).map(|_| told.recv_timeout(LIMIT).unwrap()).collect();
-        hook.change(|state| state.ended = true);
+        outbox.change(|state| state.ended = true);
         thread.join().unwrap();
         // A watchdog is content.
         assert_eq!(service.liveness.check(Instant::now()), Ok(()));

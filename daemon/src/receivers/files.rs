@@ -1,0 +1,155 @@
+//! Files that receivers name: secrets, and certificates.
+
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+
+use rustls::pki_types::CertificateDer;
+use rustls::pki_types::pem::PemObject;
+
+/// A file with more is no file with a secret.
+const MOST_SECRET_BYTES: u64 = 4096;
+/// A file with more is no file of certificates.
+const MOST_CA_BYTES: u64 = 1 << 20;
+
+/// A file that a receiver names cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[error("{message}")]
+pub(crate) struct FileError {
+    /// The key that names it.
+    pub(super) key: &'static str,
+    pub(super) message: String,
+}
+
+impl FileError {
+    pub(crate) fn key(&self) -> &'static str {
+        self.key
+    }
+}
+
+/// Reads a secret from a file that is the service's own. `what` says in a word what it is.
+pub(super) fn read_secret(key: &'static str, what: &str, path: &Path) -> Result<String, FileError> {
+    let failed = |message: String| FileError { key, message };
+    let shown = path.display();
+    let refused = |error: io::Error| {
+        failed(format!(
+            "cannot read the {what} in {shown}: {error}; it must be a file that the user of \
+             reliefd may read: install -m 600 -o relief -g relief FILE {shown}"
+        ))
+    };
+    // Before it is opened: a pipe might keep whoever does so.
+    let metadata = fs::metadata(path).map_err(refused)?;
+    if !metadata.is_file() {
+        return Err(failed(format!("{shown} is no file")));
+    }
+    let mode = metadata.permissions().mode();
+    if mode & 0o077 != 0 {
+        return Err(failed(format!(
+            "the {what} in {shown} may be used by others (mode {:04o}): chmod 600 {shown}, and if \
+             others could have read it, make another one",
+            mode & 0o7777
+        )));
+    }
+    let mut text = String::new();
+    File::open(path)
+        .and_then(|file| file.take(MOST_SECRET_BYTES).read_to_string(&mut text))
+        .map_err(refused)?;
+    Ok(text)
+}
+
+/// The certificates in a file.
+pub(super) fn authorities_in(path: &Path) -> Result<Vec<CertificateDer<'static>>, FileError> {
+    let failed = |message: String| FileError {
+        key: "ca_file",
+        message,
+    };
+    let shown = path.display();
+    let unread =
+        |error: io::Error| failed(format!("cannot read the certificates in {shown}: {error}"));
+    // Before it is opened: a pipe might keep whoever does so.
+    if !fs::metadata(path).map_err(unread)?.is_file() {
+        return Err(failed(format!(
+            "{shown} is no file: name one with the certificate of the authority"
+        )));
+    }
+    let mut text = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(MOST_CA_BYTES).read_to_end(&mut text))
+        .map_err(unread)?;
+    let found: Vec<CertificateDer<'static>> = CertificateDer::pem_slice_iter(&text)
+        .collect::<Result<_, _>>()
+        .map_err(|error| failed(format!("{shown} holds no PEM certificates: {error}")))?;
+    if found.is_empty() {
+        return Err(failed(format!(
+            "{shown} holds no PEM certificate (BEGIN CERTIFICATE): name the file with that of the \
+             authority"
+        )));
+    }
+    Ok(found)
+}
+
+/// Those that the machine trusts, as they are now.
+pub(super) fn authorities_of_the_machine() -> Vec<CertificateDer<'static>> {
+    let found = rustls_native_certs::load_native_certs();
+    for error in &found.errors {
+        tracing::warn!(%error, "cannot read a certificate of an authority");
+    }
+    found.certs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_certificates_hold_some() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("ca.pem");
+        let refused = || authorities_in(&path).map(|found| found.len()).unwrap_err();
+        assert!(
+            refused()
+                .to_string()
+                .contains("cannot read the certificates in")
+        );
+        assert_eq!(refused().key, "ca_file");
+        for text in [
+            "",
+            "nothing",
+            "-----BEGIN CERTIFICATE-----\n!\n-----END CERTIFICATE-----\n",
+        ] {
+            std::fs::write(&path, text).unwrap();
+            let error = refused().to_string();
+            assert!(error.contains("holds no PEM certificate"), "{error}");
+        }
+        assert!(
+            authorities_in(folder.path())
+                .unwrap_err()
+                .to_string()
+                .contains("is no file")
+        );
+        let own = rcgen::generate_simple_self_signed(["a.example".to_owned()]).unwrap();
+        std::fs::write(&path, own.cert.pem().repeat(2)).unwrap();
+        assert_eq!(authorities_in(&path).unwrap().len(), 2);
+    }
+
+    #[test]
+    fn a_pipe_in_place_of_certificates_keeps_nobody() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("ca.pem");
+        let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RWXU);
+        rustix::fs::mknodat(rustix::fs::CWD, &path, kind, mode, 0).unwrap();
+        // Whoever did open it would find that it ends, and say so.
+        let ends = std::thread::spawn({
+            let path = path.clone();
+            move || File::options().write(true).open(path).map(drop)
+        });
+        let error = authorities_in(&path).unwrap_err();
+        // Whoever opens both ends waits for nobody, and the other need not wait any more.
+        let both = File::options().read(true).write(true).open(&path).unwrap();
+        ends.join().unwrap().unwrap();
+        drop(both);
+        assert!(error.to_string().contains("is no file"), "{error}");
+        assert_eq!(error.key, "ca_file");
+    }
+}
