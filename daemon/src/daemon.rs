@@ -239,6 +239,12 @@ impl Daemon {
                 .name("tidy".into())
                 .spawn(move || tidy(&service))?,
         );
+        let service = Arc::clone(&self.service);
+        self.threads.push(
+            std::thread::Builder::new()
+                .name("show".into())
+                .spawn(move || receivers::show(&service))?,
+        );
         for station in &self.service.stations {
             let (service, station) = (Arc::clone(&self.service), Arc::clone(station));
             self.threads.push(

@@ -7,6 +7,7 @@ mod fillings;
 mod fuzz;
 mod instructions;
 mod judge;
+mod notify;
 mod peers;
 mod reproduce;
 mod rules;
@@ -64,6 +65,10 @@ enum Chore {
     ///
     /// Needs Python 3; installs the judge's packages into `target/judges`.
     JudgeSolids(solids::Options),
+    /// Let a broker that is not ours, mosquitto, judge what the service publishes.
+    ///
+    /// Needs mosquitto and its clients, which it installs on Debian as root.
+    JudgeNotify,
     /// Let a browser run the story of a scan on the web page, schemathesis ask the API for everything
     /// that its description allows, and the integrator's examples run.
     ///
@@ -132,6 +137,7 @@ fn main() -> anyhow::Result<()> {
         Chore::JudgeToolpath(options) => toolpath::run(&options),
         Chore::JudgeFill(options) => fillings::run(&options),
         Chore::JudgeSolids(options) => solids::run(&options),
+        Chore::JudgeNotify => notify::judge(),
         Chore::JudgeWeb(options) => web::run(&options),
         Chore::Reproduce(options) => reproduce::run(&options),
         Chore::Fuzz(options) => fuzz::run(&options),
@@ -215,6 +221,7 @@ fn full() -> anyhow::Result<()> {
         })?;
     }
     solids::run(&solids::Options { parts: 500 })?;
+    notify::judge()?;
     web::run(&web::Options {
         seconds: 300,
         seed: 1,

@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::job::Job;
+use crate::laser::LaserState;
 use crate::scan::Scan;
-use crate::status::ScannerStatus;
+use crate::status::{ScannerLink, ScannerStatus};
 
 /// How a receiver of messages is reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, utoipa::ToSchema)]
@@ -13,6 +14,8 @@ pub enum WebhookKind {
     /// Messages are posted to a URL, signed.
     #[default]
     Webhook,
+    /// Messages are published to a broker, by MQTT.
+    Mqtt,
     /// Of a kind that this version does not know; never sent.
     #[serde(other)]
     Unknown,
@@ -24,6 +27,7 @@ impl WebhookKind {
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Webhook => "webhook",
+            Self::Mqtt => "mqtt",
             Self::Unknown => "unknown",
         }
     }
@@ -120,6 +124,30 @@ pub struct WebhookData {
     pub webhook: Option<String>,
 }
 
+/// How a scanner is, as brokers keep it (`PREFIX/scanners/NAME/state`).
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
+pub struct ScannerState {
+    /// Its name.
+    pub name: String,
+    /// How the service stands with it.
+    pub link: ScannerLink,
+    /// Its laser; absent until the scanner was first asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub laser: Option<LaserState>,
+    /// What is wrong, when something is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub problem: Option<String>,
+    /// Id of the scan under way.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scan: Option<String>,
+    /// Its columns on disk.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub columns: Option<u32>,
+    /// Its columns in all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub columns_planned: Option<u32>,
+}
+
 /// A webhook, as it is configured and as it does. Its secret is never told.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct Webhook {
@@ -128,8 +156,8 @@ pub struct Webhook {
     /// What it is; services that told only webhooks left it out.
     #[serde(default)]
     pub kind: WebhookKind,
-    /// Where messages are posted to: scheme, host and port, and `/...` for a path or query, which
-    /// may be secret.
+    /// Where messages go: of a webhook scheme, host and port, and `/...` for a path or query, which
+    /// may be secret; of a broker its address and what every topic begins with.
     pub url: String,
     /// What it is told of.
     pub events: Vec<WebhookEvent>,

@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::{Config, scanners, webhooks};
+use super::{Config, receivers, scanners};
 use crate::error::bounded;
 
 /// A hundred times what every key with its comment takes.
@@ -71,7 +71,7 @@ impl Config {
     pub fn load_with_files(path: &Path) -> Result<Self, ConfigError> {
         let text = read(path)?;
         let config = Self::parse_file(&text, path)?;
-        webhooks::check_all_files(&text, &config)
+        receivers::check_all_files(&text, &config)
             .map_err(|(start, message)| wrong(&text, path, start, message))?;
         Ok(config)
     }
@@ -130,7 +130,7 @@ impl Config {
             wrong(start, message)
         })?;
         scanners::check(text, &config, port)
-            .and_then(|()| webhooks::check(text, &config))
+            .and_then(|()| receivers::check(text, &config))
             .map_err(|(start, message)| wrong(start, message))?;
         config
             .storage

@@ -9,9 +9,11 @@ mod formats;
 mod further;
 mod http;
 mod load;
+mod mqtt;
 mod network;
 mod overrides;
 mod processing;
+mod receivers;
 mod regularities;
 mod reload;
 mod scanner;
@@ -36,18 +38,21 @@ pub use further::{
 };
 pub use http::HttpConfig;
 pub use load::ConfigError;
+pub use mqtt::MqttConfig;
+pub(crate) use mqtt::Place;
 pub use network::{NetworkChoice, NetworkContent};
 pub use overrides::OverrideError;
 pub use processing::{
     DeliverablesConfig, Estimator, Method, PageChoice, Processing, ReconstructConfig, RegridConfig,
     SegmentConfig, StepChoice, StepUnits,
 };
+pub use receivers::Retry;
 pub use regularities::{Regularize, RegularizeUnits};
 pub use reload::Reloaded;
 pub use scanner::{ScannerConfig, Transport};
 pub use storage::{Acknowledged, Limits, StorageConfig, Unacknowledged};
 pub(crate) use value::is_host_name;
-pub use webhooks::{Retry, WebhookConfig};
+pub use webhooks::WebhookConfig;
 
 /// The whole configuration.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
@@ -83,6 +88,8 @@ pub struct Config {
     pub queue: QueueConfig,
     /// Who is told when something is done.
     pub webhooks: Vec<WebhookConfig>,
+    /// Brokers that are told, too.
+    pub mqtt: Vec<MqttConfig>,
     /// What is logged.
     pub log: LogConfig,
 }

@@ -41,7 +41,8 @@ impl Config {
             fill,
             reconstruct,
             deliverables,
-            webhooks
+            webhooks,
+            mqtt
         );
         leave!(service, http, discovery, queue);
         merged.scanner = reloaded_scanner("scanner", &self.scanner, &new.scanner, &mut outcome);

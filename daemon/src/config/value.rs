@@ -64,6 +64,12 @@ pub(super) fn webhook_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result
     Ok(name)
 }
 
+pub(super) fn broker_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    let name = String::deserialize(deserializer)?;
+    check_name(&name, "broker").map_err(D::Error::custom)?;
+    Ok(name)
+}
+
 /// Where to post to. What is refused is told without what may be secret in it: others see the log.
 pub(super) fn webhook_url<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
     let text = String::deserialize(deserializer)?;
@@ -109,7 +115,7 @@ pub(super) fn webhook_events<'de, D: Deserializer<'de>>(
     let known = || WebhookEvent::CHOICES.map(WebhookEvent::as_str).join(", ");
     if names.is_empty() {
         return Err(D::Error::custom(format!(
-            "a webhook without events is told of nothing: choose from {}, or remove it",
+            "without events nothing is told: choose from {}, or remove the section",
             known()
         )));
     }

@@ -58,6 +58,23 @@ pub(super) fn read_secret(key: &'static str, what: &str, path: &Path) -> Result<
     Ok(text)
 }
 
+/// Reads the password of a `password_file`; the end of its line is no part of it.
+pub(super) fn read_password(path: &Path) -> Result<String, FileError> {
+    let key = "password_file";
+    let text = read_secret(key, "password", path)?;
+    let password = text.trim_end_matches(['\r', '\n']);
+    if password.is_empty() || password.contains(['\r', '\n', '\0']) {
+        return Err(FileError {
+            key,
+            message: format!(
+                "{} holds no password: it is to be the one line of the file",
+                path.display()
+            ),
+        });
+    }
+    Ok(password.to_owned())
+}
+
 /// The certificates in a file.
 pub(super) fn authorities_in(path: &Path) -> Result<Vec<CertificateDer<'static>>, FileError> {
     let failed = |message: String| FileError {

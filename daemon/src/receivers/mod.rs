@@ -17,7 +17,9 @@
 mod backoff;
 mod deliver;
 mod files;
+mod mqtt;
 mod receiver;
+mod show;
 mod tell;
 mod webhook;
 mod words;
@@ -34,7 +36,9 @@ use crate::config::Config;
 use crate::service::{Service, lock};
 use crate::store::{Added, Store, StoreError};
 pub(crate) use files::FileError;
+pub(crate) use mqtt::check_files as check_broker_files;
 use receiver::Receiver;
+pub(crate) use show::show;
 pub(crate) use webhook::{check_files, shown_url};
 use words::warn_without_network;
 
@@ -66,6 +70,10 @@ fn make_all(config: &Config) -> Result<Vec<Receiver>, ReceiverError> {
     for config in &config.webhooks {
         let receiver = webhook::receiver(config);
         made.push(receiver.map_err(failed(WebhookKind::Webhook, &config.name))?);
+    }
+    for config in &config.mqtt {
+        let receiver = mqtt::receiver(config);
+        made.push(receiver.map_err(failed(WebhookKind::Mqtt, &config.name))?);
     }
     Ok(made)
 }
@@ -310,6 +318,12 @@ impl Receivers {
         for outbox in self.all() {
             outbox.join(until);
         }
+        // Only now: the last message may be under way until then.
+        std::thread::scope(|scope| {
+            for outbox in self.all() {
+                scope.spawn(move || outbox.receiver().close());
+            }
+        });
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
-use relief_api::{DeliveryAttempt, WebhookEvent, WebhookKind};
+use relief_api::{DeliveryAttempt, ScannerState, WebhookEvent, WebhookKind};
 
 use super::words::printable;
 use crate::config::Retry;
@@ -28,6 +28,12 @@ pub(super) trait Way: Send + Sync {
     /// Tries to deliver a message once, for about as long as its timeout at most, and notes what
     /// came of it. Its own thread and whoever asks for a test may call this at the same time.
     fn deliver(&self, message: &Message, attempt: &mut DeliveryAttempt) -> Verdict;
+
+    /// Shows how the scanners are, to a receiver that keeps that for others. Waits for nobody.
+    fn show(&self, _scanners: &[ScannerState]) {}
+
+    /// The service ends: a receiver to which a connection is kept may be told.
+    fn close(&self) {}
 }
 
 /// What is known of a receiver of any kind.
@@ -66,6 +72,16 @@ impl Receiver {
             settings,
             way: Box::new(way),
         }
+    }
+
+    /// As [`Way::show`].
+    pub(super) fn show(&self, scanners: &[ScannerState]) {
+        self.way.show(scanners);
+    }
+
+    /// As [`Way::close`].
+    pub(super) fn close(&self) {
+        self.way.close();
     }
 
     /// Tries to deliver a message once, and waits for what comes of it.

@@ -93,3 +93,17 @@ pub(super) fn printable(bytes: &[u8]) -> String {
         .collect();
     words.join(" ").chars().take(MOST_ANSWER_CHARS).collect()
 }
+
+/// The machine's name, with nothing in it that topics or headers give a meaning to.
+pub(super) fn host_name() -> String {
+    let name = rustix::system::uname();
+    let plain = |c: char| match c {
+        c if c.is_ascii_alphanumeric() || "-._".contains(c) => c,
+        _ => '_',
+    };
+    name.nodename()
+        .to_string_lossy()
+        .chars()
+        .map(plain)
+        .collect()
+}

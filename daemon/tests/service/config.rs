@@ -173,8 +173,8 @@ fn faults_are_told_with_their_line_and_a_way_out() {
         ),
         (
             format!("{whole}events = []\n"),
-            "relief.toml, line 5, column 10: a webhook without events is told of nothing: choose \
-             from scan-ended, scan-paused, job-done, job-failed, scanner-trouble, or remove it",
+            "relief.toml, line 5, column 10: without events nothing is told: choose from \
+             scan-ended, scan-paused, job-done, job-failed, scanner-trouble, or remove the section",
         ),
         (
             format!("{whole}events = [\"job-done\", \"scan\"]\n"),
@@ -213,7 +213,7 @@ fn faults_are_told_with_their_line_and_a_way_out() {
         .collect();
     assert_eq!(
         refused(&many),
-        "relief.toml, line 66, column 8: more than 16 webhooks are not possible"
+        "relief.toml, line 66, column 8: more than 16 receivers of messages are not possible"
     );
     let kind = refused("[queue]\nworkers = \"two\"\n");
     assert!(

@@ -10,6 +10,7 @@ mod access;
 mod acknowledge;
 mod ailing;
 mod api;
+mod brokers;
 mod calibration;
 mod client;
 mod config;

@@ -25,7 +25,7 @@ use receiver::{Answer, Receiver};
 const SECRET: &str = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
 const OTHER_SECRET: &str = "whsec_AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA=";
 
-fn write_secret(file: &Path, secret: &str) {
+pub(crate) fn write_secret(file: &Path, secret: &str) {
     fs::write(file, secret).unwrap();
     fs::set_permissions(file, fs::Permissions::from_mode(0o600)).unwrap();
 }

@@ -1,0 +1,171 @@
+//! What the sections of all who are told have in common: `[[webhooks]]` and `[[mqtt]]`.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Duration;
+
+use relief_api::WebhookEvent;
+use toml::de::{DeTable, DeValue};
+
+use super::Config;
+use super::load::line_and_column;
+use crate::receivers::{FileError, check_broker_files, check_files};
+
+/// When a message is tried again that was not taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Retry {
+    /// After the first attempt; three times as long after each further one ...
+    pub first: Duration,
+    /// ... up to this.
+    pub longest: Duration,
+    /// For how long since it was made a message is tried ...
+    pub lasting: Duration,
+    /// ... and how often at least, whatever the clock was set to meanwhile.
+    pub attempts: u32,
+}
+
+impl Default for Retry {
+    fn default() -> Self {
+        Self {
+            first: Duration::from_secs(5),
+            longest: Duration::from_secs(4 * 3_600),
+            lasting: Duration::from_secs(24 * 3_600),
+            attempts: 8,
+        }
+    }
+}
+
+pub(super) fn default_events() -> Vec<WebhookEvent> {
+    use WebhookEvent as E;
+    vec![E::ScanEnded, E::JobDone, E::JobFailed]
+}
+
+pub(super) fn default_timeout_ms() -> u32 {
+    10_000
+}
+
+/// Each has a thread of its own; more are a mistake.
+const MOST_RECEIVERS: usize = 16;
+
+/// Where something is wrong, in bytes from the beginning of the text, and what.
+type Fault = (usize, String);
+
+/// What is wrong with a section: the key, and what.
+pub(super) type KeyFault = (&'static str, String);
+
+/// A section of the file.
+struct Section<'a>(&'a DeTable<'a>);
+
+impl Section<'_> {
+    /// Where the value of a key stands.
+    fn value(&self, name: &str) -> usize {
+        let found = self.0.iter().find(|(key, _)| key.get_ref() == name);
+        found.map_or(0, |(_, value)| value.span().start)
+    }
+}
+
+/// A receiver, as its section has it.
+struct Told<'a> {
+    /// What it is, as in "webhook".
+    what: &'static str,
+    name: &'a str,
+    /// What does not go together.
+    keys: Result<(), KeyFault>,
+    /// Looks at its files.
+    files: Box<dyn Fn() -> Result<(), FileError> + 'a>,
+}
+
+/// All receivers with the names of their sections, in the order of the configuration.
+fn all(config: &Config) -> Vec<(&'static str, Vec<Told<'_>>)> {
+    let webhooks = config.webhooks.iter().map(|own| Told {
+        what: "webhook",
+        name: &own.name,
+        keys: own.check(),
+        files: Box::new(|| check_files(own)),
+    });
+    let brokers = config.mqtt.iter().map(|own| Told {
+        what: "broker",
+        name: &own.name,
+        keys: own.check(),
+        files: Box::new(|| check_broker_files(own)),
+    });
+    vec![
+        ("webhooks", webhooks.collect()),
+        ("mqtt", brokers.collect()),
+    ]
+}
+
+/// Calls `check` with each receiver of a text that is a configuration, and its section.
+fn each(
+    text: &str,
+    config: &Config,
+    mut check: impl FnMut(&Told<'_>, &Section<'_>) -> Result<(), Fault>,
+) -> Result<(), Fault> {
+    let Ok(sections) = DeTable::parse(text) else {
+        // It has been read before.
+        return Ok(());
+    };
+    for (name, all) in all(config) {
+        let found = sections
+            .get_ref()
+            .iter()
+            .find(|(key, _)| key.get_ref() == name);
+        let Some(DeValue::Array(tables)) = found.map(|(_, value)| value.get_ref()) else {
+            continue;
+        };
+        for (told, table) in all.iter().zip(tables.iter()) {
+            if let DeValue::Table(keys) = table.get_ref() {
+                check(told, &Section(keys))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Checks what must hold between the keys of a receiver, and between receivers of all kinds: the
+/// API and the records know them by their names.
+pub(super) fn check(text: &str, config: &Config) -> Result<(), Fault> {
+    let mut names = BTreeMap::new();
+    each(text, config, |told, section| {
+        let at = section.value("name");
+        if names.len() == MOST_RECEIVERS {
+            return Err((
+                at,
+                format!("more than {MOST_RECEIVERS} receivers of messages are not possible"),
+            ));
+        }
+        if let Some((what, earlier)) = names.insert(told.name.to_owned(), (told.what, at)) {
+            let (line, _) = line_and_column(text, earlier);
+            let name = told.name;
+            return Err((
+                at,
+                format!("there is a {what} {name} in line {line} already: each has its own name"),
+            ));
+        }
+        let keys = &told.keys;
+        keys.clone()
+            .map_err(|(key, message)| (section.value(key), message))
+    })
+}
+
+/// Checks the files that receivers name.
+pub(super) fn check_all_files(text: &str, config: &Config) -> Result<(), Fault> {
+    each(text, config, |told, section| {
+        (told.files)().map_err(|error| (section.value(error.key()), error.to_string()))
+    })
+}
+
+/// Refuses certificates of authorities where none are looked at.
+pub(super) fn check_ca_file(
+    ca_file: Option<&Path>,
+    is_secure: bool,
+    scheme: &str,
+) -> Result<(), KeyFault> {
+    match ca_file {
+        Some(_) if !is_secure => Err((
+            "ca_file",
+            format!("`ca_file` is for {scheme}, but `url` is not: remove it, or change the url"),
+        )),
+        _ => Ok(()),
+    }
+}
