@@ -206,8 +206,22 @@ pub enum ServiceError {
         /// Those there are.
         known: Vec<String>,
     },
+    /// There is no such hook.
+    #[error("there is no hook {name}; there {}", match .known.as_slice() {
+        [] => "are none".to_owned(),
+        known => format!("{} {}", are(known), known.join(", ")),
+    })]
+    NoSuchHook {
+        /// As it was given.
+        name: String,
+        /// Those there are.
+        known: Vec<String>,
+    },
+    /// Nothing is there that a hook could be run for.
+    #[error("there is no result in the spool that it could be run for")]
+    NoResult,
     /// Somebody else is at it.
-    #[error("the webhook {name} is just being tested")]
+    #[error("{name} is just being tested")]
     WebhookBusy {
         /// The webhook.
         name: String,

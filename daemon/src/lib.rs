@@ -20,6 +20,7 @@ pub mod systemd;
 
 mod acquisition;
 mod arguments;
+mod confined;
 mod daemon;
 mod error;
 mod events;
@@ -46,6 +47,7 @@ mod tokens;
 pub use acquisition::PlanError;
 pub use arguments::Arguments;
 pub use config::{Config, ConfigError};
+pub use confined::{HOOK_CHILD, become_hook};
 pub use daemon::{Daemon, StartError};
 pub use error::ServiceError;
 pub use http::ListenError;

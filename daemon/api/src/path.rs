@@ -62,6 +62,12 @@ pub const WEBHOOKS: &str = "/v1/webhooks";
 pub const WEBHOOK_DELIVERIES: &str = "/v1/webhooks/{webhook}/deliveries";
 /// Pattern of a webhook's test.
 pub const WEBHOOK_TEST: &str = "/v1/webhooks/{webhook}/test";
+/// The hooks.
+pub const HOOKS: &str = "/v1/hooks";
+/// Pattern of a hook's log.
+pub const HOOK_RUNS: &str = "/v1/hooks/{hook}/runs";
+/// Pattern of a hook's test.
+pub const HOOK_TEST: &str = "/v1/hooks/{hook}/test";
 /// Pattern of a scan's range image.
 pub const SCAN_IMAGE: &str = "/v1/scans/{scan}/image";
 /// Pattern of trying other settings on a scan's range image.
@@ -205,6 +211,18 @@ pub fn webhook_deliveries(name: &str) -> String {
 #[must_use]
 pub fn webhook_test(name: &str) -> String {
     format!("{WEBHOOKS}/{}/test", segment(name))
+}
+
+/// Log of a hook.
+#[must_use]
+pub fn hook_runs(name: &str) -> String {
+    format!("{HOOKS}/{}/runs", segment(name))
+}
+
+/// Test of a hook.
+#[must_use]
+pub fn hook_test(name: &str) -> String {
+    format!("{HOOKS}/{}/test", segment(name))
 }
 
 /// One segment of a path, escaped (RFC 3986, section 2.3).

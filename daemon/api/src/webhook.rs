@@ -16,6 +16,8 @@ pub enum WebhookKind {
     Webhook,
     /// Messages are published to a broker, by MQTT.
     Mqtt,
+    /// A program is run, with what the message says in its environment.
+    Hook,
     /// Of a kind that this version does not know; never sent.
     #[serde(other)]
     Unknown,
@@ -28,6 +30,7 @@ impl WebhookKind {
         match self {
             Self::Webhook => "webhook",
             Self::Mqtt => "mqtt",
+            Self::Hook => "hook",
             Self::Unknown => "unknown",
         }
     }

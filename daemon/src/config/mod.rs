@@ -7,6 +7,7 @@ mod discovery;
 mod fill;
 mod formats;
 mod further;
+mod hooks;
 mod http;
 mod load;
 mod mqtt;
@@ -36,6 +37,7 @@ pub use further::{
     KnotsChoice, MachineChoice, OfChoice, PatternChoice, SkinConfig, SkinMethod, SurfaceConfig,
     ToolpathConfig,
 };
+pub use hooks::{HookConfig, HookEvent, HookSandbox};
 pub use http::HttpConfig;
 pub use load::ConfigError;
 pub use mqtt::MqttConfig;
@@ -90,6 +92,8 @@ pub struct Config {
     pub webhooks: Vec<WebhookConfig>,
     /// Brokers that are told, too.
     pub mqtt: Vec<MqttConfig>,
+    /// What is run for each result.
+    pub hooks: Vec<HookConfig>,
     /// What is logged.
     pub log: LogConfig,
 }

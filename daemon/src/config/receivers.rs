@@ -1,4 +1,5 @@
-//! What the sections of all who are told have in common: `[[webhooks]]` and `[[mqtt]]`.
+//! What the sections of all who are told have in common: `[[webhooks]]`, `[[mqtt]]` and
+//! `[[hooks]]`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,7 +10,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::Config;
 use super::load::line_and_column;
-use crate::receivers::{FileError, check_broker_files, check_files};
+use crate::receivers::{FileError, check_broker_files, check_command, check_files};
 
 /// When a message is tried again that was not taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,9 +90,16 @@ fn all(config: &Config) -> Vec<(&'static str, Vec<Told<'_>>)> {
         keys: own.check(),
         files: Box::new(|| check_broker_files(own)),
     });
+    let hooks = config.hooks.iter().map(|own| Told {
+        what: "hook",
+        name: &own.name,
+        keys: own.check(),
+        files: Box::new(|| check_command(own)),
+    });
     vec![
         ("webhooks", webhooks.collect()),
         ("mqtt", brokers.collect()),
+        ("hooks", hooks.collect()),
     ]
 }
 

@@ -42,7 +42,8 @@ impl Config {
             reconstruct,
             deliverables,
             webhooks,
-            mqtt
+            mqtt,
+            hooks
         );
         leave!(service, http, discovery, queue);
         merged.scanner = reloaded_scanner("scanner", &self.scanner, &new.scanner, &mut outcome);

@@ -70,6 +70,24 @@ pub(super) fn broker_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<
     Ok(name)
 }
 
+pub(super) fn hook_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    let name = String::deserialize(deserializer)?;
+    check_name(&name, "hook").map_err(D::Error::custom)?;
+    Ok(name)
+}
+
+pub(super) fn hook_seconds<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    bounded(deserializer, 1, 86_400, " s")
+}
+
+pub(super) fn hook_megabytes<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    bounded(deserializer, 1, 1_000_000, " MB")
+}
+
+pub(super) fn hook_processes<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    bounded(deserializer, 16, 65_536, " processes")
+}
+
 /// Where to post to. What is refused is told without what may be secret in it: others see the log.
 pub(super) fn webhook_url<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
     let text = String::deserialize(deserializer)?;

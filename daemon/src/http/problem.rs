@@ -143,6 +143,16 @@ impl From<ServiceError> for Refusal {
                 "no-such-webhook",
                 Some("each has a section [[webhooks]] in the configuration".into()),
             ),
+            ServiceError::NoSuchHook { .. } => (
+                S::NOT_FOUND,
+                "no-such-hook",
+                Some("each has a section [[hooks]] in the configuration".into()),
+            ),
+            ServiceError::NoResult => (
+                S::CONFLICT,
+                "no-result",
+                Some("take a scan, or rerun one".into()),
+            ),
             ServiceError::WebhookBusy { .. } => (
                 S::CONFLICT,
                 "webhook-busy",

@@ -17,6 +17,7 @@
 mod backoff;
 mod deliver;
 mod files;
+mod hook;
 mod mqtt;
 mod receiver;
 mod show;
@@ -36,6 +37,7 @@ use crate::config::Config;
 use crate::service::{Service, lock};
 use crate::store::{Added, Store, StoreError};
 pub(crate) use files::FileError;
+pub(crate) use hook::check_command;
 pub(crate) use mqtt::check_files as check_broker_files;
 use receiver::Receiver;
 pub(crate) use show::show;
@@ -75,6 +77,13 @@ fn make_all(config: &Config) -> Result<Vec<Receiver>, ReceiverError> {
         let receiver = mqtt::receiver(config);
         made.push(receiver.map_err(failed(WebhookKind::Mqtt, &config.name))?);
     }
+    let state_dir = &config.service.state_dir;
+    made.extend(
+        config
+            .hooks
+            .iter()
+            .map(|own| hook::receiver(own, state_dir)),
+    );
     Ok(made)
 }
 
@@ -220,7 +229,8 @@ impl Receivers {
     pub(crate) fn open(config: &Config, store: &Store) -> Result<Self, ReceiverError> {
         let receivers = Self::default();
         receivers.replace(config, store)?;
-        if !receivers.all().is_empty() {
+        let is_far = |outbox: &Arc<Outbox>| outbox.receiver().settings.kind != WebhookKind::Hook;
+        if receivers.all().iter().any(is_far) {
             warn_without_network();
         }
         Ok(receivers)

@@ -1,11 +1,12 @@
 //! What receivers are told: from what happens to messages, and to the answers of the API.
 
-use std::sync::{Mutex, MutexGuard, TryLockError};
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 
 use deliverables::hexadecimal;
 use relief_api::{
-    Delivery, DeliveryState, Event, Job, JobState, Scan, ScannerLink, ScannerStatus, Webhook,
-    WebhookData, WebhookEvent, WebhookMessage,
+    Delivery, DeliveryState, Event, Hook, Job, JobState, Scan, ScannerLink, ScannerStatus, Webhook,
+    WebhookData, WebhookEvent, WebhookKind, WebhookMessage,
 };
 use sha2::{Digest, Sha256};
 
@@ -15,7 +16,7 @@ use crate::error::ServiceError;
 use crate::ids::now;
 use crate::service::{Service, lock};
 use crate::station::Station;
-use crate::store::{Message, Outgoing, StoreError};
+use crate::store::{Message, Outgoing, Store, StoreError};
 
 /// Bytes of an id: two are never the same.
 const ID_BYTES: usize = 16;
@@ -163,13 +164,51 @@ impl Receivers {
         })
     }
 
-    fn outbox(&self, name: &str) -> Result<std::sync::Arc<Outbox>, ServiceError> {
-        let all = self.all();
+    /// Results that a program is still to be run for, with their files.
+    pub(crate) fn results_needed(&self, store: &Store) -> Result<BTreeSet<String>, StoreError> {
+        let mut needed = BTreeSet::new();
+        for outbox in self.all() {
+            if outbox.receiver().settings.kind != WebhookKind::Hook {
+                continue;
+            }
+            for number in store.waiting(&outbox.name)? {
+                let message = store.message(&outbox.name, number)?;
+                let told = message.map(|message| serde_json::from_str(&message.body));
+                let told: Option<WebhookMessage> = told.and_then(Result::ok);
+                needed.extend(told.and_then(|told| told.data.job).map(|job| job.result));
+            }
+        }
+        Ok(needed)
+    }
+
+    /// Who is told by messages.
+    fn outbox(&self, name: &str) -> Result<Arc<Outbox>, ServiceError> {
+        self.of(|kind| kind != WebhookKind::Hook, name)
+            .map_err(|known| ServiceError::NoSuchWebhook {
+                name: name.to_owned(),
+                known,
+            })
+    }
+
+    /// A program that is run.
+    fn hook(&self, name: &str) -> Result<Arc<Outbox>, ServiceError> {
+        self.of(|kind| kind == WebhookKind::Hook, name)
+            .map_err(|known| ServiceError::NoSuchHook {
+                name: name.to_owned(),
+                known,
+            })
+    }
+
+    /// The one of this name, or the names of those there are.
+    fn of(
+        &self,
+        is_meant: impl Fn(WebhookKind) -> bool,
+        name: &str,
+    ) -> Result<Arc<Outbox>, Vec<String>> {
+        let mut all = self.all();
+        all.retain(|outbox| is_meant(outbox.receiver().settings.kind));
         let found = all.iter().find(|outbox| outbox.name == name).cloned();
-        found.ok_or_else(|| ServiceError::NoSuchWebhook {
-            name: name.to_owned(),
-            known: all.iter().map(|outbox| outbox.name.clone()).collect(),
-        })
+        found.ok_or_else(|| all.iter().map(|outbox| outbox.name.clone()).collect())
     }
 }
 
@@ -228,6 +267,9 @@ impl Service {
         for outbox in self.receivers.all() {
             let latest = latest(self.store.deliveries(&outbox.name)?);
             let settings = &outbox.receiver().settings;
+            if settings.kind == WebhookKind::Hook {
+                continue;
+            }
             let state = lock(&outbox.state);
             list.push(Webhook {
                 name: outbox.name.clone(),
@@ -252,20 +294,72 @@ impl Service {
     pub(crate) fn test_webhook(&self, name: &str) -> Result<Delivery, ServiceError> {
         self.check_running()?;
         let outbox = self.receivers.outbox(name)?;
+        let data = WebhookData {
+            webhook: Some(name.to_owned()),
+            ..WebhookData::default()
+        };
+        self.test(&outbox, None, data)
+    }
+
+    /// The hooks, and how they do.
+    pub(crate) fn list_hooks(&self) -> Result<Vec<Hook>, ServiceError> {
+        let mut list = Vec::new();
+        for config in &self.config().hooks {
+            // One that has just been taken out, or is to be put in.
+            let Ok(outbox) = self.receivers.hook(&config.name) else {
+                continue;
+            };
+            let latest = latest(self.store.deliveries(&outbox.name)?);
+            let state = lock(&outbox.state);
+            list.push(Hook {
+                name: config.name.clone(),
+                command: config.command.clone(),
+                waiting: state.due.len(),
+                dropped: state.dropped,
+                latest,
+            });
+        }
+        Ok(list)
+    }
+
+    /// The log of a hook, newest first.
+    pub(crate) fn hook_runs(&self, name: &str) -> Result<Vec<Delivery>, ServiceError> {
+        let outbox = self.receivers.hook(name)?;
+        Ok(self.store.deliveries(&outbox.name)?)
+    }
+
+    /// Runs a hook for the newest result at once, once, and waits for its end.
+    pub(crate) fn test_hook(&self, name: &str) -> Result<Delivery, ServiceError> {
+        self.check_running()?;
+        let outbox = self.receivers.hook(name)?;
+        let is_there = |job: &Job| job.state == JobState::Done && self.spool.has(&job.result);
+        let newest = self.store.newest_job(is_there)?;
+        let job = newest.ok_or(ServiceError::NoResult)?;
+        let about = job.scan.clone();
+        let data = WebhookData {
+            job: Some(job),
+            ..WebhookData::default()
+        };
+        self.test(&outbox, Some(&about), data)
+    }
+
+    fn test(
+        &self,
+        outbox: &Outbox,
+        about: Option<&str>,
+        data: WebhookData,
+    ) -> Result<Delivery, ServiceError> {
+        let name = outbox.name.as_str();
         let Some(_alone) = alone(&outbox.testing) else {
             return Err(ServiceError::WebhookBusy {
                 name: name.to_owned(),
             });
         };
-        let data = WebhookData {
-            webhook: Some(name.to_owned()),
-            ..WebhookData::default()
-        };
         let news = News {
             event: WebhookEvent::Test,
             of: name,
             at: &now(),
-            about: None,
+            about,
         };
         let message = message(name, &news, data);
         let (tried, verdict) = outbox.receiver().attempt(&message);
@@ -294,7 +388,6 @@ mod tests {
 
     use super::*;
     use crate::config::{Config, WebhookConfig};
-    use crate::store::Store;
 
     /// Receivers of which one is told of everything, and a store.
     fn webhooks() -> (tempfile::TempDir, Receivers, Store) {

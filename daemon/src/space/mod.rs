@@ -1,8 +1,8 @@
 //! Room on the disk: whether there is enough for a scan, and what goes to make some.
 //!
 //! Nothing goes that somebody still needs: a scan stays until it is over and none of its
-//! jobs waits, runs or has failed; a result, if the configuration says so, until somebody has
-//! acknowledged it. Range images that were put aside go as soon as the
+//! jobs waits, runs or has failed; a result until no hook is to be run for it any more, and, if the
+//! configuration says so, until somebody has acknowledged it. Range images that were put aside go as soon as the
 //! reserve is touched, since a job can make them again.
 
 mod promise;
@@ -178,11 +178,14 @@ impl Service {
         let at = Timestamp::now();
         // Scans whose columns may still be asked for by a job, and the results that are there.
         let mut asked_for = BTreeSet::new();
+        let still_used = self.receivers.results_needed(&self.store)?;
         let results = self.store.of_jobs(|job| {
             let folder = self.spool.directory(&job.result);
             let is_done = job.state == JobState::Done;
-            let keep = limits.unacknowledged == Unacknowledged::Keep;
-            let kept = || kept_result(&folder, &job, at, keep);
+            let unfetched =
+                limits.unacknowledged == Unacknowledged::Keep && job.acknowledged_at.is_none();
+            let needed = unfetched || still_used.contains(&job.result);
+            let kept = || kept_result(&folder, &job, at, needed);
             let result = is_done.then(kept).flatten();
             if asks_for_columns(job.state) {
                 asked_for.insert(job.scan);
@@ -292,8 +295,7 @@ fn asks_for_columns(state: JobState) -> bool {
     !state.is_over() || state == JobState::Failed
 }
 
-/// Whether a result that nobody has acknowledged is one to keep, the configuration says.
-fn kept_result(folder: &Path, job: &Job, at: Timestamp, keep_unacknowledged: bool) -> Option<Kept> {
+fn kept_result(folder: &Path, job: &Job, at: Timestamp, needed: bool) -> Option<Kept> {
     let mut bytes = 0;
     for entry in fs::read_dir(folder).ok()? {
         bytes += on_disk(&entry.ok()?.metadata().ok()?);
@@ -306,7 +308,7 @@ fn kept_result(folder: &Path, job: &Job, at: Timestamp, keep_unacknowledged: boo
             .acknowledged_at
             .as_deref()
             .map(|since| age_s(Some(since), at)),
-        needed: keep_unacknowledged && job.acknowledged_at.is_none(),
+        needed,
     })
 }
 

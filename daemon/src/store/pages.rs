@@ -7,6 +7,24 @@ use super::record::decode;
 use super::{JOBS, SCANS, Store, StoreError};
 
 impl Store {
+    /// The newest job that is meant.
+    pub(crate) fn newest_job(
+        &self,
+        mut is_meant: impl FnMut(&Job) -> bool,
+    ) -> Result<Option<Job>, StoreError> {
+        self.with(|database: &Database| {
+            let table = database.begin_read()?.open_table(JOBS)?;
+            for row in table.iter()?.rev() {
+                match decode::<Job>(&self.path, row?.1.value()) {
+                    Ok(job) if is_meant(&job) => return Ok(Ok(Some(job))),
+                    Ok(_) => {}
+                    Err(error) => return Ok(Err(error)),
+                }
+            }
+            Ok(Ok(None))
+        })?
+    }
+
     /// The job that makes, or made, this result.
     pub(crate) fn job_of_result(&self, result: &str) -> Result<Option<Job>, StoreError> {
         self.with(|database: &Database| {

@@ -2,7 +2,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use reliefd::Config;
-use reliefd::config::{DiscoveryConfig, HttpConfig, WebhookConfig};
+use reliefd::config::{DiscoveryConfig, HookConfig, HttpConfig, WebhookConfig};
 
 fn refused(text: &str) -> String {
     Config::parse(text, Path::new("relief.toml"))
@@ -391,6 +391,8 @@ fn the_examples_are_sound_and_show_the_defaults() {
     );
     webhook.ca_file = Some("/etc/relief/lab-ca.pem".into());
     assert_eq!(all.webhooks, [webhook]);
+    let check = ["/usr/local/bin/check-part", "--strict"];
+    assert_eq!(all.hooks, [HookConfig::new("check", &check)]);
     let further = all.deliverables.further().unwrap();
     assert_eq!(further.surface.unwrap().placement.as_str(), "optimal");
     assert_eq!(further.skin.unwrap().settings, skin::Settings::new(0.1));

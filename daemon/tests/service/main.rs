@@ -18,6 +18,7 @@ mod cut_short;
 mod events;
 mod fake;
 mod further;
+mod hooks;
 mod hostile;
 mod jobs;
 mod laser;

@@ -15,6 +15,7 @@ pub(crate) mod fetch;
 pub(crate) mod fill;
 mod fill_image;
 mod grid;
+pub(crate) mod hooks;
 pub(crate) mod jobs;
 pub(crate) mod laser;
 pub(crate) mod manual;
@@ -76,6 +77,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Laser(args) => block_on(laser::run(args, json)),
         Command::Token(args) => block_on(token::run(args, json)),
         Command::Webhooks(args) => block_on(webhooks::run(args, json)),
+        Command::Hooks(args) => block_on(hooks::run(args, json)),
         Command::Config(args) => config::run(args, json),
         Command::Manual(args) => manual::run(&args, json),
     }

@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, UdpSocket};
 use std::os::unix::fs::PermissionsExt;
 
-use reliefd::config::{DeliverablesConfig, WebhookConfig};
+use reliefd::config::{DeliverablesConfig, HookConfig, WebhookConfig};
 use reliefd::{Config, Daemon};
 use serde_json::json;
 use sim_scanner::config::SimConfig;
@@ -59,6 +59,13 @@ async fn what_the_clients_of_the_service_tell() {
     config.service.spool_dir = at.join("spool");
     config.scanner.port = scanner.port().to_owned();
     config.deliverables = further(at);
+    let mut hook = HookConfig::new("check", &["/bin/sh", "-c", "echo $RELIEF_NAME"]);
+    // In the place of reliefd, which is not built for this test.
+    let helper = at.join("helper");
+    fs::write(&helper, "#!/bin/sh\necho $RELIEF_NAME\n").unwrap();
+    fs::set_permissions(&helper, fs::Permissions::from_mode(0o755)).unwrap();
+    hook.helper = Some(helper);
+    config.hooks = vec![hook];
     let daemon = Daemon::start(config).await.unwrap();
     let socket = daemon.socket().to_owned();
     let told = |arguments: &'static [&'static str]| {
@@ -116,6 +123,22 @@ async fn what_the_clients_of_the_service_tell() {
     assert!(
         listed.contains("done, acknowledged by socket at 20"),
         "{listed}"
+    );
+    let hooks = async |arguments: &[&str]| {
+        let told = ask(at, &socket, &[&["hooks"], arguments].concat()).await;
+        check("commands.schema.json#/$defs/hooks", &told);
+        told
+    };
+    let tested = hooks(&["test", "check"]).await;
+    assert_eq!(tested["tried"][0]["answer"], "house");
+    let runs = hooks(&["log", "check"]).await;
+    assert_eq!(runs["runs"].as_array().unwrap().len(), 2);
+    assert_eq!(hooks(&[]).await["hooks"][0]["latest"]["state"], "delivered");
+    let shown = run(at, &environment, &["hooks", "log", "check"]).await;
+    let shown = String::from_utf8_lossy(&shown.stdout);
+    assert!(
+        shown.contains("done after ") && shown.contains("\n      house"),
+        "{shown}"
     );
     // A job that fails, so that its error is there, and that is taken up again.
     let few = &["rerun", "latest", "--set", "regrid.roi_x_mm=[900,901]"];

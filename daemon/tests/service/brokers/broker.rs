@@ -21,11 +21,10 @@ pub(super) const PASSWORD: &str = "hunter2 ";
 fn found(program: &str) -> Option<PathBuf> {
     let path = std::env::var("PATH").unwrap_or_default();
     let mut folders = path.split(':').chain(["/usr/sbin"]);
-    let found = folders.find_map(|folder| {
+    folders.find_map(|folder| {
         let file = Path::new(folder).join(program);
         file.is_file().then_some(file)
-    });
-    found
+    })
 }
 
 /// A broker's folder, port and certificates; the broker itself comes and goes.
