@@ -195,8 +195,8 @@ pub enum ServiceError {
         /// Bytes of these that scans under way may still take.
         promised_bytes: u64,
     },
-    /// There is no such webhook.
-    #[error("there is no webhook {name}; there {}", match .known.as_slice() {
+    /// Nobody who is told has this name.
+    #[error("there is no receiver {name}; there {}", match .known.as_slice() {
         [] => "are none".to_owned(),
         known => format!("{} {}", are(known), known.join(", ")),
     })]
@@ -223,7 +223,7 @@ pub enum ServiceError {
     /// Somebody else is at it.
     #[error("{name} is just being tested")]
     WebhookBusy {
-        /// The webhook.
+        /// The receiver.
         name: String,
     },
     /// The same request is just being done.

@@ -103,7 +103,7 @@ function webhook(hook, again) {
   if (latest) state.update(latest.state);
   const tried = latest?.tried.at(-1);
   return h('div', { class: 'hook' }, h('div', { class: 'head' }, h('h3', null, hook.name), latest ? state : null, test), facts([
-    [t('room.url'), h('code', null, hook.url)],
+    [word('receiver', hook.kind), h('code', null, hook.url)],
     [t('room.events'), hook.events.map((/** @type {string} */ event) => word('webhook', event)).join(', ')],
     [t('room.waiting'), String(hook.waiting)],
     [t('room.dropped'), hook.dropped > 0 ? String(hook.dropped) : null],

@@ -8,7 +8,8 @@ use crate::{apt, shell};
 /// password, a broker that is away, a service that is killed.
 pub(crate) fn judge() -> Result<()> {
     apt::need(&[
-        ("mosquitto", "mosquitto"),
+        // Debian keeps the broker itself out of the path of those who are not root.
+        ("mosquitto_passwd", "mosquitto"),
         ("mosquitto_sub", "mosquitto-clients"),
     ])?;
     // Else a broker that cannot be found would be no failure. The whole workspace, as it was built.

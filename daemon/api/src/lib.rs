@@ -84,6 +84,6 @@ pub use status::{
 pub use ticket::{CreateTicket, Ticket};
 pub use token::{CreateToken, MAX_TOKEN_NAME_CHARS, NewToken, Token, TokenList};
 pub use webhook::{
-    Delivery, DeliveryAttempt, DeliveryList, DeliveryState, ScannerState, Webhook, WebhookData,
-    WebhookEvent, WebhookKind, WebhookList, WebhookMessage,
+    Delivery, DeliveryAttempt, DeliveryList, DeliveryState, DiskRoom, ScannerState, Webhook,
+    WebhookData, WebhookEvent, WebhookKind, WebhookList, WebhookMessage,
 };

@@ -16,6 +16,8 @@ pub enum WebhookKind {
     Webhook,
     /// Messages are published to a broker, by MQTT.
     Mqtt,
+    /// People are written to.
+    Mail,
     /// A program is run, with what the message says in its environment.
     Hook,
     /// Of a kind that this version does not know; never sent.
@@ -30,6 +32,7 @@ impl WebhookKind {
         match self {
             Self::Webhook => "webhook",
             Self::Mqtt => "mqtt",
+            Self::Mail => "mail",
             Self::Hook => "hook",
             Self::Unknown => "unknown",
         }
@@ -62,6 +65,10 @@ pub enum WebhookEvent {
     JobFailed,
     /// A scanner got into trouble: an open interlock, a fault of the laser, a lost line.
     ScannerTrouble,
+    /// An interlock was opened, or the emergency stop pressed; `scanner-trouble` tells of it, too.
+    Interlock,
+    /// Little room is left on the disk.
+    DiskLow,
     /// Somebody has asked for a test; every webhook is told.
     Test,
     /// Of a kind that this version does not know; never sent.
@@ -71,12 +78,14 @@ pub enum WebhookEvent {
 
 impl WebhookEvent {
     /// Those that a webhook can be set to.
-    pub const CHOICES: [Self; 5] = [
+    pub const CHOICES: [Self; 7] = [
         Self::ScanEnded,
         Self::ScanPaused,
         Self::JobDone,
         Self::JobFailed,
         Self::ScannerTrouble,
+        Self::Interlock,
+        Self::DiskLow,
     ];
 
     /// As it is spelt in JSON.
@@ -88,6 +97,8 @@ impl WebhookEvent {
             Self::JobDone => "job-done",
             Self::JobFailed => "job-failed",
             Self::ScannerTrouble => "scanner-trouble",
+            Self::Interlock => "interlock",
+            Self::DiskLow => "disk-low",
             Self::Test => "test",
             Self::Unknown => "unknown",
         }
@@ -110,7 +121,7 @@ pub struct WebhookMessage {
 /// What a message is about; each event has its own part of it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct WebhookData {
-    /// Name of the scanner, of all but `test`.
+    /// Name of the scanner, of all but `disk-low` and `test`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scanner: Option<String>,
     /// The scan, as it was then; of a job the scan that it processes.
@@ -119,12 +130,28 @@ pub struct WebhookData {
     /// The job, as it was then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub job: Option<Job>,
-    /// How the scanner does, of `scanner-trouble`.
+    /// How the scanner does, of `scanner-trouble` and `interlock`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub status: Option<ScannerStatus>,
-    /// Name of the webhook, of `test`.
+    /// The disk, of `disk-low`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub disk: Option<DiskRoom>,
+    /// Name of the receiver, of `test`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub webhook: Option<String>,
+}
+
+/// What is left of a disk.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
+pub struct DiskRoom {
+    /// The folder on it: that of the kept scans, or of the results.
+    pub folder: String,
+    /// Bytes free there.
+    pub free_bytes: u64,
+    /// With fewer, this is told (`storage.low_mb`).
+    pub low_bytes: u64,
+    /// Bytes that are to stay free; a scan that would need them is refused.
+    pub reserve_bytes: u64,
 }
 
 /// How a scanner is, as brokers keep it (`PREFIX/scanners/NAME/state`).
@@ -160,7 +187,8 @@ pub struct Webhook {
     #[serde(default)]
     pub kind: WebhookKind,
     /// Where messages go: of a webhook scheme, host and port, and `/...` for a path or query, which
-    /// may be secret; of a broker its address and what every topic begins with.
+    /// may be secret; of a broker its address and what every topic begins with; of mail the
+    /// server.
     pub url: String,
     /// What it is told of.
     pub events: Vec<WebhookEvent>,

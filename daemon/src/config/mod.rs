@@ -10,6 +10,7 @@ mod further;
 mod hooks;
 mod http;
 mod load;
+mod mail;
 mod mqtt;
 mod network;
 mod overrides;
@@ -40,6 +41,7 @@ pub use further::{
 pub use hooks::{HookConfig, HookEvent, HookSandbox};
 pub use http::HttpConfig;
 pub use load::ConfigError;
+pub use mail::{MailConfig, MailSecurity};
 pub use mqtt::MqttConfig;
 pub(crate) use mqtt::Place;
 pub use network::{NetworkChoice, NetworkContent};
@@ -92,6 +94,8 @@ pub struct Config {
     pub webhooks: Vec<WebhookConfig>,
     /// Brokers that are told, too.
     pub mqtt: Vec<MqttConfig>,
+    /// People who are written to.
+    pub mail: Vec<MailConfig>,
     /// What is run for each result.
     pub hooks: Vec<HookConfig>,
     /// What is logged.
@@ -113,6 +117,9 @@ pub struct ServiceConfig {
     /// Loopback address on which the API is offered to bearers of a token; none unless set.
     #[serde(deserialize_with = "value::loopback")]
     pub listen: Option<SocketAddr>,
+    /// Where people find the service's page, through whatever leads there: mails link to it.
+    #[serde(deserialize_with = "value::public_url")]
+    pub public_url: Option<String>,
     /// Folder of the kept scans and of the job queue.
     pub state_dir: PathBuf,
     /// Folder in which results appear.
@@ -126,6 +133,7 @@ impl Default for ServiceConfig {
             socket_group: None,
             socket_mode: 0o660,
             listen: None,
+            public_url: None,
             state_dir: "/var/lib/relief".into(),
             spool_dir: "/var/spool/relief".into(),
         }

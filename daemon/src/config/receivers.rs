@@ -1,4 +1,4 @@
-//! What the sections of all who are told have in common: `[[webhooks]]`, `[[mqtt]]` and
+//! What the sections of all who are told have in common: `[[webhooks]]`, `[[mqtt]]`, `[[mail]]` and
 //! `[[hooks]]`.
 
 use std::collections::BTreeMap;
@@ -10,7 +10,9 @@ use toml::de::{DeTable, DeValue};
 
 use super::Config;
 use super::load::line_and_column;
-use crate::receivers::{FileError, check_broker_files, check_command, check_files};
+use crate::receivers::{
+    FileError, check_broker_files, check_command, check_files, check_mail_files,
+};
 
 /// When a message is tried again that was not taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -90,6 +92,12 @@ fn all(config: &Config) -> Vec<(&'static str, Vec<Told<'_>>)> {
         keys: own.check(),
         files: Box::new(|| check_broker_files(own)),
     });
+    let mail = config.mail.iter().map(|own| Told {
+        what: "mail",
+        name: &own.name,
+        keys: own.check(),
+        files: Box::new(|| check_mail_files(own)),
+    });
     let hooks = config.hooks.iter().map(|own| Told {
         what: "hook",
         name: &own.name,
@@ -99,6 +107,7 @@ fn all(config: &Config) -> Vec<(&'static str, Vec<Told<'_>>)> {
     vec![
         ("webhooks", webhooks.collect()),
         ("mqtt", brokers.collect()),
+        ("mail", mail.collect()),
         ("hooks", hooks.collect()),
     ]
 }
@@ -175,5 +184,107 @@ pub(super) fn check_ca_file(
             format!("`ca_file` is for {scheme}, but `url` is not: remove it, or change the url"),
         )),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_of_brokers_and_mails_are_told_with_their_line_and_a_way_out() {
+        let path = Path::new("relief.toml");
+        let broker = "[[mqtt]]\nname = \"hall\"\nurl = \"mqtts://lab.example\"\n";
+        let mail = "[[mail]]\nname = \"lab\"\nserver = \"lab.example\"\n\
+                    from = \"a@lab.example\"\nto = [\"b@lab.example\"]\n";
+        for sound in [broker, mail, &format!("{broker}{mail}")] {
+            assert!(Config::parse(sound, path).is_ok(), "{sound}");
+        }
+        for (text, line, told) in [
+            (
+                broker.replace("mqtts:", "https:"),
+                3,
+                "\"https://lab.example\" begins with neither mqtt:// nor mqtts://",
+            ),
+            (
+                broker.replace("lab.example", "a:hunter2@lab.example"),
+                3,
+                "use `username` and `password_file`",
+            ),
+            (
+                format!("{broker}topic_prefix = \"a/#\"\n"),
+                4,
+                "without `+` and `#`",
+            ),
+            (
+                format!("{broker}topic_prefix = \"/a\"\n"),
+                4,
+                "nothing that topics can begin with",
+            ),
+            (
+                format!("{broker}password_file = \"p\"\n"),
+                4,
+                "is for a `username`",
+            ),
+            (
+                format!("{}ca_file = \"c\"\n", broker.replace("mqtts:", "mqtt:")),
+                4,
+                "`ca_file` is for mqtts",
+            ),
+            (
+                format!("{broker}events = [\"tea\"]\n"),
+                4,
+                "there is no event `tea`",
+            ),
+            (
+                format!("{broker}topics = 1\n"),
+                4,
+                "in [mqtt] unknown key `topics`",
+            ),
+            (
+                format!("{broker}{}", mail.replace("\"lab\"", "\"hall\"")),
+                5,
+                "there is a broker hall in line 2 already",
+            ),
+            (format!("{mail}security = \"none\"\n"), 6, "in plain text"),
+            (
+                format!("{mail}username = \"a\"\n"),
+                6,
+                "needs a `password_file`",
+            ),
+            (
+                format!("{mail}password_file = \"p\"\n"),
+                6,
+                "is for a `username`",
+            ),
+            (mail.replace("b@lab", "b lab"), 5, "is no address of a mail"),
+            (mail.replace("[\"b@lab.example\"]", "[]"), 5, "0 addresses"),
+            (
+                mail.replace("\"lab.example\"", "\"lab.example:25\""),
+                3,
+                "the port as `port`",
+            ),
+            (
+                format!(
+                    "{}security = \"none\"\nca_file = \"c\"\n",
+                    mail.replace("\"lab.example\"", "\"localhost\"")
+                ),
+                7,
+                "`ca_file` is for TLS",
+            ),
+            (
+                "[service]\npublic_url = \"https://a:hunter2@lab.example\"\n".to_owned(),
+                2,
+                "without a name or password",
+            ),
+        ] {
+            let error = Config::parse(&text, path).unwrap_err().to_string();
+            assert!(
+                error.starts_with(&format!("relief.toml, line {line}, ")),
+                "{error}"
+            );
+            assert!(error.contains(told), "{error}");
+            assert!(!error.contains("hunter2"), "{error}");
+        }
     }
 }

@@ -43,6 +43,7 @@ impl Config {
             deliverables,
             webhooks,
             mqtt,
+            mail,
             hooks
         );
         leave!(service, http, discovery, queue);

@@ -12,6 +12,9 @@ pub struct StorageConfig {
     /// some of them is refused.
     #[serde(deserialize_with = "value::reserve_mb")]
     pub reserve_mb: u32,
+    /// With fewer megabytes free there, receivers of messages are told; 0 for never.
+    #[serde(deserialize_with = "value::reserve_mb")]
+    pub low_mb: u32,
     /// Most megabytes that kept scans may take; the oldest go first.
     #[serde(deserialize_with = "value::megabytes")]
     pub scans_mb: Option<u32>,
@@ -65,6 +68,12 @@ impl StorageConfig {
         u64::from(self.reserve_mb) * MB
     }
 
+    /// With fewer bytes free, receivers are told.
+    #[must_use]
+    pub fn low_bytes(&self) -> u64 {
+        u64::from(self.low_mb) * MB
+    }
+
     /// Most bytes and days of kept scans.
     #[must_use]
     pub fn scans(&self) -> Limits {
@@ -100,6 +109,7 @@ impl Default for StorageConfig {
     fn default() -> Self {
         Self {
             reserve_mb: 256,
+            low_mb: 1_024,
             scans_mb: None,
             scans_days: None,
             results_mb: None,

@@ -88,6 +88,33 @@ pub(super) fn hook_processes<'de, D: Deserializer<'de>>(deserializer: D) -> Resu
     bounded(deserializer, 16, 65_536, " processes")
 }
 
+pub(super) fn mail_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    let name = String::deserialize(deserializer)?;
+    check_name(&name, "mail").map_err(D::Error::custom)?;
+    Ok(name)
+}
+
+/// Where browsers find the page. It stands in mails, so that nothing secret may be in it.
+pub(super) fn public_url<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<String>, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    let uri = text.parse::<Uri>().ok();
+    let is_plain = |uri: &Uri| {
+        let has_scheme = matches!(uri.scheme_str(), Some("http" | "https"));
+        let host = uri.authority().map(|authority| authority.as_str());
+        has_scheme && host.is_some_and(|host| !host.contains('@')) && uri.query().is_none()
+    };
+    if uri.as_ref().is_some_and(is_plain) && !text.contains('#') {
+        return Ok(Some(text));
+    }
+    Err(D::Error::custom(format!(
+        "{:?} is no address of the page: one such as \"https://bench.lab.example\" is needed, \
+         without a name or password, and nothing behind `?` or `#`",
+        shown_url(&text)
+    )))
+}
+
 /// Where to post to. What is refused is told without what may be secret in it: others see the log.
 pub(super) fn webhook_url<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
     let text = String::deserialize(deserializer)?;

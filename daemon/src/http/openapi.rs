@@ -4,7 +4,7 @@ use axum::Router;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
-use relief_api::{Event, Problem, path};
+use relief_api::{Event, Problem, ScannerState, WebhookMessage, path};
 use utoipa::openapi::content::ContentBuilder;
 use utoipa::openapi::path::Operation;
 use utoipa::openapi::response::{Response as Described, ResponseBuilder};
@@ -54,7 +54,7 @@ impl<'r> ToResponse<'r> for Problems {
         (name = "tokens", description = "Who may ask; on the Unix socket only"),
         (name = "service", description = "The service itself"),
     ),
-    components(schemas(Event, Problem)),
+    components(schemas(Event, Problem, ScannerState, WebhookMessage)),
 )]
 struct Heading;
 

@@ -141,7 +141,7 @@ impl From<ServiceError> for Refusal {
             ServiceError::NoSuchWebhook { .. } => (
                 S::NOT_FOUND,
                 "no-such-webhook",
-                Some("each has a section [[webhooks]] in the configuration".into()),
+                Some("each has a section [[webhooks]], [[mqtt]] or [[mail]] in the configuration".into()),
             ),
             ServiceError::NoSuchHook { .. } => (
                 S::NOT_FOUND,

@@ -18,8 +18,10 @@ mod backoff;
 mod deliver;
 mod files;
 mod hook;
+mod mail;
 mod mqtt;
 mod receiver;
+mod runs;
 mod show;
 mod tell;
 mod webhook;
@@ -38,6 +40,7 @@ use crate::service::{Service, lock};
 use crate::store::{Added, Store, StoreError};
 pub(crate) use files::FileError;
 pub(crate) use hook::check_command;
+pub(crate) use mail::check_files as check_mail_files;
 pub(crate) use mqtt::check_files as check_broker_files;
 use receiver::Receiver;
 pub(crate) use show::show;
@@ -76,6 +79,11 @@ fn make_all(config: &Config) -> Result<Vec<Receiver>, ReceiverError> {
     for config in &config.mqtt {
         let receiver = mqtt::receiver(config);
         made.push(receiver.map_err(failed(WebhookKind::Mqtt, &config.name))?);
+    }
+    let public_url = config.service.public_url.as_deref();
+    for config in &config.mail {
+        let receiver = mail::receiver(config, public_url);
+        made.push(receiver.map_err(failed(WebhookKind::Mail, &config.name))?);
     }
     let state_dir = &config.service.state_dir;
     made.extend(
@@ -247,13 +255,18 @@ impl Receivers {
         let known: Vec<&str> = known.iter().map(String::as_str).collect();
         let earlier = self.all();
         let mut outboxes = Vec::new();
+        // Given up at the end, and not while others wait: a connection may have to be ended.
+        let mut replaced = Vec::new();
         for receiver in receivers {
             let same = earlier
                 .iter()
                 .find(|outbox| outbox.name == receiver.settings.name);
             match same {
                 Some(outbox) => {
-                    outbox.change(|state| state.receiver = Arc::new(receiver));
+                    let receiver = Arc::new(receiver);
+                    outbox.change(|state| {
+                        replaced.push(std::mem::replace(&mut state.receiver, receiver));
+                    });
                     outboxes.push(Arc::clone(outbox));
                 }
                 None => outboxes.push(Arc::new(Outbox::new(receiver))),

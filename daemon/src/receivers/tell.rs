@@ -1,13 +1,13 @@
 //! What receivers are told: from what happens to messages, and to the answers of the API.
 
-use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 
 use deliverables::hexadecimal;
 use relief_api::{
-    Delivery, DeliveryState, Event, Hook, Job, JobState, Scan, ScannerLink, ScannerStatus, Webhook,
-    WebhookData, WebhookEvent, WebhookKind, WebhookMessage,
+    Delivery, DeliveryState, DiskRoom, Event, Job, JobState, Scan, ScannerLink, ScannerStatus,
+    Webhook, WebhookData, WebhookEvent, WebhookKind, WebhookMessage,
 };
+use scanner_protocol::Faults;
 use sha2::{Digest, Sha256};
 
 use super::receiver::Verdict;
@@ -16,7 +16,7 @@ use crate::error::ServiceError;
 use crate::ids::now;
 use crate::service::{Service, lock};
 use crate::station::Station;
-use crate::store::{Message, Outgoing, Store, StoreError};
+use crate::store::{Message, Outgoing, StoreError};
 
 /// Bytes of an id: two are never the same.
 const ID_BYTES: usize = 16;
@@ -64,6 +64,16 @@ fn message(receiver: &str, news: &News<'_>, data: WebhookData) -> Message {
     }
 }
 
+/// Whether this trouble is that somebody, or an open door, has stopped the scanner: what is wrong
+/// is told in the words that the protocol has for faults.
+fn is_stopped(problem: Option<&str>) -> bool {
+    let stops = Faults::INTERLOCK | Faults::EMERGENCY_STOP;
+    let mut named = Faults::NAMED.iter();
+    problem.is_some_and(|problem| {
+        named.any(|(fault, words)| stops.contains(*fault) && problem.contains(words))
+    })
+}
+
 /// Makes sure that only one at a time goes on. Whoever ended by a panic does not go on.
 fn alone(lock: &Mutex<()>) -> Option<MutexGuard<'_, ()>> {
     match lock.try_lock() {
@@ -74,7 +84,7 @@ fn alone(lock: &Mutex<()>) -> Option<MutexGuard<'_, ()>> {
 }
 
 /// The one tried last, of deliveries that are listed newest first.
-fn latest(mut deliveries: Vec<Delivery>) -> Option<Delivery> {
+pub(super) fn latest(mut deliveries: Vec<Delivery>) -> Option<Delivery> {
     let last_try = |delivery: &Delivery| delivery.tried.last().map(|tried| tried.at.clone());
     deliveries.retain(|delivery| !delivery.tried.is_empty());
     // Of two tried within one millisecond the last one found counts, which is to be the newer.
@@ -145,14 +155,19 @@ impl Receivers {
     }
 
     /// Messages that tell of a scanner's trouble, as of now.
-    fn of_trouble(&self, scanner: &str, status: &ScannerStatus) -> Vec<Outgoing> {
+    fn of_trouble(
+        &self,
+        event: WebhookEvent,
+        scanner: &str,
+        status: &ScannerStatus,
+    ) -> Vec<Outgoing> {
         // Other trouble may come at the same time.
         let of = format!(
             "{scanner}\n{}",
             status.problem.as_deref().unwrap_or_default()
         );
         let news = News {
-            event: WebhookEvent::ScannerTrouble,
+            event,
             of: &of,
             at: &now(),
             about: Some(scanner),
@@ -164,21 +179,18 @@ impl Receivers {
         })
     }
 
-    /// Results that a program is still to be run for, with their files.
-    pub(crate) fn results_needed(&self, store: &Store) -> Result<BTreeSet<String>, StoreError> {
-        let mut needed = BTreeSet::new();
-        for outbox in self.all() {
-            if outbox.receiver().settings.kind != WebhookKind::Hook {
-                continue;
-            }
-            for number in store.waiting(&outbox.name)? {
-                let message = store.message(&outbox.name, number)?;
-                let told = message.map(|message| serde_json::from_str(&message.body));
-                let told: Option<WebhookMessage> = told.and_then(Result::ok);
-                needed.extend(told.and_then(|told| told.data.job).map(|job| job.result));
-            }
-        }
-        Ok(needed)
+    /// Messages that tell of a disk that gets full, as of now.
+    fn of_disk(&self, disk: &DiskRoom) -> Vec<Outgoing> {
+        let news = News {
+            event: WebhookEvent::DiskLow,
+            of: &disk.folder,
+            at: &now(),
+            about: None,
+        };
+        self.outgoing(&news, || WebhookData {
+            disk: Some(disk.clone()),
+            ..WebhookData::default()
+        })
     }
 
     /// Who is told by messages.
@@ -190,17 +202,8 @@ impl Receivers {
             })
     }
 
-    /// A program that is run.
-    fn hook(&self, name: &str) -> Result<Arc<Outbox>, ServiceError> {
-        self.of(|kind| kind == WebhookKind::Hook, name)
-            .map_err(|known| ServiceError::NoSuchHook {
-                name: name.to_owned(),
-                known,
-            })
-    }
-
     /// The one of this name, or the names of those there are.
-    fn of(
+    pub(super) fn of(
         &self,
         is_meant: impl Fn(WebhookKind) -> bool,
         name: &str,
@@ -246,11 +249,15 @@ impl Service {
         link: ScannerLink,
         problem: Option<String>,
     ) {
-        let Some(status) = station.note(link, problem) else {
+        let Some((before, status)) = station.note(link, problem) else {
             return;
         };
         if status.link == ScannerLink::Trouble {
-            let outgoing = self.receivers.of_trouble(station.name(), &status);
+            let told = |event| self.receivers.of_trouble(event, station.name(), &status);
+            let mut outgoing = told(WebhookEvent::ScannerTrouble);
+            if is_stopped(status.problem.as_deref()) && !is_stopped(before.as_deref()) {
+                outgoing.extend(told(WebhookEvent::Interlock));
+            }
             match self.store.put_messages(&outgoing) {
                 Ok(added) => self.receivers.added(added),
                 Err(error) => {
@@ -259,6 +266,18 @@ impl Service {
             }
         }
         self.hub.tell(Event::Scanner(status));
+    }
+
+    /// Tells of a disk that gets full.
+    ///
+    /// # Errors
+    /// The disk does not keep the messages; nobody is told.
+    pub(crate) fn tell_of_disk(&self, disk: &DiskRoom) -> Result<(), StoreError> {
+        let outgoing = self.receivers.of_disk(disk);
+        if !outgoing.is_empty() {
+            self.receivers.added(self.store.put_messages(&outgoing)?);
+        }
+        Ok(())
     }
 
     /// The receivers, and how they do.
@@ -301,49 +320,8 @@ impl Service {
         self.test(&outbox, None, data)
     }
 
-    /// The hooks, and how they do.
-    pub(crate) fn list_hooks(&self) -> Result<Vec<Hook>, ServiceError> {
-        let mut list = Vec::new();
-        for config in &self.config().hooks {
-            // One that has just been taken out, or is to be put in.
-            let Ok(outbox) = self.receivers.hook(&config.name) else {
-                continue;
-            };
-            let latest = latest(self.store.deliveries(&outbox.name)?);
-            let state = lock(&outbox.state);
-            list.push(Hook {
-                name: config.name.clone(),
-                command: config.command.clone(),
-                waiting: state.due.len(),
-                dropped: state.dropped,
-                latest,
-            });
-        }
-        Ok(list)
-    }
-
-    /// The log of a hook, newest first.
-    pub(crate) fn hook_runs(&self, name: &str) -> Result<Vec<Delivery>, ServiceError> {
-        let outbox = self.receivers.hook(name)?;
-        Ok(self.store.deliveries(&outbox.name)?)
-    }
-
-    /// Runs a hook for the newest result at once, once, and waits for its end.
-    pub(crate) fn test_hook(&self, name: &str) -> Result<Delivery, ServiceError> {
-        self.check_running()?;
-        let outbox = self.receivers.hook(name)?;
-        let is_there = |job: &Job| job.state == JobState::Done && self.spool.has(&job.result);
-        let newest = self.store.newest_job(is_there)?;
-        let job = newest.ok_or(ServiceError::NoResult)?;
-        let about = job.scan.clone();
-        let data = WebhookData {
-            job: Some(job),
-            ..WebhookData::default()
-        };
-        self.test(&outbox, Some(&about), data)
-    }
-
-    fn test(
+    /// Tries once, at once, and keeps what comes of it.
+    pub(super) fn test(
         &self,
         outbox: &Outbox,
         about: Option<&str>,
@@ -388,6 +366,7 @@ mod tests {
 
     use super::*;
     use crate::config::{Config, WebhookConfig};
+    use crate::store::Store;
 
     /// Receivers of which one is told of everything, and a store.
     fn webhooks() -> (tempfile::TempDir, Receivers, Store) {

@@ -5,6 +5,7 @@
 //! configuration says so, until somebody has acknowledged it. Range images that were put aside go as soon as the
 //! reserve is touched, since a job can make them again.
 
+mod low;
 mod promise;
 mod sweep;
 
@@ -23,6 +24,7 @@ use crate::config::Unacknowledged;
 use crate::error::ServiceError;
 use crate::ids::now;
 use crate::service::{Service, lock};
+use low::Low;
 use promise::taken_bytes;
 pub(crate) use promise::{Promise, Promises};
 use sweep::{Kept, surplus};
@@ -48,6 +50,7 @@ pub(crate) struct Measured {
 pub(crate) fn tidy(service: &Arc<Service>) {
     let pulse = service.liveness.begin("tidy");
     let mut ticks = 0;
+    let mut low = Low::default();
     while !service.wait_for_stop(TICK) {
         pulse.work(LONGEST_TURN);
         service.keep_unkept();
@@ -56,6 +59,7 @@ pub(crate) fn tidy(service: &Arc<Service>) {
             service.sweep();
         }
         service.measure_free();
+        service.tell_if_low(&mut low);
         pulse.rest();
     }
 }

@@ -352,12 +352,19 @@ impl Station {
         }
     }
 
-    /// Notes how the scanner does. Gives what is to be told, if that has changed.
-    pub(crate) fn note(&self, link: ScannerLink, problem: Option<String>) -> Option<ScannerStatus> {
-        self.change(|status| {
+    /// Notes how the scanner does. Gives what was wrong before, and what is to be told, if that has
+    /// changed.
+    pub(crate) fn note(
+        &self,
+        link: ScannerLink,
+        problem: Option<String>,
+    ) -> Option<(Option<String>, ScannerStatus)> {
+        let mut before = None;
+        let changed = self.change(|status| {
             status.link = link;
-            status.problem = problem;
-        })
+            before = std::mem::replace(&mut status.problem, problem);
+        });
+        changed.map(|status| (before, status))
     }
 
     fn change(&self, change: impl FnOnce(&mut ScannerStatus)) -> Option<ScannerStatus> {

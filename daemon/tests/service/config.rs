@@ -174,17 +174,18 @@ fn faults_are_told_with_their_line_and_a_way_out() {
         (
             format!("{whole}events = []\n"),
             "relief.toml, line 5, column 10: without events nothing is told: choose from \
-             scan-ended, scan-paused, job-done, job-failed, scanner-trouble, or remove the section",
+             scan-ended, scan-paused, job-done, job-failed, scanner-trouble, interlock, disk-low, \
+             or remove the section",
         ),
         (
             format!("{whole}events = [\"job-done\", \"scan\"]\n"),
             "relief.toml, line 5, column 10: there is no event `scan`; known are: scan-ended, \
-             scan-paused, job-done, job-failed, scanner-trouble",
+             scan-paused, job-done, job-failed, scanner-trouble, interlock, disk-low",
         ),
         (
             format!("{whole}events = [\"test\"]\n"),
             "relief.toml, line 5, column 10: there is no event `test`; known are: scan-ended, \
-             scan-paused, job-done, job-failed, scanner-trouble",
+             scan-paused, job-done, job-failed, scanner-trouble, interlock, disk-low",
         ),
         (
             format!("{whole}timeout_ms = 30000\n"),

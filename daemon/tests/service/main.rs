@@ -22,6 +22,7 @@ mod hooks;
 mod hostile;
 mod jobs;
 mod laser;
+mod mail;
 mod old_state;
 mod pause;
 mod power;

@@ -10,7 +10,7 @@ const sources = readdirSync(root).filter((name) => name.endsWith('.js'));
 
 /** Groups of strings whose keys are put together while the page runs. */
 const GROUPS = [
-  'fault', 'scan-state', 'job-state', 'link', 'delivery', 'webhook', 'stage', 'kind', 'edge', 'background', 'plan', 'setting', 'parameter',
+  'fault', 'scan-state', 'job-state', 'link', 'delivery', 'receiver', 'webhook', 'stage', 'kind', 'edge', 'background', 'plan', 'setting', 'parameter',
   'nav', 'theme', 'language', 'laser', 'picture', 'solid', 'result', 'jobs', 'room', 'said', 'scan',
 ];
 

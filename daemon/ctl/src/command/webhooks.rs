@@ -9,10 +9,11 @@ use crate::failure::Failure;
 use crate::output;
 use crate::service::EndpointArgs;
 
-/// Show the webhooks, what became of their messages, and test them
+/// Show who is told by webhook, MQTT or mail, what became of the messages, and test it
 ///
-/// A webhook is a section [[webhooks]] of the service's configuration: a URL that is told when a
-/// scan or a job is done. Without a further word, all of them are listed with what was last tried.
+/// A receiver of messages is a section of the service's configuration: [[webhooks]], a URL that is
+/// told when a scan or a job is done; [[mqtt]], a broker; [[mail]], people who are written to. Without
+/// a further word, all of them are listed with what was last tried.
 #[derive(Debug, clap::Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub(crate) struct Args {
@@ -24,16 +25,16 @@ pub(crate) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Action {
-    /// Show the messages that wait for a webhook, and the latest of the others, with every attempt
+    /// Show the messages that wait for a receiver, and the latest of the others, with every attempt
     Log {
-        /// The webhook
+        /// The webhook, broker or mail
         name: String,
         #[command(flatten)]
         endpoint: EndpointArgs,
     },
-    /// Send a signed message of the type `test` at once, and show what comes back
+    /// Send a message of the type `test` at once, and show what comes back
     Test {
-        /// The webhook
+        /// The webhook, broker or mail
         name: String,
         #[command(flatten)]
         endpoint: EndpointArgs,
@@ -53,12 +54,15 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
 
 fn list(list: &WebhookList) -> String {
     if list.webhooks.is_empty() {
-        return "there are no webhooks: each is a section [[webhooks]] of the configuration".into();
+        return "nobody is told: sections [[webhooks]], [[mqtt]] and [[mail]] of the configuration \
+                name who is"
+            .into();
     }
     let lines = list.webhooks.iter().map(|webhook| {
         let events: Vec<&str> = webhook.events.iter().map(|event| event.as_str()).collect();
         vec![
             webhook.name.clone(),
+            webhook.kind.as_str().to_owned(),
             webhook.url.clone(),
             events.join(" "),
             webhook.waiting.to_string(),
@@ -66,8 +70,8 @@ fn list(list: &WebhookList) -> String {
         ]
     });
     output::table(
-        &["WEBHOOK", "URL", "EVENTS", "WAITING", "LATEST"],
-        &[3],
+        &["NAME", "KIND", "URL", "EVENTS", "WAITING", "LATEST"],
+        &[4],
         lines,
     )
 }
@@ -136,7 +140,9 @@ fn state(delivery: &Delivery) -> String {
 
 fn outcome(tried: &DeliveryAttempt) -> String {
     let status = tried.status.map(|status| format!("taken ({status})"));
-    let told = tried.error.clone().or(status).unwrap_or_default();
+    let told = tried.error.clone().or(status);
+    // Brokers acknowledge, and say nothing.
+    let told = told.unwrap_or_else(|| "taken".into());
     match &tried.answer {
         Some(answer) => format!("{told}; it said: {answer}"),
         None => told,

@@ -377,7 +377,7 @@ async fn webhooks_are_listed_tested_and_looked_into() {
     let none = Daemon::start(config.clone()).await.unwrap();
     let told = run(at, &[("RELIEF_SOCKET", "s")], &["webhooks"]).await;
     let told = String::from_utf8_lossy(&told.stdout).into_owned();
-    assert!(told.starts_with("there are no webhooks"), "{told}");
+    assert!(told.starts_with("nobody is told"), "{told}");
     none.shutdown().await;
 
     let takes = receiver("HTTP/1.1 204 x\r\n\r\n");
@@ -424,7 +424,7 @@ async fn webhooks_are_listed_tested_and_looked_into() {
     let (code, _, told) = shown(&["webhooks", "test", "lob"]).await;
     assert_eq!(code, Some(1));
     assert!(
-        told.contains("there is no webhook lob; there are lab, bad"),
+        told.contains("there is no receiver lob; there are lab, bad"),
         "{told}"
     );
     let (_, out, _) = shown(&["webhooks"]).await;

@@ -24,6 +24,8 @@ struct Ailment {
     hangs: bool,
     /// How many wait for it to say so.
     waiting: u32,
+    /// How often it was asked.
+    looks: u32,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -51,6 +53,11 @@ impl Ailing {
     /// From now on so much is free.
     pub(crate) fn has_free(&self, bytes: u64) {
         self.0.lock().unwrap().free_bytes = Some(bytes);
+    }
+
+    /// How often it was asked what is free.
+    pub(crate) fn looks(&self) -> u32 {
+        self.0.lock().unwrap().looks
     }
 
     /// Waits until something was refused.
@@ -105,6 +112,7 @@ impl Hindrance for Ailing {
         ailment.waiting += 1;
         let mut ailment = self.1.wait_while(ailment, |ailment| ailment.hangs).unwrap();
         ailment.waiting = ailment.waiting.saturating_sub(1);
+        ailment.looks += 1;
         let free = ailment.free_bytes;
         drop(ailment);
         free.map_or_else(|| LocalDisk.free_bytes(path), |free| Ok(Some(free)))

@@ -6,12 +6,15 @@ use std::time::{Duration, SystemTime};
 
 use redb::ReadableTable;
 use relief_api::{
-    Event, Job, JobState, PlanRequest, Scan, ScanState, SpoolEntry, StartScan, Status, path,
+    Event, Job, JobState, PlanRequest, Scan, ScanState, SpoolEntry, StartScan, Status,
+    WebhookEvent, path,
 };
 use rustix::io::Errno;
 
 use crate::fake::{COLUMNS, SAMPLES};
 use crate::rig::{Rig, ended, json};
+use crate::webhooks::receiver::Receiver;
+use crate::webhooks::webhook;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_scan_without_room_is_refused_with_the_figures() {
@@ -42,6 +45,49 @@ async fn a_scan_without_room_is_refused_with_the_figures() {
     );
     disk.has_free(100_200_000);
     rig.scan_to_result("a").await;
+    rig.daemon.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn little_room_is_told_once_until_there_is_enough_again() {
+    let receiver = Receiver::new([]);
+    let folder = tempfile::tempdir().unwrap();
+    let mut lab = webhook(folder.path(), "lab", &receiver.url());
+    lab.events = vec![WebhookEvent::DiskLow];
+    let (rig, disk) = super::rig(|config| {
+        config.storage.low_mb = 500;
+        config.webhooks = vec![lab];
+    })
+    .await;
+    let looked = async |free_bytes: u64| {
+        disk.has_free(free_bytes);
+        // Twice, so that it has been thought about once.
+        for _ in 0..2 {
+            let looks = disk.looks();
+            while disk.looks() < looks + 2 {
+                tokio::time::sleep(Duration::from_millis(5)).await;
+            }
+        }
+    };
+    looked(499_000_000).await;
+    let told = receiver.next().message();
+    assert_eq!(told.event, WebhookEvent::DiskLow);
+    let disk_low = told.data.disk.unwrap();
+    assert_eq!(
+        (disk_low.free_bytes, disk_low.low_bytes),
+        (499_000_000, 500_000_000)
+    );
+    let state = rig.folder.path().join("state/scans");
+    assert_eq!(disk_low.folder, state.display().to_string());
+    for free_bytes in [520_000_000, 499_000_000] {
+        looked(free_bytes).await;
+    }
+    receiver.is_quiet();
+    looked(550_000_000).await;
+    looked(400_000_000).await;
+    let again = receiver.next().message().data.disk.unwrap();
+    assert_eq!(again.free_bytes, 400_000_000);
+    receiver.is_quiet();
     rig.daemon.shutdown().await;
 }
 

@@ -1,7 +1,7 @@
 //! A broker that is not ours, Debian's mosquitto, and its client that listens.
 
 use std::fs;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -10,6 +10,8 @@ use std::time::{Duration, Instant};
 
 use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, DnType, IsCa, KeyPair};
 use rustix::process::{Pid, Signal, kill_process};
+
+use crate::webhooks::receiver::any_port;
 
 /// Far longer than anything takes that should happen.
 const LIMIT: Duration = Duration::from_secs(60);
@@ -169,6 +171,28 @@ impl Broker {
         });
         Listener { child, heard }
     }
+}
+
+/// What stands for a broker that lets everybody in, and then acknowledges nothing. Gives its port,
+/// and what it is sent.
+pub(super) fn mute() -> (u16, mpsc::Receiver<Vec<u8>>) {
+    let listener = any_port();
+    let port = listener.local_addr().unwrap().port();
+    let (sender, sent) = mpsc::channel();
+    std::thread::spawn(move || {
+        for mut stream in listener.incoming().flatten() {
+            let mut bytes = [0; 4096];
+            if stream.read(&mut bytes).is_err() || stream.write_all(&[0x20, 2, 0, 0]).is_err() {
+                continue;
+            }
+            while let Ok(count @ 1..) = stream.read(&mut bytes) {
+                if sender.send(bytes[..count].to_vec()).is_err() {
+                    return;
+                }
+            }
+        }
+    });
+    (port, sent)
 }
 
 /// Somebody who listens to everything.

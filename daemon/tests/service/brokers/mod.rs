@@ -16,7 +16,7 @@ use reliefd::config::{MqttConfig, Retry};
 
 use crate::rig::Rig;
 use crate::webhooks::write_secret;
-use broker::{Broker, PASSWORD, USER};
+use broker::{Broker, PASSWORD, USER, mute};
 
 /// A section for this broker, with its password in the folder.
 fn section(folder: &Path, broker: &Broker) -> MqttConfig {
@@ -100,6 +100,32 @@ async fn messages_and_states_are_published() {
     rig.daemon.shutdown().await;
     assert_eq!(late.on("lab/relief/status").payload, "offline");
     assert_eq!(listener.on("lab/relief/status").payload, "offline");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_not_acknowledged_is_not_delivered() {
+    let (port, sent) = mute();
+    let mut hall = MqttConfig::new("hall", &format!("mqtt://127.0.0.1:{port}"));
+    hall.topic_prefix = Some("lab".into());
+    hall.timeout_ms = 3_000;
+    let folder = tempfile::tempdir().unwrap();
+    let rig = Rig::start(folder, |config| config.mqtt = vec![hall]).await;
+    let tested: Delivery = rig.client.ask(&path::webhook_test("hall")).await;
+    assert_eq!(tested.state, DeliveryState::GivenUp);
+    assert_eq!(
+        tested.tried[0].error,
+        Some(format!(
+            "127.0.0.1:{port} did not answer within 3000 ms (timeout_ms)"
+        ))
+    );
+    rig.daemon.shutdown().await;
+    // It was published all the same, and the farewell after it.
+    let mut all = Vec::new();
+    let holds = |all: &[u8], words: &[u8]| all.windows(words.len()).any(|part| part == words);
+    while !holds(&all, b"offline") {
+        all.extend(sent.recv_timeout(Duration::from_secs(60)).unwrap());
+    }
+    assert!(holds(&all, b"lab/test"));
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -2,7 +2,7 @@
 
 mod failures;
 pub(crate) mod receiver;
-mod tls;
+pub(crate) mod tls;
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -175,6 +175,8 @@ async fn trouble_is_told_to_those_who_want_to_hear_of_it() {
         let trouble = told(WebhookEvent::ScannerTrouble).status.unwrap();
         assert_eq!(trouble.link, ScannerLink::Trouble);
         assert!(trouble.problem.unwrap().contains("interlock open"));
+        let stopped = told(WebhookEvent::Interlock).status.unwrap();
+        assert!(stopped.problem.unwrap().contains("interlock open"));
         if needs_person {
             let paused = told(WebhookEvent::ScanPaused).scan.unwrap();
             assert_eq!((&paused.id, paused.state), (&scan.id, ScanState::Paused));
@@ -217,6 +219,8 @@ async fn trouble_is_told_to_those_who_want_to_hear_of_it() {
     assert_eq!((scan.state, scan.columns), (ScanState::Failed, 3));
     let status = told(WebhookEvent::ScannerTrouble).status.unwrap();
     assert!(status.problem.unwrap().contains("table stalled"));
+    // That is no interlock.
+    all.is_quiet();
     jobs.is_quiet();
 
     let few = serde_json::json!({"settings": {"regrid.roi_x_mm": [900, 901]}});
@@ -311,7 +315,7 @@ async fn a_test_tells_what_came_back() {
         (problem.status, problem.kind.as_str()),
         (404, "no-such-webhook")
     );
-    assert_eq!(problem.detail, "there is no webhook bal; there is lab");
+    assert_eq!(problem.detail, "there is no receiver bal; there is lab");
     let problem = ask("GET", path::webhook_deliveries("bal")).await;
     assert_eq!(problem.status, 404);
 

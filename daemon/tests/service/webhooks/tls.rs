@@ -12,14 +12,17 @@ use super::receiver::{Answer, Receiver, Wrap, any_port};
 use super::{SECRET, start, webhook};
 
 /// The authority of a lab.
-fn authority() -> CertifiedIssuer<'static, KeyPair> {
+pub(crate) fn authority() -> CertifiedIssuer<'static, KeyPair> {
     let mut params = CertificateParams::new([]).unwrap();
     params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
     CertifiedIssuer::self_signed(params, KeyPair::generate().unwrap()).unwrap()
 }
 
-/// A receiver behind https whose certificate is for this name.
-fn receiver(authority: &CertifiedIssuer<'static, KeyPair>, name: &str) -> Receiver {
+/// A server whose certificate is for this name.
+pub(crate) fn server_config(
+    authority: &CertifiedIssuer<'static, KeyPair>,
+    name: &str,
+) -> Arc<ServerConfig> {
     let key = KeyPair::generate().unwrap();
     let params = CertificateParams::new([name.to_owned()]).unwrap();
     let certificate = params.signed_by(&key, authority).unwrap();
@@ -30,7 +33,12 @@ fn receiver(authority: &CertifiedIssuer<'static, KeyPair>, name: &str) -> Receiv
         .with_no_client_auth()
         .with_single_cert(vec![certificate.der().clone()], key.into())
         .unwrap();
-    let config = Arc::new(config);
+    Arc::new(config)
+}
+
+/// A receiver behind https whose certificate is for this name.
+fn receiver(authority: &CertifiedIssuer<'static, KeyPair>, name: &str) -> Receiver {
+    let config = server_config(authority, name);
     let wrap: Wrap = Box::new(move |stream| {
         let connection = ServerConnection::new(Arc::clone(&config)).unwrap();
         Box::new(StreamOwned::new(connection, stream))
