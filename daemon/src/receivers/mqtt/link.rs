@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use rumqttc::{AsyncClient, Event, EventLoop, MqttOptions, NetworkOptions, Outgoing, Packet, QoS};
 use tokio::sync::Notify;
 
-use super::words::told;
+use super::words;
 use crate::error::panic_text;
 use crate::service::lock;
 
@@ -222,17 +222,29 @@ impl Shared {
     /// Keeps a connection until the end. Runs on a thread of its own.
     fn keep(&self) {
         let mut wait = FIRST_WAIT;
+        let mut told: Option<String> = None;
         loop {
+            let begun = Instant::now();
             // A defect that a broker sets off costs one connection and nothing else.
             let ended = catch_unwind(AssertUnwindSafe(|| self.connect()));
             let why = ended.unwrap_or_else(|panic| Some(defect(&*panic)));
             let mut state = lock(&self.state);
             if state.client.take().is_some() {
-                wait = FIRST_WAIT;
+                // One that is lost at once each time, as where two services have one name there, is
+                // not made again each second.
+                if begun.elapsed() >= LONGEST_WAIT {
+                    wait = FIRST_WAIT;
+                }
                 if let Some(why) = &why {
                     tracing::warn!(broker = self.broker(), %why, "connection to a broker lost");
                 }
+            } else if let Some(why) = &why
+                && told.as_ref() != Some(why)
+            {
+                // Once, for as long as it stays the same.
+                tracing::warn!(broker = self.broker(), %why, "no connection to a broker");
             }
+            told.clone_from(&why);
             state.queued.clear();
             state.written.clear();
             state.why_not = why;
@@ -299,7 +311,7 @@ impl Shared {
                 }),
                 Ok(Event::Outgoing(Outgoing::Disconnect)) => return None,
                 Ok(_) => {}
-                Err(error) => return Some(told(&error, &self.broker(), self.timeout)),
+                Err(error) => return Some(words::told(&error, &self.broker(), self.timeout)),
             }
         }
     }

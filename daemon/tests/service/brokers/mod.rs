@@ -14,7 +14,7 @@ use relief_api::{
 };
 use reliefd::config::{MqttConfig, Retry};
 
-use crate::rig::Rig;
+use crate::rig::{Rig, config};
 use crate::webhooks::write_secret;
 use broker::{Broker, PASSWORD, USER, mute};
 
@@ -97,9 +97,17 @@ async fn messages_and_states_are_published() {
     let status = late.on("status");
     assert!(status.retained && status.payload == "online", "{status:?}");
     assert!(late.on("/state").retained);
+    // A reload makes another connection, which takes the place of the one before.
+    let mut reloaded = config(rig.folder.path());
+    reloaded.mqtt = vec![section(rig.folder.path(), &broker)];
+    let _ = rig.daemon.reload(&reloaded);
+    late.until("lab/relief/status", |payload| payload == "online");
+    let tested: Delivery = rig.client.ask(&path::webhook_test("hall")).await;
+    assert_eq!(tested.state, DeliveryState::Delivered, "{tested:?}");
     rig.daemon.shutdown().await;
-    assert_eq!(late.on("lab/relief/status").payload, "offline");
-    assert_eq!(listener.on("lab/relief/status").payload, "offline");
+    late.until("lab/relief/status", |payload| payload == "offline");
+    // And that is what the broker keeps.
+    assert_eq!(broker.listen(None).on("status").payload, "offline");
 }
 
 #[tokio::test(flavor = "multi_thread")]

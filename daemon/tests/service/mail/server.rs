@@ -156,19 +156,23 @@ fn serve(
                     false => "535 who are you?",
                 }
             }
-            "MAIL" => match script.lock().unwrap().pop_front() {
-                // No end of lines of one answer.
-                Some("") => loop {
-                    write!(stream, "250-wait\r\n")?;
-                    stream.flush()?;
-                    std::thread::sleep(Duration::from_millis(20));
-                },
-                Some(refusal) => refusal,
-                None => {
-                    mail.from = rest.to_owned();
-                    "250 ok"
+            "MAIL" => {
+                // The lock is given back before anything goes on for long.
+                let refusal = script.lock().unwrap().pop_front();
+                match refusal {
+                    // No end of lines of one answer.
+                    Some("") => loop {
+                        write!(stream, "250-wait\r\n")?;
+                        stream.flush()?;
+                        std::thread::sleep(Duration::from_millis(20));
+                    },
+                    Some(refusal) => refusal,
+                    None => {
+                        mail.from = rest.to_owned();
+                        "250 ok"
+                    }
                 }
-            },
+            }
             "RCPT" => {
                 mail.to.push(rest.to_owned());
                 "250 ok"

@@ -376,7 +376,7 @@ async fn a_reload_takes_over_webhooks_and_their_secrets() {
     let reply = rig.client.request("POST", &test, None).await;
     assert_eq!(
         reply.problem().detail,
-        "there is no webhook lab; there are none"
+        "there is no receiver lab; there are none"
     );
     rig.scan_to_result("unheard").await;
     first.is_quiet();
