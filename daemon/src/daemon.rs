@@ -14,6 +14,7 @@ use tokio_util::sync::CancellationToken;
 
 use crate::acquisition::watch;
 use crate::config::{Config, HttpConfig, Reloaded};
+use crate::discovery::Announcement;
 use crate::error::ServiceError;
 use crate::events::Hub;
 use crate::http::{ListenError, on_loopback, on_socket, serve};
@@ -100,6 +101,7 @@ pub struct Daemon {
     /// Else it goes on without this process.
     socket_is_ours: bool,
     listen: Option<SocketAddr>,
+    announcement: Option<Announcement>,
 }
 
 impl std::fmt::Debug for Daemon {
@@ -211,6 +213,7 @@ impl Daemon {
             socket: offered.socket,
             socket_is_ours: offered.socket_is_ours,
             listen: offered.listen,
+            announcement: None,
         };
         daemon.start_threads(workers).map_err(StartError::Thread)?;
         // Nothing can fail any more that would end the service, and nobody can ask for a scan yet.
@@ -223,6 +226,7 @@ impl Daemon {
         if let Some(tcp) = offered.tcp {
             daemon.serve(tcp, on_loopback(&daemon.service, &daemon.stop), limits);
         }
+        daemon.announcement = Announcement::begin(&daemon.service.config());
         tracing::info!(socket = %daemon.socket.display(), "reliefd {} is ready", env!("CARGO_PKG_VERSION"));
         Ok(daemon)
     }
@@ -311,6 +315,7 @@ impl Daemon {
         service.queue.stop();
         service.receivers.stop();
         let threads = self.threads;
+        let announcement = self.announcement;
         let ended = tokio::task::spawn_blocking(move || {
             stop_all(&service.stations, "the service was stopped");
             service.join_scans();
@@ -323,6 +328,9 @@ impl Daemon {
             service.receivers.join();
             if let Some(traces) = service.traces.get() {
                 traces.end();
+            }
+            if let Some(announcement) = announcement {
+                announcement.end();
             }
         })
         .await;

@@ -167,6 +167,12 @@ pub enum ServiceError {
         /// The folder or file.
         what: String,
     },
+    /// Nothing could be noted of it.
+    #[error("no job is known that made {result}, so that nothing can be noted of it")]
+    NoRecordOfResult {
+        /// The folder.
+        result: String,
+    },
     /// The disk would get full.
     #[error(
         "there is no room in {folder}: the scan takes up to {}, and {} are to stay free \
@@ -200,6 +206,20 @@ pub enum ServiceError {
         /// Those there are.
         known: Vec<String>,
     },
+    /// There is no such hook.
+    #[error("there is no hook {name}; there {}", match .known.as_slice() {
+        [] => "are none".to_owned(),
+        known => format!("{} {}", are(known), known.join(", ")),
+    })]
+    NoSuchHook {
+        /// As it was given.
+        name: String,
+        /// Those there are.
+        known: Vec<String>,
+    },
+    /// Nothing is there that a hook could be run for.
+    #[error("there is no result in the spool that it could be run for")]
+    NoResult,
     /// Somebody else is at it.
     #[error("{name} is just being tested")]
     WebhookBusy {

@@ -14,11 +14,13 @@
 
 pub mod calibration;
 pub mod config;
+pub mod discovery;
 pub mod logging;
 pub mod systemd;
 
 mod acquisition;
 mod arguments;
+mod confined;
 mod daemon;
 mod error;
 mod events;
@@ -46,6 +48,7 @@ mod traces;
 pub use acquisition::PlanError;
 pub use arguments::Arguments;
 pub use config::{Config, ConfigError};
+pub use confined::{HOOK_CHILD, become_hook};
 pub use daemon::{Daemon, StartError};
 pub use error::ServiceError;
 pub use http::ListenError;

@@ -5,13 +5,17 @@ use std::process::ExitCode;
 use clap::Parser;
 use reliefd::logging::{self, LogHandle};
 use reliefd::systemd::{self, Inherited};
-use reliefd::{Arguments, Config, Daemon};
+use reliefd::{Arguments, Config, Daemon, HOOK_CHILD, become_hook};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
 /// "Configuration error" in sysexits.h: trying again does not help, and systemd is told so.
 const EX_CONFIG: u8 = 78;
 
 fn main() -> ExitCode {
+    let mut words = std::env::args_os().skip(1);
+    if words.next().is_some_and(|word| word == HOOK_CHILD) {
+        return become_hook(words);
+    }
     let arguments = Arguments::parse();
     let config = match Config::load_with_files(&arguments.config) {
         Ok(config) => config,

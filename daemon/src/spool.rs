@@ -188,6 +188,8 @@ impl Spool {
             result: result.to_owned(),
             directory: directory.to_string_lossy().into_owned(),
             files: list().map_err(error("list a result", &directory))?,
+            acknowledged_at: None,
+            acknowledged_by: None,
         }))
     }
 

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)] // A test may give up.
 
 use std::fs;
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::os::fd::OwnedFd;
 use std::os::unix::fs::FileTypeExt;
 use std::os::unix::net::{UnixDatagram, UnixListener, UnixStream};
@@ -206,4 +206,60 @@ fn a_look_at_the_configuration_tells_of_each_of_several_scanners() {
         "two-scanners.toml: sound\nscanner left: /dev/relief/scanner-000123\n\
          scanner right: USB 1209:0001, serial 000124\n"
     );
+}
+
+/// Whether a process runs; one that has ended stays until somebody has waited for it.
+fn runs(pid: &str) -> bool {
+    let status = fs::read_to_string(format!("/proc/{pid}/stat"));
+    status.is_ok_and(|status| !status.contains(") Z "))
+}
+
+#[test]
+fn a_hook_ends_with_the_service() {
+    let confined = r#"{"parent": %d, "cpu_s": 60, "memory_bytes": 4000000000, "file_bytes": 1,
+        "processes": 60000, "folders": null, "command": ["/bin/sleep", "600"]}"#;
+    // A shell in the service's place.
+    let mut service = Command::new("/bin/sh")
+        .args([
+            "-c",
+            "\"$0\" hook-child \"$(printf \"$1\" $$)\" & echo $!; wait",
+        ])
+        .args([env!("CARGO_BIN_EXE_reliefd"), confined])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut pid = String::new();
+    let mut told = BufReader::new(service.stdout.take().unwrap());
+    told.read_line(&mut pid).unwrap();
+    let pid = pid.trim();
+    let begun = Instant::now();
+    let name = || fs::read_to_string(format!("/proc/{pid}/comm")).unwrap_or_default();
+    while name() != "sleep\n" {
+        assert!(begun.elapsed() < LIMIT, "the hook does not begin");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    service.kill().unwrap();
+    service.wait().unwrap();
+    while runs(pid) {
+        assert!(begun.elapsed() < LIMIT, "the hook has outlived the service");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn a_hook_that_cannot_be_confined_is_not_begun() {
+    let other = r#"{"parent": 1, "cpu_s": 60, "memory_bytes": 4000000000, "file_bytes": 1,
+        "processes": 60000, "folders": null, "command": ["/bin/echo", "begun"]}"#;
+    for (arguments, why) in [
+        (&["hook-child"][..], "this is how the service runs hooks"),
+        (&["hook-child", "{}"], "this is how the service runs hooks"),
+        (&["hook-child", other], "the service has ended"),
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_reliefd"));
+        let output = command.args(arguments).output().unwrap();
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(125), "{told}");
+        assert!(told.contains(why), "{told}");
+        assert!(output.stdout.is_empty());
+    }
 }

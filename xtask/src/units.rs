@@ -12,7 +12,8 @@ use crate::{apt, shell};
 const UNITS: [&str; 2] = ["reliefd.service", "reliefd.socket"];
 
 /// Drop-ins that users may install, and the units that they are for.
-const DROP_INS: [(&str, &str); 2] = [
+const DROP_INS: [(&str, &str); 3] = [
+    ("discovery.conf", "reliefd.service"),
     ("loopback.conf", "reliefd.socket"),
     ("network.conf", "reliefd.service"),
 ];

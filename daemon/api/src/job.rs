@@ -96,6 +96,12 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "SettingOverrides::is_empty")]
     #[schema(schema_with = crate::scan::settings_schema)]
     pub settings: SettingOverrides,
+    /// When its result was first acknowledged, RFC 3339: somebody has it whole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub acknowledged_at: Option<String>,
+    /// Who did so: the name of a token, or `socket`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub acknowledged_by: Option<String>,
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref)] // As serde calls it.
@@ -144,6 +150,12 @@ pub struct SpoolEntry {
     pub directory: String,
     /// Its files by name.
     pub files: Vec<SpoolFile>,
+    /// When it was first acknowledged, RFC 3339: somebody has it whole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub acknowledged_at: Option<String>,
+    /// Who did so: the name of a token, or `socket`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub acknowledged_by: Option<String>,
 }
 
 /// A file of the spool.

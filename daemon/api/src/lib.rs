@@ -50,6 +50,7 @@
 //! not know.
 
 mod event;
+mod hook;
 mod image;
 mod job;
 mod laser;
@@ -65,6 +66,7 @@ mod token;
 mod webhook;
 
 pub use event::{Event, LiveColumn};
+pub use hook::{Hook, HookList, HookRuns};
 pub use image::{DEFAULT_NODES, ImageRequest, MAX_NODES, Regrid, RegridImage, ScanImage};
 pub use job::{Job, JobId, JobList, JobState, Rerun, SpoolEntry, SpoolFile, StageTiming};
 pub use laser::{LaserEntry, LaserLog, LaserState};

@@ -48,6 +48,8 @@ pub const JOB_CANCEL: &str = "/v1/jobs/{job}/cancel";
 pub const SPOOL: &str = "/v1/spool/{result}";
 /// Pattern of one file of the spool.
 pub const SPOOL_FILE: &str = "/v1/spool/{result}/{file}";
+/// Pattern of acknowledging a result.
+pub const SPOOL_ACK: &str = "/v1/spool/{result}/ack";
 /// The log of the lasers.
 pub const LASER: &str = "/v1/laser";
 /// The tokens; on the socket only.
@@ -60,6 +62,12 @@ pub const WEBHOOKS: &str = "/v1/webhooks";
 pub const WEBHOOK_DELIVERIES: &str = "/v1/webhooks/{webhook}/deliveries";
 /// Pattern of a webhook's test.
 pub const WEBHOOK_TEST: &str = "/v1/webhooks/{webhook}/test";
+/// The hooks.
+pub const HOOKS: &str = "/v1/hooks";
+/// Pattern of a hook's log.
+pub const HOOK_RUNS: &str = "/v1/hooks/{hook}/runs";
+/// Pattern of a hook's test.
+pub const HOOK_TEST: &str = "/v1/hooks/{hook}/test";
 /// Pattern of a scan's range image.
 pub const SCAN_IMAGE: &str = "/v1/scans/{scan}/image";
 /// Pattern of trying other settings on a scan's range image.
@@ -181,6 +189,12 @@ pub fn spool_file(result: &str, file: &str) -> String {
     format!("{}/{}", spool(result), segment(file))
 }
 
+/// Acknowledgement of one result.
+#[must_use]
+pub fn spool_ack(result: &str) -> String {
+    spool(result) + "/ack"
+}
+
 /// Revocation of one token.
 #[must_use]
 pub fn token_revoke(name: &str) -> String {
@@ -197,6 +211,18 @@ pub fn webhook_deliveries(name: &str) -> String {
 #[must_use]
 pub fn webhook_test(name: &str) -> String {
     format!("{WEBHOOKS}/{}/test", segment(name))
+}
+
+/// Log of a hook.
+#[must_use]
+pub fn hook_runs(name: &str) -> String {
+    format!("{HOOKS}/{}/runs", segment(name))
+}
+
+/// Test of a hook.
+#[must_use]
+pub fn hook_test(name: &str) -> String {
+    format!("{HOOKS}/{}/test", segment(name))
 }
 
 /// One segment of a path, escaped (RFC 3986, section 2.3).

@@ -18,6 +18,8 @@ pub enum WebhookKind {
     Mqtt,
     /// People are written to.
     Mail,
+    /// A program is run, with what the message says in its environment.
+    Hook,
     /// Of a kind that this version does not know; never sent.
     #[serde(other)]
     Unknown,
@@ -31,6 +33,7 @@ impl WebhookKind {
             Self::Webhook => "webhook",
             Self::Mqtt => "mqtt",
             Self::Mail => "mail",
+            Self::Hook => "hook",
             Self::Unknown => "unknown",
         }
     }

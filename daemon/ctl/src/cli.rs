@@ -6,9 +6,9 @@ use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    abort, accept, calibrate, change, compare, config, convert, demo, doctor, features, fetch,
-    fill, jobs, laser, manual, pause, rerun, resume, scan, scans, skin, status, surface, token,
-    toolpath, watch, webhooks,
+    abort, accept, calibrate, change, compare, config, convert, demo, discover, doctor, features,
+    fetch, fill, hooks, jobs, laser, manual, pause, rerun, resume, scan, scans, skin, status,
+    surface, token, toolpath, watch, webhooks,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
@@ -58,7 +58,9 @@ pub(crate) enum Command {
     Laser(laser::Args),
     Token(token::Args),
     Webhooks(webhooks::Args),
+    Hooks(hooks::Args),
     Config(config::Args),
+    Discover(discover::Args),
     Doctor(doctor::Args),
     Manual(manual::Args),
 }

@@ -137,6 +137,14 @@ impl Config {
         let traces = config.traces.check();
         traces.map_err(|message| inconsistent(path, "traces", message))?;
         config
+            .storage
+            .check()
+            .map_err(|message| inconsistent(path, "storage", message))?;
+        config
+            .discovery
+            .check(&config.http.hosts)
+            .map_err(|message| inconsistent(path, "discovery", message))?;
+        config
             .processing()
             .check()
             .map_err(|(section, message)| inconsistent(path, section, message))?;

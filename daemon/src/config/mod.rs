@@ -3,9 +3,11 @@
 //! A key that does not exist, or a value that cannot be, is refused with its line and a
 //! way out; nothing is silently ignored.
 
+mod discovery;
 mod fill;
 mod formats;
 mod further;
+mod hooks;
 mod http;
 mod load;
 mod mail;
@@ -31,11 +33,13 @@ use std::time::Duration;
 use relief_api::{PlanRequest, THE_SCANNER};
 use serde::{Deserialize, Serialize};
 
+pub use discovery::DiscoveryConfig;
 pub use fill::{FillConfig, FillMode};
 pub use further::{
     KnotsChoice, MachineChoice, OfChoice, PatternChoice, SkinConfig, SkinMethod, SurfaceConfig,
     ToolpathConfig,
 };
+pub use hooks::{HookConfig, HookEvent, HookSandbox};
 pub use http::HttpConfig;
 pub use load::ConfigError;
 pub use mail::{MailConfig, MailSecurity};
@@ -51,8 +55,9 @@ pub use receivers::Retry;
 pub use regularities::{Regularize, RegularizeUnits};
 pub use reload::Reloaded;
 pub use scanner::{ScannerConfig, Transport};
-pub use storage::{Limits, StorageConfig};
+pub use storage::{Acknowledged, Limits, StorageConfig, Unacknowledged};
 pub use traces::TracesConfig;
+pub(crate) use value::is_host_name;
 pub use webhooks::WebhookConfig;
 
 /// The whole configuration.
@@ -73,6 +78,8 @@ pub struct Config {
     pub journal: JournalConfig,
     /// Room on the disk.
     pub storage: StorageConfig,
+    /// Whether others on the network are told of the service.
+    pub discovery: DiscoveryConfig,
     /// From samples to the uniform range image.
     pub regrid: RegridConfig,
     /// From the range image to regions.
@@ -91,6 +98,8 @@ pub struct Config {
     pub mqtt: Vec<MqttConfig>,
     /// People who are written to.
     pub mail: Vec<MailConfig>,
+    /// What is run for each result.
+    pub hooks: Vec<HookConfig>,
     /// Who is told how long things took.
     pub traces: TracesConfig,
     /// What is logged.

@@ -1,4 +1,5 @@
-//! What the sections of all who are told have in common: `[[webhooks]]`, `[[mqtt]]` and `[[mail]]`.
+//! What the sections of all who are told have in common: `[[webhooks]]`, `[[mqtt]]`, `[[mail]]` and
+//! `[[hooks]]`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,7 +10,9 @@ use toml::de::{DeTable, DeValue};
 
 use super::Config;
 use super::load::line_and_column;
-use crate::receivers::{FileError, check_broker_files, check_files, check_mail_files};
+use crate::receivers::{
+    FileError, check_broker_files, check_command, check_files, check_mail_files,
+};
 
 /// When a message is tried again that was not taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,10 +98,17 @@ fn all(config: &Config) -> Vec<(&'static str, Vec<Told<'_>>)> {
         keys: own.check(),
         files: Box::new(|| check_mail_files(own)),
     });
+    let hooks = config.hooks.iter().map(|own| Told {
+        what: "hook",
+        name: &own.name,
+        keys: own.check(),
+        files: Box::new(|| check_command(own)),
+    });
     vec![
         ("webhooks", webhooks.collect()),
         ("mqtt", brokers.collect()),
         ("mail", mail.collect()),
+        ("hooks", hooks.collect()),
     ]
 }
 

@@ -43,9 +43,10 @@ impl Config {
             deliverables,
             webhooks,
             mqtt,
-            mail
+            mail,
+            hooks
         );
-        leave!(service, http, queue, traces);
+        leave!(service, http, discovery, queue, traces);
         merged.scanner = reloaded_scanner("scanner", &self.scanner, &new.scanner, &mut outcome);
         for (name, scanner) in &self.scanners {
             let section = format!("scanners.{name}");

@@ -27,6 +27,35 @@ pub struct StorageConfig {
     /// Days for which results are kept.
     #[serde(deserialize_with = "value::days")]
     pub results_days: Option<u32>,
+    /// Days for which results are kept once they are acknowledged.
+    #[serde(deserialize_with = "value::days")]
+    pub acknowledged_days: Option<u32>,
+    /// What becomes of results that are acknowledged.
+    pub acknowledged: Acknowledged,
+    /// What becomes of results that are not.
+    pub unacknowledged: Unacknowledged,
+}
+
+/// What becomes of results that somebody has acknowledged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Acknowledged {
+    /// They stay until their days are over or room is short, when they go before all others.
+    #[default]
+    Keep,
+    /// They go at the next look.
+    Remove,
+}
+
+/// What becomes of results that nobody has acknowledged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Unacknowledged {
+    /// They go by age and size, after those that are acknowledged.
+    #[default]
+    Limits,
+    /// They stay, whatever the limits.
+    Keep,
 }
 
 /// Bytes of a megabyte.
@@ -54,7 +83,25 @@ impl StorageConfig {
     /// Most bytes and days of results.
     #[must_use]
     pub fn results(&self) -> Limits {
-        Limits::new(self.results_mb, self.results_days)
+        Limits {
+            acknowledged_s: match self.acknowledged {
+                Acknowledged::Keep => self.acknowledged_days.map(seconds),
+                Acknowledged::Remove => Some(0),
+            },
+            ..Limits::new(self.results_mb, self.results_days)
+        }
+    }
+
+    /// Refuses what contradicts itself.
+    pub(super) fn check(&self) -> Result<(), String> {
+        if self.acknowledged == Acknowledged::Remove && self.acknowledged_days.is_some() {
+            return Err(
+                "acknowledged = \"remove\" leaves nothing for acknowledged_days to keep: \
+                 leave out one of them"
+                    .to_owned(),
+            );
+        }
+        Ok(())
     }
 }
 
@@ -67,6 +114,9 @@ impl Default for StorageConfig {
             scans_days: None,
             results_mb: None,
             results_days: None,
+            acknowledged_days: None,
+            acknowledged: Acknowledged::default(),
+            unacknowledged: Unacknowledged::default(),
         }
     }
 }
@@ -78,13 +128,20 @@ pub struct Limits {
     pub bytes: Option<u64>,
     /// Seconds since the end.
     pub age_s: Option<u64>,
+    /// Seconds since it was acknowledged; 0 for none at all.
+    pub acknowledged_s: Option<u64>,
+}
+
+fn seconds(days: u32) -> u64 {
+    u64::from(days) * 86_400
 }
 
 impl Limits {
     fn new(megabytes: Option<u32>, days: Option<u32>) -> Self {
         Self {
             bytes: megabytes.map(|megabytes| u64::from(megabytes) * MB),
-            age_s: days.map(|days| u64::from(days) * 86_400),
+            age_s: days.map(seconds),
+            acknowledged_s: None,
         }
     }
 }

@@ -70,6 +70,24 @@ pub(super) fn broker_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<
     Ok(name)
 }
 
+pub(super) fn hook_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    let name = String::deserialize(deserializer)?;
+    check_name(&name, "hook").map_err(D::Error::custom)?;
+    Ok(name)
+}
+
+pub(super) fn hook_seconds<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    bounded(deserializer, 1, 86_400, " s")
+}
+
+pub(super) fn hook_megabytes<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    bounded(deserializer, 1, 1_000_000, " MB")
+}
+
+pub(super) fn hook_processes<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    bounded(deserializer, 16, 65_536, " processes")
+}
+
 pub(super) fn mail_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
     let name = String::deserialize(deserializer)?;
     check_name(&name, "mail").map_err(D::Error::custom)?;
@@ -251,20 +269,41 @@ pub(super) fn host_names<'de, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Vec<String>, D::Error> {
     let names = Vec::<String>::deserialize(deserializer)?;
-    let is_name = |name: &str| {
-        let label = |label: &str| {
-            let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'-';
-            !label.is_empty() && label.len() <= 63 && label.bytes().all(plain)
-        };
-        name.len() <= 253 && name.split('.').all(label)
-    };
-    match names.iter().find(|name| !is_name(name)) {
+    match names.iter().find(|name| !is_host_name(name)) {
         Some(wrong) => Err(D::Error::custom(format!(
             "`{wrong}` is no name of a host: write it as in \"bench.lab.example\", without scheme \
              and port"
         ))),
         None => Ok(names.iter().map(|name| name.to_ascii_lowercase()).collect()),
     }
+}
+
+/// Letters, digits, `-` and dots, as names of hosts have (RFC 1123, section 2.1).
+pub(crate) fn is_host_name(name: &str) -> bool {
+    let label = |label: &str| {
+        let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'-';
+        !label.is_empty() && label.len() <= 63 && label.bytes().all(plain)
+    };
+    name.len() <= 253 && name.split('.').all(label)
+}
+
+pub(super) fn port<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u16, D::Error> {
+    let port = bounded(deserializer, 1, u16::MAX.into(), "")?;
+    // It is within bounds.
+    Ok(u16::try_from(port).unwrap_or(u16::MAX))
+}
+
+/// What a service is called in lists: one label of a domain name (RFC 6763, section 4.1.1).
+pub(super) fn announced_name<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<String>, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    if text.trim().is_empty() || text.len() > 63 || text.chars().any(char::is_control) {
+        return Err(D::Error::custom(format!(
+            "{text:?} is no name to be announced: up to 63 bytes in one line are possible"
+        )));
+    }
+    Ok(Some(text))
 }
 
 /// Name of a group; whether there is one is seen when the socket is made.

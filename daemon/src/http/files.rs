@@ -2,12 +2,13 @@
 
 use std::io;
 
-use axum::extract::{Path, State};
+use axum::extract::{Extension, Path, State};
 use axum::http::HeaderMap;
 use axum::response::{Json, Response};
-use relief_api::{SpoolEntry, path};
+use relief_api::{Job, SpoolEntry, path};
 
 use super::download::{Download, DownloadHeaders, download};
+use super::guard::{Asker, ON_SOCKET};
 use super::openapi::Problems;
 use super::problem::Refusal;
 use super::{Context, blocking};
@@ -21,14 +22,26 @@ pub(super) async fn entry(
     State(context): State<Context>,
     Path(result): Path<String>,
 ) -> Result<Json<SpoolEntry>, Refusal> {
-    blocking(context, move |service| {
-        service
-            .spool
-            .entry(&result)?
-            .ok_or(ServiceError::NotInSpool { what: result })
-    })
-    .await
-    .map(Json)
+    blocking(context, move |service| service.spool_entry(&result))
+        .await
+        .map(Json)
+}
+
+/// Notes that the sender has a result whole: it may go before those that nobody has. Asking again
+/// changes nothing.
+#[utoipa::path(post, path = path::SPOOL_ACK, tag = "results", operation_id = "acknowledge_result",
+    params(("result" = String, Path, description = "Name of the folder")),
+    responses((status = 200, body = Job, description = "The job that made it, with who has it since when"),
+        (status = 404, response = Problems), (status = 409, response = Problems)))]
+pub(super) async fn acknowledge(
+    State(context): State<Context>,
+    Path(result): Path<String>,
+    asker: Option<Extension<Asker>>,
+) -> Result<Json<Job>, Refusal> {
+    let by = asker.map_or_else(|| ON_SOCKET.to_owned(), |Extension(Asker(name))| name);
+    blocking(context, move |service| service.acknowledge(&result, &by))
+        .await
+        .map(Json)
 }
 
 /// A file of a result. Ranges and conditional requests are understood.

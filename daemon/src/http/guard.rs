@@ -16,10 +16,17 @@ use super::problem::Refusal;
 
 const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
+/// Who asks on the loopback address: the name of the token.
+#[derive(Debug, Clone)]
+pub(super) struct Asker(pub(super) String);
+
+/// Stands for whoever asks on the socket.
+pub(super) const ON_SOCKET: &str = "socket";
+
 /// Refuses requests of other sites' pages, and those without a token or ticket that holds.
 pub(crate) async fn bearers_only(
     State(context): State<Context>,
-    request: Request,
+    mut request: Request,
     next: Next,
 ) -> Response {
     let hosts = context.service.config();
@@ -35,6 +42,7 @@ pub(crate) async fn bearers_only(
     match admitted {
         Ok(bearer) => {
             tracing::debug!(bearer, method = %request.method(), path = request.uri().path(), "request");
+            request.extensions_mut().insert(Asker(bearer));
             next.run(request).await
         }
         Err(refusal) => {

@@ -8,6 +8,7 @@ mod download;
 mod events;
 mod files;
 mod guard;
+mod hooks;
 mod images;
 mod jobs;
 mod listen;

@@ -14,7 +14,9 @@ use utoipa::{OpenApi as _, ToResponse};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use super::{Context, events, files, images, jobs, metrics, scanners, scans, tickets, webhooks};
+use super::{
+    Context, events, files, hooks, images, jobs, metrics, scanners, scans, tickets, webhooks,
+};
 
 /// A refused request.
 pub(super) struct Problems;
@@ -48,6 +50,7 @@ impl<'r> ToResponse<'r> for Problems {
         (name = "scanners", description = "The scanners and their lasers"),
         (name = "events", description = "What happens, as it happens"),
         (name = "webhooks", description = "Who is told when something is done"),
+        (name = "hooks", description = "What is run for each result"),
         (name = "tokens", description = "Who may ask; on the Unix socket only"),
         (name = "service", description = "The service itself"),
     ),
@@ -87,7 +90,11 @@ pub(super) fn described() -> OpenApiRouter<Context> {
         .routes(routes!(jobs::cancel))
         .routes(routes!(files::entry))
         .routes(routes!(files::file))
+        .routes(routes!(files::acknowledge))
         .routes(routes!(tickets::create))
+        .routes(routes!(hooks::list))
+        .routes(routes!(hooks::runs))
+        .routes(routes!(hooks::test))
         .routes(routes!(webhooks::list))
         .routes(routes!(webhooks::deliveries))
         .routes(routes!(webhooks::test))

@@ -143,12 +143,30 @@ impl From<ServiceError> for Refusal {
                 "no-such-webhook",
                 Some("each has a section [[webhooks]], [[mqtt]] or [[mail]] in the configuration".into()),
             ),
+            ServiceError::NoSuchHook { .. } => (
+                S::NOT_FOUND,
+                "no-such-hook",
+                Some("each has a section [[hooks]] in the configuration".into()),
+            ),
+            ServiceError::NoResult => (
+                S::CONFLICT,
+                "no-result",
+                Some("take a scan, or rerun one".into()),
+            ),
             ServiceError::WebhookBusy { .. } => (
                 S::CONFLICT,
                 "webhook-busy",
                 Some("try again in a moment".into()),
             ),
             ServiceError::NotInSpool { .. } => (S::NOT_FOUND, "not-in-spool", None),
+            ServiceError::NoRecordOfResult { .. } => (
+                S::CONFLICT,
+                "no-record-of-result",
+                Some(
+                    "it is left by a job whose record was lost: remove the folder once you have it"
+                        .into(),
+                ),
+            ),
             ServiceError::NoRoom { .. } => (
                 S::INSUFFICIENT_STORAGE,
                 "no-room",

@@ -3,6 +3,7 @@
 //! A job is begun at least once and published exactly once: the records say what is
 //! waiting, and the result's folder, which appears by one rename, says what is done.
 
+mod acknowledge;
 mod process;
 mod progress;
 mod queue;
@@ -199,6 +200,8 @@ fn new_job(scan: &Scan, result: String, name: String) -> Job {
         directory: None,
         left_out: Vec::new(),
         settings: relief_api::SettingOverrides::new(),
+        acknowledged_at: None,
+        acknowledged_by: None,
     }
 }
 

@@ -18,9 +18,11 @@ mod agent;
 mod backoff;
 mod deliver;
 mod files;
+mod hook;
 mod mail;
 mod mqtt;
 mod receiver;
+mod runs;
 mod show;
 mod tell;
 mod webhook;
@@ -39,6 +41,7 @@ use crate::service::{Service, lock};
 use crate::store::{Added, Store, StoreError};
 pub(crate) use agent::agent;
 pub(crate) use files::{FileError, read_secret};
+pub(crate) use hook::check_command;
 pub(crate) use mail::check_files as check_mail_files;
 pub(crate) use mqtt::check_files as check_broker_files;
 use receiver::Receiver;
@@ -85,6 +88,13 @@ fn make_all(config: &Config) -> Result<Vec<Receiver>, ReceiverError> {
         let receiver = mail::receiver(config, public_url);
         made.push(receiver.map_err(failed(WebhookKind::Mail, &config.name))?);
     }
+    let state_dir = &config.service.state_dir;
+    made.extend(
+        config
+            .hooks
+            .iter()
+            .map(|own| hook::receiver(own, state_dir)),
+    );
     Ok(made)
 }
 
@@ -230,7 +240,8 @@ impl Receivers {
     pub(crate) fn open(config: &Config, store: &Store) -> Result<Self, ReceiverError> {
         let receivers = Self::default();
         receivers.replace(config, store)?;
-        if !receivers.all().is_empty() {
+        let is_far = |outbox: &Arc<Outbox>| outbox.receiver().settings.kind != WebhookKind::Hook;
+        if receivers.all().iter().any(is_far) {
             warn_without_network();
         }
         Ok(receivers)

@@ -1,11 +1,11 @@
 //! What receivers are told: from what happens to messages, and to the answers of the API.
 
-use std::sync::{Mutex, MutexGuard, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 
 use deliverables::hexadecimal;
 use relief_api::{
     Delivery, DeliveryState, DiskRoom, Event, Job, JobState, Scan, ScannerLink, ScannerStatus,
-    Webhook, WebhookData, WebhookEvent, WebhookMessage,
+    Webhook, WebhookData, WebhookEvent, WebhookKind, WebhookMessage,
 };
 use scanner_protocol::Faults;
 use sha2::{Digest, Sha256};
@@ -84,7 +84,7 @@ fn alone(lock: &Mutex<()>) -> Option<MutexGuard<'_, ()>> {
 }
 
 /// The one tried last, of deliveries that are listed newest first.
-fn latest(mut deliveries: Vec<Delivery>) -> Option<Delivery> {
+pub(super) fn latest(mut deliveries: Vec<Delivery>) -> Option<Delivery> {
     let last_try = |delivery: &Delivery| delivery.tried.last().map(|tried| tried.at.clone());
     deliveries.retain(|delivery| !delivery.tried.is_empty());
     // Of two tried within one millisecond the last one found counts, which is to be the newer.
@@ -193,13 +193,25 @@ impl Receivers {
         })
     }
 
-    fn outbox(&self, name: &str) -> Result<std::sync::Arc<Outbox>, ServiceError> {
-        let all = self.all();
+    /// Who is told by messages.
+    fn outbox(&self, name: &str) -> Result<Arc<Outbox>, ServiceError> {
+        self.of(|kind| kind != WebhookKind::Hook, name)
+            .map_err(|known| ServiceError::NoSuchWebhook {
+                name: name.to_owned(),
+                known,
+            })
+    }
+
+    /// The one of this name, or the names of those there are.
+    pub(super) fn of(
+        &self,
+        is_meant: impl Fn(WebhookKind) -> bool,
+        name: &str,
+    ) -> Result<Arc<Outbox>, Vec<String>> {
+        let mut all = self.all();
+        all.retain(|outbox| is_meant(outbox.receiver().settings.kind));
         let found = all.iter().find(|outbox| outbox.name == name).cloned();
-        found.ok_or_else(|| ServiceError::NoSuchWebhook {
-            name: name.to_owned(),
-            known: all.iter().map(|outbox| outbox.name.clone()).collect(),
-        })
+        found.ok_or_else(|| all.iter().map(|outbox| outbox.name.clone()).collect())
     }
 }
 
@@ -274,6 +286,9 @@ impl Service {
         for outbox in self.receivers.all() {
             let latest = latest(self.store.deliveries(&outbox.name)?);
             let settings = &outbox.receiver().settings;
+            if settings.kind == WebhookKind::Hook {
+                continue;
+            }
             let state = lock(&outbox.state);
             list.push(Webhook {
                 name: outbox.name.clone(),
@@ -298,20 +313,31 @@ impl Service {
     pub(crate) fn test_webhook(&self, name: &str) -> Result<Delivery, ServiceError> {
         self.check_running()?;
         let outbox = self.receivers.outbox(name)?;
+        let data = WebhookData {
+            webhook: Some(name.to_owned()),
+            ..WebhookData::default()
+        };
+        self.test(&outbox, None, data)
+    }
+
+    /// Tries once, at once, and keeps what comes of it.
+    pub(super) fn test(
+        &self,
+        outbox: &Outbox,
+        about: Option<&str>,
+        data: WebhookData,
+    ) -> Result<Delivery, ServiceError> {
+        let name = outbox.name.as_str();
         let Some(_alone) = alone(&outbox.testing) else {
             return Err(ServiceError::WebhookBusy {
                 name: name.to_owned(),
             });
         };
-        let data = WebhookData {
-            webhook: Some(name.to_owned()),
-            ..WebhookData::default()
-        };
         let news = News {
             event: WebhookEvent::Test,
             of: name,
             at: &now(),
-            about: None,
+            about,
         };
         let message = message(name, &news, data);
         let (tried, verdict) = outbox.receiver().attempt(&message);

@@ -1,7 +1,8 @@
 //! Room on the disk: whether there is enough for a scan, and what goes to make some.
 //!
 //! Nothing goes that somebody still needs: a scan stays until it is over and none of its
-//! jobs waits, runs or has failed. Range images that were put aside go as soon as the
+//! jobs waits, runs or has failed; a result until no hook is to be run for it any more, and, if the
+//! configuration says so, until somebody has acknowledged it. Range images that were put aside go as soon as the
 //! reserve is touched, since a job can make them again.
 
 mod low;
@@ -19,6 +20,7 @@ use jiff::Timestamp;
 use relief_api::{Event, Job, JobState, Scan, ScanState, StorageStatus};
 use storage::remove_file_if_there;
 
+use crate::config::Unacknowledged;
 use crate::error::ServiceError;
 use crate::ids::now;
 use crate::service::{Service, lock};
@@ -180,10 +182,15 @@ impl Service {
         let at = Timestamp::now();
         // Scans whose columns may still be asked for by a job, and the results that are there.
         let mut asked_for = BTreeSet::new();
+        let still_used = self.receivers.results_needed(&self.store)?;
         let results = self.store.of_jobs(|job| {
             let folder = self.spool.directory(&job.result);
             let is_done = job.state == JobState::Done;
-            let result = is_done.then(|| kept_result(&folder, &job, at)).flatten();
+            let unfetched =
+                limits.unacknowledged == Unacknowledged::Keep && job.acknowledged_at.is_none();
+            let needed = unfetched || still_used.contains(&job.result);
+            let kept = || kept_result(&folder, &job, at, needed);
+            let result = is_done.then(kept).flatten();
             if asks_for_columns(job.state) {
                 asked_for.insert(job.scan);
             }
@@ -200,6 +207,7 @@ impl Service {
             Some(Kept {
                 bytes: on_disk(&metadata),
                 age_s: age_s(since, at),
+                acknowledged_s: None,
                 needed: may_be_processed(&scan) || asked_for.contains(&scan.id),
                 id: scan.id,
             })
@@ -291,7 +299,7 @@ fn asks_for_columns(state: JobState) -> bool {
     !state.is_over() || state == JobState::Failed
 }
 
-fn kept_result(folder: &Path, job: &Job, at: Timestamp) -> Option<Kept> {
+fn kept_result(folder: &Path, job: &Job, at: Timestamp, needed: bool) -> Option<Kept> {
     let mut bytes = 0;
     for entry in fs::read_dir(folder).ok()? {
         bytes += on_disk(&entry.ok()?.metadata().ok()?);
@@ -300,7 +308,11 @@ fn kept_result(folder: &Path, job: &Job, at: Timestamp) -> Option<Kept> {
         id: job.result.clone(),
         bytes,
         age_s: age_s(job.ended_at.as_deref(), at),
-        needed: false,
+        acknowledged_s: job
+            .acknowledged_at
+            .as_deref()
+            .map(|since| age_s(Some(since), at)),
+        needed,
     })
 }
 

@@ -3,9 +3,49 @@
 use redb::{Database, ReadableDatabase, ReadableTable};
 use relief_api::{Job, JobId, Scan};
 
+use super::record::decode;
 use super::{JOBS, SCANS, Store, StoreError};
 
 impl Store {
+    /// The newest job that is meant.
+    pub(crate) fn newest_job(
+        &self,
+        mut is_meant: impl FnMut(&Job) -> bool,
+    ) -> Result<Option<Job>, StoreError> {
+        self.with(|database: &Database| {
+            let table = database.begin_read()?.open_table(JOBS)?;
+            for row in table.iter()?.rev() {
+                match decode::<Job>(&self.path, row?.1.value()) {
+                    Ok(job) if is_meant(&job) => return Ok(Ok(Some(job))),
+                    Ok(_) => {}
+                    Err(error) => return Ok(Err(error)),
+                }
+            }
+            Ok(Ok(None))
+        })?
+    }
+
+    /// The job that makes, or made, this result.
+    pub(crate) fn job_of_result(&self, result: &str) -> Result<Option<Job>, StoreError> {
+        self.with(|database: &Database| {
+            let table = database.begin_read()?.open_table(JOBS)?;
+            for row in table.iter()?.rev() {
+                let row = row?.1;
+                // Names of results need no escapes: few records have to be decoded.
+                let may_be = std::str::from_utf8(row.value()).is_ok_and(|r| r.contains(result));
+                if !may_be {
+                    continue;
+                }
+                match decode::<Job>(&self.path, row.value()) {
+                    Ok(job) if job.result == result => return Ok(Ok(Some(job))),
+                    Ok(_) => {}
+                    Err(error) => return Ok(Err(error)),
+                }
+            }
+            Ok(Ok(None))
+        })?
+    }
+
     /// The newest scans that are older than this one.
     pub(crate) fn scans_before(
         &self,

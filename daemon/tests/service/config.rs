@@ -2,7 +2,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use reliefd::Config;
-use reliefd::config::{HttpConfig, WebhookConfig};
+use reliefd::config::{DiscoveryConfig, HookConfig, HttpConfig, WebhookConfig};
 
 fn refused(text: &str) -> String {
     Config::parse(text, Path::new("relief.toml"))
@@ -75,6 +75,29 @@ fn faults_are_told_with_their_line_and_a_way_out() {
         (
             "[http]\nstall_timeout_ms = 99\n",
             "relief.toml, line 2, column 20: 99 is out of range: 100 to 600000 ms are possible",
+        ),
+        (
+            "[discovery]\nport = 65536\n",
+            "relief.toml, line 2, column 8: 65536 is out of range: 1 to 65535 are possible",
+        ),
+        (
+            "[discovery]\nname = \"a\\tb\"\n",
+            "relief.toml, line 2, column 8: \"a\\tb\" is no name to be announced: up to 63 bytes \
+             in one line are possible",
+        ),
+        (
+            "[discovery]\nannounce = true\n",
+            "relief.toml, section [discovery]: announce = true needs the name of a reverse proxy \
+             in http.hosts: the service itself can be reached on this machine alone",
+        ),
+        (
+            "[storage]\nacknowledged = \"remove\"\nacknowledged_days = 7\n",
+            "relief.toml, section [storage]: acknowledged = \"remove\" leaves nothing for \
+             acknowledged_days to keep: leave out one of them",
+        ),
+        (
+            "[storage]\nunacknowledged = \"kept\"\n",
+            "relief.toml, line 2, column 18: unknown value `kept`; did you mean `keep`?",
         ),
         (
             "[service]\nlisten = \"localhost\"\n",
@@ -354,6 +377,14 @@ fn the_examples_are_sound_and_show_the_defaults() {
         Config::default().service.socket_mode
     );
     assert_eq!(all.log, Config::default().log);
+    let storage = Config::default().storage;
+    assert_eq!(all.storage.acknowledged, storage.acknowledged);
+    assert_eq!(all.storage.unacknowledged, storage.unacknowledged);
+    let discovery = DiscoveryConfig {
+        name: Some("Relief on bench".into()),
+        ..DiscoveryConfig::default()
+    };
+    assert_eq!(all.discovery, discovery);
     let mut webhook = WebhookConfig::new(
         "lab",
         "https://lab.example/relief",
@@ -361,6 +392,8 @@ fn the_examples_are_sound_and_show_the_defaults() {
     );
     webhook.ca_file = Some("/etc/relief/lab-ca.pem".into());
     assert_eq!(all.webhooks, [webhook]);
+    let check = ["/usr/local/bin/check-part", "--strict"];
+    assert_eq!(all.hooks, [HookConfig::new("check", &check)]);
     let further = all.deliverables.further().unwrap();
     assert_eq!(further.surface.unwrap().placement.as_str(), "optimal");
     assert_eq!(further.skin.unwrap().settings, skin::Settings::new(0.1));

@@ -7,6 +7,7 @@
 )]
 
 mod access;
+mod acknowledge;
 mod ailing;
 mod api;
 mod brokers;
@@ -17,6 +18,7 @@ mod cut_short;
 mod events;
 mod fake;
 mod further;
+mod hooks;
 mod hostile;
 mod jobs;
 mod laser;

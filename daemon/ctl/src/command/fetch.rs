@@ -5,7 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use deliverables::{MANIFEST_NAME, Manifest};
-use relief_api::{SpoolEntry, path};
+use relief_api::{Job, SpoolEntry, path};
 use serde::Serialize;
 
 use super::named;
@@ -23,6 +23,10 @@ pub(crate) struct Args {
     /// Directory for the files, instead of one named after the scan
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
+    /// Tell the service that the files are here, once they are whole and on disk: it may then
+    /// remove its own (`[storage]` of the configuration)
+    #[arg(long)]
+    ack: bool,
     #[command(flatten)]
     endpoint: EndpointArgs,
 }
@@ -36,13 +40,22 @@ pub(crate) struct Fetched {
     pub(crate) directory: PathBuf,
     /// Every file but the manifest.
     pub(crate) files: Vec<deliverables::ManifestFile>,
+    /// When the service first heard that somebody has them, if it did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    acknowledged_at: Option<String>,
+    /// From whom.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    acknowledged_by: Option<String>,
 }
 
 pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
     let client = args.endpoint.client()?;
     let result = named::result(&client, args.scan).await?;
     let directory = args.output.unwrap_or_else(|| PathBuf::from(&result));
-    let fetched = into_directory(&client, &result, directory).await?;
+    let mut fetched = into_directory(&client, &result, directory).await?;
+    if args.ack {
+        acknowledge(&client, &mut fetched).await?;
+    }
     output::either(json, &fetched, |fetched| {
         let mut lines: Vec<String> = fetched
             .files
@@ -71,7 +84,26 @@ pub(crate) async fn into_directory(
         result: entry.result,
         directory,
         files,
+        acknowledged_at: entry.acknowledged_at,
+        acknowledged_by: entry.acknowledged_by,
     })
+}
+
+/// Tells the service that the files are here, once no power failure can take them: it may remove
+/// its own at once.
+async fn acknowledge(client: &Client, fetched: &mut Fetched) -> Result<(), Failure> {
+    let names = fetched.files.iter().map(|file| file.name.as_str());
+    for name in names.chain([MANIFEST_NAME, "."]) {
+        let path = fetched.directory.join(name);
+        File::open(&path)
+            .and_then(|file| file.sync_all())
+            .map_err(|error| Failure::at(format!("cannot sync {}", path.display()), &error))?;
+    }
+    let path = path::spool_ack(&fetched.result);
+    let job: Job = client.post(&path, &serde_json::json!({})).await?;
+    fetched.acknowledged_at = job.acknowledged_at;
+    fetched.acknowledged_by = job.acknowledged_by;
+    Ok(())
 }
 
 /// Into a temporary name first, so that no file is ever half there.

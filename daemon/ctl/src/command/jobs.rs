@@ -58,8 +58,16 @@ fn state(job: &Job) -> String {
         (Some(error), None, _) => format!("{state}: {error}"),
         (None, _, Some(stage)) => format!("{state}: {stage}"),
         (None, _, None) if !job.left_out.is_empty() => {
-            format!("{state}: {}", job.left_out.join("; "))
+            format!("{state}{}: {}", acknowledged(job), job.left_out.join("; "))
         }
-        (None, _, None) => state.to_owned(),
+        (None, _, None) => state.to_owned() + &acknowledged(job),
+    }
+}
+
+/// Who has its result since when, if anybody does.
+fn acknowledged(job: &Job) -> String {
+    match (&job.acknowledged_at, &job.acknowledged_by) {
+        (Some(at), Some(by)) => format!(", acknowledged by {by} at {at}"),
+        _ => String::new(),
     }
 }

@@ -8,12 +8,14 @@ pub(crate) mod compare;
 pub(crate) mod config;
 pub(crate) mod convert;
 pub(crate) mod demo;
+pub(crate) mod discover;
 pub(crate) mod doctor;
 pub(crate) mod features;
 pub(crate) mod fetch;
 pub(crate) mod fill;
 mod fill_image;
 mod grid;
+pub(crate) mod hooks;
 pub(crate) mod jobs;
 pub(crate) mod laser;
 pub(crate) mod manual;
@@ -69,11 +71,13 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Rerun(args) => block_on(rerun::run(args, json)),
         Command::Surface(args) => block_on(surface::run(args, json)),
         Command::Watch(args) => block_on(watch::run(args, json)),
+        Command::Discover(args) => block_on(discover::run(args, json)),
         Command::Doctor(args) => block_on(doctor::run(args, json)),
         Command::Fetch(args) => block_on(fetch::run(args, json)),
         Command::Laser(args) => block_on(laser::run(args, json)),
         Command::Token(args) => block_on(token::run(args, json)),
         Command::Webhooks(args) => block_on(webhooks::run(args, json)),
+        Command::Hooks(args) => block_on(hooks::run(args, json)),
         Command::Config(args) => config::run(args, json),
         Command::Manual(args) => manual::run(&args, json),
     }

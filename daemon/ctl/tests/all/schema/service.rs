@@ -1,10 +1,10 @@
 //! What the clients of a service tell.
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::TcpListener;
+use std::net::{TcpListener, UdpSocket};
 use std::os::unix::fs::PermissionsExt;
 
-use reliefd::config::{DeliverablesConfig, WebhookConfig};
+use reliefd::config::{DeliverablesConfig, HookConfig, WebhookConfig};
 use reliefd::{Config, Daemon};
 use serde_json::json;
 use sim_scanner::config::SimConfig;
@@ -59,6 +59,13 @@ async fn what_the_clients_of_the_service_tell() {
     config.service.spool_dir = at.join("spool");
     config.scanner.port = scanner.port().to_owned();
     config.deliverables = further(at);
+    let mut hook = HookConfig::new("check", &["/bin/sh", "-c", "echo $RELIEF_NAME"]);
+    // In the place of reliefd, which is not built for this test.
+    let helper = at.join("helper");
+    fs::write(&helper, "#!/bin/sh\necho $RELIEF_NAME\n").unwrap();
+    fs::set_permissions(&helper, fs::Permissions::from_mode(0o755)).unwrap();
+    hook.helper = Some(helper);
+    config.hooks = vec![hook];
     let daemon = Daemon::start(config).await.unwrap();
     let socket = daemon.socket().to_owned();
     let told = |arguments: &'static [&'static str]| {
@@ -86,7 +93,8 @@ async fn what_the_clients_of_the_service_tell() {
     let entries = laser["entries"].as_array().unwrap();
     assert!(entries.iter().any(|entry| entry["laser"] == "on"));
     assert_eq!(entries.last().unwrap()["laser"], "off");
-    told(&["fetch", "latest", "-o", "out"]).await;
+    let fetched = told(&["fetch", "latest", "-o", "out"]).await;
+    assert_eq!(fetched.get("acknowledged_at"), None);
     check("manifest.schema.json", &file(at.join("out/manifest.json")));
     let report = file(at.join("out/report.json"));
     check("report.schema.json", &report);
@@ -94,6 +102,44 @@ async fn what_the_clients_of_the_service_tell() {
         assert!(report[key].is_object(), "{key}: {}", report["warnings"]);
         assert!(report["settings"][key].is_object(), "{key}");
     }
+    // What is not whole is not acknowledged.
+    let spooled = at.join("spool").join(fetched["result"].as_str().unwrap());
+    let iges = fs::read(spooled.join("house.igs")).unwrap();
+    fs::write(spooled.join("house.igs"), &iges[1..]).unwrap();
+    let environment = [("RELIEF_SOCKET", "s")];
+    let again = &["fetch", "latest", "-o", "out", "--ack"];
+    let broken = run(at, &environment, again).await;
+    let words = String::from_utf8_lossy(&broken.stderr);
+    assert!(words.contains("is not what the manifest says"), "{words}");
+    fs::write(spooled.join("house.igs"), &iges).unwrap();
+    assert_eq!(
+        told(&["jobs"]).await["jobs"][0].get("acknowledged_at"),
+        None
+    );
+    let fetched = told(&["fetch", "latest", "-o", "out", "--ack"]).await;
+    assert_eq!(fetched["acknowledged_by"], "socket");
+    let listed = run(at, &environment, &["jobs"]).await;
+    let listed = String::from_utf8_lossy(&listed.stdout);
+    assert!(
+        listed.contains("done, acknowledged by socket at 20"),
+        "{listed}"
+    );
+    let hooks = async |arguments: &[&str]| {
+        let told = ask(at, &socket, &[&["hooks"], arguments].concat()).await;
+        check("commands.schema.json#/$defs/hooks", &told);
+        told
+    };
+    let tested = hooks(&["test", "check"]).await;
+    assert_eq!(tested["tried"][0]["answer"], "house");
+    let runs = hooks(&["log", "check"]).await;
+    assert_eq!(runs["runs"].as_array().unwrap().len(), 2);
+    assert_eq!(hooks(&[]).await["hooks"][0]["latest"]["state"], "delivered");
+    let shown = run(at, &environment, &["hooks", "log", "check"]).await;
+    let shown = String::from_utf8_lossy(&shown.stdout);
+    assert!(
+        shown.contains("done after ") && shown.contains("\n      house"),
+        "{shown}"
+    );
     // A job that fails, so that its error is there, and that is taken up again.
     let few = &["rerun", "latest", "--set", "regrid.roi_x_mm=[900,901]"];
     let failing = told(few).await;
@@ -390,4 +436,60 @@ async fn webhooks_are_listed_tested_and_looked_into() {
         "{out}"
     );
     daemon.shutdown().await;
+}
+
+/// Whether a datagram to a multicast group comes back to whoever has joined it.
+fn multicast_works() -> bool {
+    let group = "239.255.72.69".parse().unwrap();
+    let echo = || -> std::io::Result<bool> {
+        let socket = UdpSocket::bind("0.0.0.0:0")?;
+        socket.join_multicast_v4(&group, &"0.0.0.0".parse().unwrap())?;
+        socket.set_read_timeout(Some(std::time::Duration::from_secs(2)))?;
+        socket.send_to(b"relief", (group, socket.local_addr()?.port()))?;
+        Ok(socket.recv(&mut [0; 16])? == 6)
+    };
+    echo().unwrap_or(false)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_service_that_announces_itself_is_found_until_it_ends() {
+    if !multicast_works() {
+        eprintln!("skipped: no multicast here");
+        return;
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let mut config = Config::default();
+    config.service.socket = at.join("s");
+    config.service.state_dir = at.join("state");
+    config.service.spool_dir = at.join("spool");
+    config.scanner.port = at.join("none");
+    config.http.hosts = vec!["bench.lab.example".into()];
+    config.discovery.announce = true;
+    // Away from whatever else the machine announces.
+    let free = UdpSocket::bind("0.0.0.0:0").unwrap();
+    config.discovery.mdns_port = free.local_addr().unwrap().port();
+    drop(free);
+    let port = config.discovery.mdns_port.to_string();
+    let daemon = Daemon::start(config).await.unwrap();
+    let look = async || {
+        let arguments = ["discover", "--seconds", "1", "--mdns-port", &port];
+        let json = run(at, &[], &[&["--json"], &arguments[..]].concat()).await;
+        let told = document(&json);
+        check("commands.schema.json#/$defs/discover", &told);
+        told["services"].clone()
+    };
+    // It first makes sure that nobody else has its name.
+    let found = loop {
+        let found = look().await;
+        if found != json!([]) {
+            break found;
+        }
+    };
+    assert_eq!(found.as_array().unwrap().len(), 1, "{found}");
+    assert_eq!(found[0]["name"], "Relief on bench");
+    assert_eq!(found[0]["url"], "https://bench.lab.example/");
+    assert_eq!(found[0]["scanners"], json!(["scanner"]));
+    daemon.shutdown().await;
+    assert_eq!(look().await, json!([]));
 }
