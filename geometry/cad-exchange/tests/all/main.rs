@@ -1,7 +1,11 @@
 //! All tests of IGES and STEP files.
 
 #[path = "../../examples/sample/mod.rs"]
-#[allow(dead_code)]
+#[allow(
+    dead_code,
+    clippy::unwrap_used,
+    reason = "shared with the examples; a test that cannot go on says where"
+)]
 mod sample;
 
 mod analytic;
