@@ -217,8 +217,19 @@ pub enum ServiceError {
         /// Those there are.
         known: Vec<String>,
     },
-    /// Nothing is there that a hook could be run for.
-    #[error("there is no result in the spool that it could be run for")]
+    /// There is no such upload.
+    #[error("there is no upload {name}; there {}", match .known.as_slice() {
+        [] => "are none".to_owned(),
+        known => format!("{} {}", are(known), known.join(", ")),
+    })]
+    NoSuchUpload {
+        /// As it was given.
+        name: String,
+        /// Those there are.
+        known: Vec<String>,
+    },
+    /// Nothing is there that a hook could be run for, or that could be copied.
+    #[error("there is no result in the spool that it could be tried with")]
     NoResult,
     /// Somebody else is at it.
     #[error("{name} is just being tested")]

@@ -63,6 +63,7 @@ mod scan;
 mod status;
 mod ticket;
 mod token;
+mod upload;
 mod webhook;
 
 pub use event::{Event, LiveColumn};
@@ -83,6 +84,7 @@ pub use status::{
 };
 pub use ticket::{CreateTicket, Ticket};
 pub use token::{CreateToken, MAX_TOKEN_NAME_CHARS, NewToken, Token, TokenList};
+pub use upload::{Upload, UploadList, UploadRuns};
 pub use webhook::{
     Delivery, DeliveryAttempt, DeliveryList, DeliveryState, DiskRoom, ScannerState, Webhook,
     WebhookData, WebhookEvent, WebhookKind, WebhookList, WebhookMessage,

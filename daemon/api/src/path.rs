@@ -68,6 +68,12 @@ pub const HOOKS: &str = "/v1/hooks";
 pub const HOOK_RUNS: &str = "/v1/hooks/{hook}/runs";
 /// Pattern of a hook's test.
 pub const HOOK_TEST: &str = "/v1/hooks/{hook}/test";
+/// The uploads.
+pub const UPLOADS: &str = "/v1/uploads";
+/// Pattern of an upload's log.
+pub const UPLOAD_RUNS: &str = "/v1/uploads/{upload}/runs";
+/// Pattern of an upload's test.
+pub const UPLOAD_TEST: &str = "/v1/uploads/{upload}/test";
 /// Pattern of a scan's range image.
 pub const SCAN_IMAGE: &str = "/v1/scans/{scan}/image";
 /// Pattern of trying other settings on a scan's range image.
@@ -223,6 +229,18 @@ pub fn hook_runs(name: &str) -> String {
 #[must_use]
 pub fn hook_test(name: &str) -> String {
     format!("{HOOKS}/{}/test", segment(name))
+}
+
+/// Log of an upload.
+#[must_use]
+pub fn upload_runs(name: &str) -> String {
+    format!("{UPLOADS}/{}/runs", segment(name))
+}
+
+/// Test of an upload.
+#[must_use]
+pub fn upload_test(name: &str) -> String {
+    format!("{UPLOADS}/{}/test", segment(name))
 }
 
 /// One segment of a path, escaped (RFC 3986, section 2.3).

@@ -20,6 +20,8 @@ pub enum WebhookKind {
     Mail,
     /// A program is run, with what the message says in its environment.
     Hook,
+    /// The result that the message tells of is copied elsewhere.
+    Upload,
     /// Of a kind that this version does not know; never sent.
     #[serde(other)]
     Unknown,
@@ -34,6 +36,7 @@ impl WebhookKind {
             Self::Mqtt => "mqtt",
             Self::Mail => "mail",
             Self::Hook => "hook",
+            Self::Upload => "upload",
             Self::Unknown => "unknown",
         }
     }

@@ -8,7 +8,7 @@ use clap::{Parser, Subcommand};
 use crate::command::{
     abort, accept, calibrate, change, compare, config, convert, demo, discover, doctor, features,
     fetch, fill, hooks, jobs, laser, manual, pause, rerun, resume, scan, scans, skin, status,
-    surface, token, toolpath, watch, webhooks,
+    surface, token, toolpath, uploads, watch, webhooks,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
@@ -59,6 +59,7 @@ pub(crate) enum Command {
     Token(token::Args),
     Webhooks(webhooks::Args),
     Hooks(hooks::Args),
+    Uploads(uploads::Args),
     Config(config::Args),
     Discover(discover::Args),
     Doctor(doctor::Args),

@@ -22,6 +22,7 @@ mod scanner;
 mod scanners;
 mod storage;
 mod traces;
+mod uploads;
 mod value;
 mod webhooks;
 
@@ -57,6 +58,7 @@ pub use reload::Reloaded;
 pub use scanner::{ScannerConfig, Transport};
 pub use storage::{Acknowledged, Limits, StorageConfig, Unacknowledged};
 pub use traces::TracesConfig;
+pub use uploads::{UploadConfig, UploadTo};
 pub(crate) use value::is_host_name;
 pub use webhooks::WebhookConfig;
 
@@ -100,6 +102,8 @@ pub struct Config {
     pub mail: Vec<MailConfig>,
     /// What is run for each result.
     pub hooks: Vec<HookConfig>,
+    /// Where copies of results go.
+    pub uploads: Vec<UploadConfig>,
     /// Who is told how long things took.
     pub traces: TracesConfig,
     /// What is logged.

@@ -1,5 +1,5 @@
-//! What the sections of all who are told have in common: `[[webhooks]]`, `[[mqtt]]`, `[[mail]]` and
-//! `[[hooks]]`.
+//! What the sections of all who are told have in common: `[[webhooks]]`, `[[mqtt]]`, `[[mail]]`,
+//! `[[hooks]]` and `[[uploads]]`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,7 +11,7 @@ use toml::de::{DeTable, DeValue};
 use super::Config;
 use super::load::line_and_column;
 use crate::receivers::{
-    FileError, check_broker_files, check_command, check_files, check_mail_files,
+    FileError, check_broker_files, check_command, check_files, check_mail_files, check_upload_files,
 };
 
 /// When a message is tried again that was not taken.
@@ -104,11 +104,18 @@ fn all(config: &Config) -> Vec<(&'static str, Vec<Told<'_>>)> {
         keys: own.check(),
         files: Box::new(|| check_command(own)),
     });
+    let uploads = config.uploads.iter().map(|own| Told {
+        what: "upload",
+        name: &own.name,
+        keys: own.check(),
+        files: Box::new(|| check_upload_files(own)),
+    });
     vec![
         ("webhooks", webhooks.collect()),
         ("mqtt", brokers.collect()),
         ("mail", mail.collect()),
         ("hooks", hooks.collect()),
+        ("uploads", uploads.collect()),
     ]
 }
 
@@ -285,6 +292,58 @@ mod tests {
             );
             assert!(error.contains(told), "{error}");
             assert!(!error.contains("hunter2"), "{error}");
+        }
+    }
+
+    #[test]
+    fn faults_of_uploads_are_told_with_their_line_and_a_way_out() {
+        let path = Path::new("relief.toml");
+        let share = "[[uploads]]\nname = \"a\"\nto = \"folder\"\nfolder = \"/mnt\"\n";
+        let sftp = "[[uploads]]\nname = \"b\"\nto = \"sftp\"\nfolder = \"x\"\nuser = \"u\"\n\
+                    identity_file = \"i\"\nknown_hosts_file = \"k\"\nhost = \"h\"\n";
+        assert!(Config::parse(&format!("{share}{sftp}"), path).is_ok());
+        for (text, line, told) in [
+            (
+                share.replace("folder = ", "# "),
+                3,
+                "an upload to folder needs `folder`",
+            ),
+            (share.replace("/mnt", "mnt"), 4, "is to be a whole path"),
+            (
+                format!("{share}bucket = \"b\"\n"),
+                5,
+                "`bucket` is for s3, not for folder",
+            ),
+            (
+                format!("{share}files = [\"[a\"]\n"),
+                5,
+                "is no pattern of names",
+            ),
+            (format!("{share}files = []\n"), 5, "nothing goes there"),
+            (
+                share.replace("\"folder\"", "\"s3\""),
+                4,
+                "`folder` is for folder and sftp",
+            ),
+            (
+                sftp.replace("\"h\"", "\"-oProxyCommand=sh\""),
+                8,
+                "no `-` first",
+            ),
+            (
+                sftp.replace("host = \"h\"\n", ""),
+                3,
+                "an upload to sftp needs `host`",
+            ),
+            (
+                format!("{share}endpoint = \"https://a:b@s\"\n"),
+                5,
+                "no address of an object store",
+            ),
+        ] {
+            let error = Config::parse(&text, path).unwrap_err().to_string();
+            assert!(error.contains(&format!("line {line},")), "{text}: {error}");
+            assert!(error.contains(told), "{text}: {error}");
         }
     }
 }

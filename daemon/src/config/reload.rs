@@ -44,7 +44,8 @@ impl Config {
             webhooks,
             mqtt,
             mail,
-            hooks
+            hooks,
+            uploads
         );
         leave!(service, http, discovery, queue, traces);
         merged.scanner = reloaded_scanner("scanner", &self.scanner, &new.scanner, &mut outcome);

@@ -76,6 +76,70 @@ pub(super) fn hook_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<St
     Ok(name)
 }
 
+pub(super) fn upload_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    let name = String::deserialize(deserializer)?;
+    check_name(&name, "upload").map_err(D::Error::custom)?;
+    Ok(name)
+}
+
+/// Patterns of names of files: at least one, and each of them one.
+pub(super) fn patterns<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Vec<String>, D::Error> {
+    let patterns = Vec::<String>::deserialize(deserializer)?;
+    if patterns.is_empty() {
+        let told = "without patterns nothing goes there: leave the key out for all files";
+        return Err(D::Error::custom(told));
+    }
+    for pattern in &patterns {
+        glob::Pattern::new(pattern).map_err(|error| {
+            D::Error::custom(format!(
+                "{pattern:?} is no pattern of names such as \"*.igs\": {error}"
+            ))
+        })?;
+    }
+    Ok(patterns)
+}
+
+/// Where an object store is.
+pub(super) fn object_store<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<String>, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    if text.parse::<Uri>().as_ref().is_ok_and(is_plain) {
+        return Ok(Some(text));
+    }
+    Err(D::Error::custom(format!(
+        "{:?} is no address of an object store: one such as \"https://s3.lab.example\" is needed, \
+         without a name or password, which belong into `key_file`",
+        shown_url(&text)
+    )))
+}
+
+/// A machine, as programs are told of it: nothing that they could take for an option.
+pub(super) fn host<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
+    plain_word(deserializer, "name or address of a machine", ".-:_")
+}
+
+pub(super) fn user<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
+    plain_word(deserializer, "name of a user", ".-_@")
+}
+
+fn plain_word<'de, D: Deserializer<'de>>(
+    deserializer: D,
+    what: &str,
+    beside: &str,
+) -> Result<Option<String>, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || beside.contains(c);
+    if !text.is_empty() && !text.starts_with('-') && text.chars().all(is_plain) {
+        return Ok(Some(text));
+    }
+    Err(D::Error::custom(format!(
+        "{text:?} is no {what}: letters, digits and `{beside}` are possible, and no `-` first"
+    )))
+}
+
 pub(super) fn hook_seconds<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
     bounded(deserializer, 1, 86_400, " s")
 }

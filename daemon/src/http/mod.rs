@@ -23,6 +23,7 @@ mod serve;
 mod stall;
 mod tickets;
 mod tokens;
+mod uploads;
 mod webhooks;
 
 use std::sync::Arc;

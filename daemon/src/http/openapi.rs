@@ -15,7 +15,8 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::{
-    Context, events, files, hooks, images, jobs, metrics, scanners, scans, tickets, webhooks,
+    Context, events, files, hooks, images, jobs, metrics, scanners, scans, tickets, uploads,
+    webhooks,
 };
 
 /// A refused request.
@@ -51,6 +52,7 @@ impl<'r> ToResponse<'r> for Problems {
         (name = "events", description = "What happens, as it happens"),
         (name = "webhooks", description = "Who is told when something is done"),
         (name = "hooks", description = "What is run for each result"),
+        (name = "uploads", description = "Where copies of results go"),
         (name = "tokens", description = "Who may ask; on the Unix socket only"),
         (name = "service", description = "The service itself"),
     ),
@@ -95,6 +97,9 @@ pub(super) fn described() -> OpenApiRouter<Context> {
         .routes(routes!(hooks::list))
         .routes(routes!(hooks::runs))
         .routes(routes!(hooks::test))
+        .routes(routes!(uploads::list))
+        .routes(routes!(uploads::runs))
+        .routes(routes!(uploads::test))
         .routes(routes!(webhooks::list))
         .routes(routes!(webhooks::deliveries))
         .routes(routes!(webhooks::test))

@@ -148,6 +148,11 @@ impl From<ServiceError> for Refusal {
                 "no-such-hook",
                 Some("each has a section [[hooks]] in the configuration".into()),
             ),
+            ServiceError::NoSuchUpload { .. } => (
+                S::NOT_FOUND,
+                "no-such-upload",
+                Some("each has a section [[uploads]] in the configuration".into()),
+            ),
             ServiceError::NoResult => (
                 S::CONFLICT,
                 "no-result",

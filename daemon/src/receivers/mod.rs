@@ -22,9 +22,11 @@ mod hook;
 mod mail;
 mod mqtt;
 mod receiver;
+mod run;
 mod runs;
 mod show;
 mod tell;
+mod upload;
 mod webhook;
 mod words;
 
@@ -36,7 +38,7 @@ use std::time::{Duration, Instant};
 
 use relief_api::WebhookKind;
 
-use crate::config::Config;
+use crate::config::{Config, UploadConfig, UploadTo};
 use crate::service::{Service, lock};
 use crate::store::{Added, Store, StoreError};
 pub(crate) use agent::agent;
@@ -46,6 +48,7 @@ pub(crate) use mail::check_files as check_mail_files;
 pub(crate) use mqtt::check_files as check_broker_files;
 use receiver::Receiver;
 pub(crate) use show::show;
+pub(crate) use upload::check_files as check_upload_files;
 pub(crate) use webhook::{check_files, shown_url};
 pub(crate) use words::host_name;
 use words::warn_without_network;
@@ -72,6 +75,11 @@ pub enum ReceiverError {
     Store(#[from] StoreError),
 }
 
+/// Whether something is done with each result, in place of being told.
+fn is_for_results(kind: WebhookKind) -> bool {
+    matches!(kind, WebhookKind::Hook | WebhookKind::Upload)
+}
+
 /// Makes the receivers of a configuration, in its order.
 fn make_all(config: &Config) -> Result<Vec<Receiver>, ReceiverError> {
     let mut made = Vec::new();
@@ -95,6 +103,10 @@ fn make_all(config: &Config) -> Result<Vec<Receiver>, ReceiverError> {
             .iter()
             .map(|own| hook::receiver(own, state_dir)),
     );
+    for config in &config.uploads {
+        let receiver = upload::receiver(config, state_dir);
+        made.push(receiver.map_err(failed(WebhookKind::Upload, &config.name))?);
+    }
     Ok(made)
 }
 
@@ -240,8 +252,9 @@ impl Receivers {
     pub(crate) fn open(config: &Config, store: &Store) -> Result<Self, ReceiverError> {
         let receivers = Self::default();
         receivers.replace(config, store)?;
-        let is_far = |outbox: &Arc<Outbox>| outbox.receiver().settings.kind != WebhookKind::Hook;
-        if receivers.all().iter().any(is_far) {
+        let is_told = |outbox: &Arc<Outbox>| !is_for_results(outbox.receiver().settings.kind);
+        let is_far = |upload: &UploadConfig| upload.to != UploadTo::Folder;
+        if receivers.all().iter().any(is_told) || config.uploads.iter().any(is_far) {
             warn_without_network();
         }
         Ok(receivers)

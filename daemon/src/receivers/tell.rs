@@ -11,7 +11,7 @@ use scanner_protocol::Faults;
 use sha2::{Digest, Sha256};
 
 use super::receiver::Verdict;
-use super::{Outbox, Receivers};
+use super::{Outbox, Receivers, is_for_results};
 use crate::error::ServiceError;
 use crate::ids::now;
 use crate::service::{Service, lock};
@@ -195,7 +195,7 @@ impl Receivers {
 
     /// Who is told by messages.
     fn outbox(&self, name: &str) -> Result<Arc<Outbox>, ServiceError> {
-        self.of(|kind| kind != WebhookKind::Hook, name)
+        self.of(|kind| !is_for_results(kind), name)
             .map_err(|known| ServiceError::NoSuchWebhook {
                 name: name.to_owned(),
                 known,
@@ -286,7 +286,7 @@ impl Service {
         for outbox in self.receivers.all() {
             let latest = latest(self.store.deliveries(&outbox.name)?);
             let settings = &outbox.receiver().settings;
-            if settings.kind == WebhookKind::Hook {
+            if is_for_results(settings.kind) {
                 continue;
             }
             let state = lock(&outbox.state);

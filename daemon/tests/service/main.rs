@@ -32,4 +32,5 @@ mod rig;
 mod scanners;
 mod scans;
 mod traces;
+mod uploads;
 mod webhooks;

@@ -27,6 +27,7 @@ mod places;
 mod regularize;
 pub(crate) mod rerun;
 pub(crate) mod resume;
+mod runs;
 pub(crate) mod scan;
 pub(crate) mod scans;
 mod setting;
@@ -38,6 +39,7 @@ mod timestamp;
 pub(crate) mod token;
 pub(crate) mod toolpath;
 mod units;
+pub(crate) mod uploads;
 pub(crate) mod watch;
 pub(crate) mod webhooks;
 
@@ -78,6 +80,7 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Token(args) => block_on(token::run(args, json)),
         Command::Webhooks(args) => block_on(webhooks::run(args, json)),
         Command::Hooks(args) => block_on(hooks::run(args, json)),
+        Command::Uploads(args) => block_on(uploads::run(args, json)),
         Command::Config(args) => config::run(args, json),
         Command::Manual(args) => manual::run(&args, json),
     }

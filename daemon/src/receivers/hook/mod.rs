@@ -3,8 +3,6 @@
 //! What a program may do is bounded in a process of its own (`crate::confined`); this is what it is
 //! told, and what becomes of it.
 
-mod run;
-
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -16,15 +14,15 @@ use relief_api::{DeliveryAttempt, Job, WebhookEvent, WebhookKind, WebhookMessage
 
 use super::FileError;
 use super::receiver::{Receiver, Settings, Verdict, Way};
+use super::run::{Ran, Until, run};
 use crate::config::{HookConfig, HookSandbox};
 use crate::confined::{Confined, Folders, NOT_CONFINED, NOT_STARTED};
 use crate::store::Message;
-use run::{Ran, Until, run};
 
 /// Shorter than the command line waits for the outcome of a test.
 const LONGEST_TEST: Duration = Duration::from_secs(25);
 /// The program that confines itself, also where another has taken its place on disk since.
-const OURSELVES: &str = "/proc/self/exe";
+pub(super) const OURSELVES: &str = "/proc/self/exe";
 /// What a hook has of the service's own environment.
 const INHERITED: [&str; 2] = ["PATH", "LANG"];
 /// Bytes of a megabyte.
@@ -160,7 +158,7 @@ impl Hook {
 }
 
 /// What a hook said, line by line, with nothing that a terminal would obey.
-fn readable(output: &[u8]) -> String {
+pub(super) fn readable(output: &[u8]) -> String {
     let text = String::from_utf8_lossy(output);
     let plain = text
         .chars()

@@ -77,7 +77,7 @@ impl Got {
 }
 
 /// HMAC-SHA-256 as RFC 2104 has it, for keys of no more than a block.
-fn hmac(key: &[u8], text: &[u8]) -> Vec<u8> {
+pub(crate) fn hmac(key: &[u8], text: &[u8]) -> Vec<u8> {
     let pad = |with: u8| -> Vec<u8> {
         let mut block = [with; 64];
         for (place, byte) in block.iter_mut().zip(key) {

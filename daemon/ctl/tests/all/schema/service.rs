@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, UdpSocket};
 use std::os::unix::fs::PermissionsExt;
 
-use reliefd::config::{DeliverablesConfig, HookConfig, WebhookConfig};
+use reliefd::config::{DeliverablesConfig, HookConfig, UploadConfig, UploadTo, WebhookConfig};
 use reliefd::{Config, Daemon};
 use serde_json::json;
 use sim_scanner::config::SimConfig;
@@ -66,6 +66,10 @@ async fn what_the_clients_of_the_service_tell() {
     fs::set_permissions(&helper, fs::Permissions::from_mode(0o755)).unwrap();
     hook.helper = Some(helper);
     config.hooks = vec![hook];
+    let mut upload = UploadConfig::new("archive", UploadTo::Folder);
+    upload.folder = Some(at.join("archive"));
+    fs::create_dir(at.join("archive")).unwrap();
+    config.uploads = vec![upload];
     let daemon = Daemon::start(config).await.unwrap();
     let socket = daemon.socket().to_owned();
     let told = |arguments: &'static [&'static str]| {
@@ -138,6 +142,22 @@ async fn what_the_clients_of_the_service_tell() {
     let shown = String::from_utf8_lossy(&shown.stdout);
     assert!(
         shown.contains("done after ") && shown.contains("\n      house"),
+        "{shown}"
+    );
+    let uploads = async |arguments: &[&str]| {
+        let told = ask(at, &socket, &[&["uploads"], arguments].concat()).await;
+        check("commands.schema.json#/$defs/uploads", &told);
+        told
+    };
+    assert_eq!(uploads(&["test", "archive"]).await["state"], "delivered");
+    let log = uploads(&["log", "archive"]).await;
+    assert_eq!(log["runs"].as_array().unwrap().len(), 2);
+    let place = at.join("archive").display().to_string();
+    assert_eq!(uploads(&[]).await["uploads"][0]["to"], place);
+    let shown = run(at, &environment, &["uploads"]).await;
+    let shown = String::from_utf8_lossy(&shown.stdout);
+    assert!(
+        shown.contains("UPLOAD") && shown.contains("done"),
         "{shown}"
     );
     // A job that fails, so that its error is there, and that is taken up again.

@@ -1,4 +1,4 @@
-//! One run of a hook: its process from its beginning to its end.
+//! One run of a confined program: its process from its beginning to its end.
 
 use std::fs;
 use std::io::{self, PipeReader, Read};
