@@ -34,6 +34,7 @@
 //! | `POST /v1/jobs/{job}/retry` | | 202 [`Job`] |
 //! | `POST /v1/jobs/{job}/cancel` | | [`Job`] |
 //! | `GET /v1/spool/{result}` | | [`SpoolEntry`] |
+//! | `POST /v1/spool/{result}/ack` | | who has it since when: [`Job`] |
 //! | `GET /v1/spool/{result}/{file}` | | the file |
 //! | `GET /v1/tokens` | | [`TokenList`], oldest first; on the socket only, as the next two |
 //! | `POST /v1/tokens` | [`CreateToken`] | 201 [`NewToken`] |
@@ -41,6 +42,12 @@
 //! | `GET /v1/webhooks` | | [`WebhookList`] |
 //! | `GET /v1/webhooks/{webhook}/deliveries` | | [`DeliveryList`], newest first |
 //! | `POST /v1/webhooks/{webhook}/test` | | the message, and what came back: [`Delivery`] |
+//! | `GET /v1/hooks` | | [`HookList`] |
+//! | `GET /v1/hooks/{hook}/runs` | | [`HookRuns`], newest first |
+//! | `POST /v1/hooks/{hook}/test` | | the run for the newest result: [`Delivery`] |
+//! | `GET /v1/uploads` | | [`UploadList`] |
+//! | `GET /v1/uploads/{upload}/runs` | | [`UploadRuns`], newest first |
+//! | `POST /v1/uploads/{upload}/test` | | the copy of the newest result: [`Delivery`] |
 //! | `POST /v1/tickets` | [`CreateTicket`] | 201 [`Ticket`] |
 //! | `GET /v1/metrics` | | for Prometheus, as text |
 //! | `GET /v1/openapi.json` | | this table for programs (OpenAPI 3.1) |
