@@ -1,5 +1,5 @@
 // @ts-check
-/** The machine room: service, scanners, storage, webhooks, the laser's log. */
+/** The machine room: service, scanners, storage, who is told, what is done with results, the laser's log. */
 
 import { at, get, post, token } from './api.js';
 import { app, english, on, t, word } from './app.js';
@@ -13,10 +13,11 @@ export function openRoom() {
   const scanners = h('div');
   const storage = h('div');
   const hooks = h('div', null, h('p', { class: 'dim' }, t('list.asking')));
+  const doers = h('div', null, h('p', { class: 'dim' }, t('list.asking')));
   const log = h('div', null, h('p', { class: 'dim' }, t('list.asking')));
   const panel = (/** @type {string} */ key, /** @type {Element} */ content, wide = false) => h('section', { class: wide ? 'panel wide' : 'panel', 'aria-label': t(key) }, h('h2', null, t(key)), content);
   const element = h('div', { class: 'view' }, h('h1', null, t('nav.room')),
-    h('div', { class: 'room' }, panel('room.service', service), panel('room.storage', storage), panel('room.scanners', scanners), panel('room.webhooks', hooks, true), panel('room.laser', log, true)));
+    h('div', { class: 'room' }, panel('room.service', service), panel('room.storage', storage), panel('room.scanners', scanners), panel('room.webhooks', hooks, true), panel('room.doers', doers, true), panel('room.laser', log, true)));
 
   let shown = '';
   const update = () => {
@@ -50,6 +51,16 @@ export function openRoom() {
       fill(hooks, trouble(error));
     }
   };
+  const loadDoers = async () => {
+    try {
+      const [{ hooks: programs }, { uploads }] = await Promise.all([get('/v1/hooks'), get('/v1/uploads')]);
+      const all = [...programs.map((/** @type {any} */ one) => doer('hook', one, one.command.join(' '), loadDoers)),
+        ...uploads.map((/** @type {any} */ one) => doer('upload', one, one.to, loadDoers))];
+      fill(doers, all.length === 0 ? h('p', { class: 'dim' }, t('room.no-doers')) : all);
+    } catch (error) {
+      fill(doers, trouble(error));
+    }
+  };
   const loadLog = async () => {
     try {
       const { entries } = await get('/v1/laser');
@@ -60,10 +71,12 @@ export function openRoom() {
   };
   const load = () => {
     loadHooks();
+    loadDoers();
     loadLog();
   };
   const offs = [on('change', update), on('connection', update), on('again', load), on('event', (event) => {
-    if (event.kind === 'scan') loadLog();
+    if (event.kind === 'laser') loadLog();
+    if (event.kind === 'published') loadDoers();
   })];
   update();
   load();
@@ -108,6 +121,30 @@ function webhook(hook, again) {
     [t('room.waiting'), String(hook.waiting)],
     [t('room.dropped'), hook.dropped > 0 ? String(hook.dropped) : null],
     [t('room.latest'), latest ? `${word('webhook', latest.event)} \u00b7 ${when(tried?.at ?? latest.created_at, app.words.language)}` : t('room.nothing-yet')],
+  ]), fault(tried?.error, tried?.answer));
+}
+
+/**
+ * Something that is done with each result.
+ * @param {'hook' | 'upload'} kind @param {any} one @param {string} what @param {() => void} again
+ */
+function doer(kind, one, what, again) {
+  const test = h('button', { type: 'button', 'aria-label': t(`room.try-${kind}-of`, { name: one.name }), onclick: () => during(test, async () => {
+    const run = await post(`/v1/${kind}s/${at(one.name)}/test`);
+    const last = run.tried.at(-1);
+    if (run.state === 'delivered') note(t('room.try-good', { name: one.name, ms: last?.milliseconds ?? 0 }));
+    else note(new Error(`${one.name}: ${last?.error ?? word('delivery', run.state)}`));
+    again();
+  }) }, t(`room.try-${kind}`));
+  const state = chip('delivery');
+  const { latest } = one;
+  if (latest) state.update(latest.state);
+  const tried = latest?.tried.at(-1);
+  return h('div', { class: 'hook' }, h('div', { class: 'head' }, h('h3', null, one.name), latest ? state : null, test), facts([
+    [word('receiver', kind), h('code', null, what)],
+    [t('room.results-waiting'), String(one.waiting)],
+    [t('room.results-dropped'), one.dropped > 0 ? String(one.dropped) : null],
+    [t('room.latest-result'), latest ? `${latest.about ?? ''} \u00b7 ${when(tried?.at ?? latest.created_at, app.words.language)}` : t('room.nothing-yet')],
   ]), fault(tried?.error, tried?.answer));
 }
 

@@ -267,6 +267,16 @@ class Story:
             assert rows.count() >= 500, rows.count()
             print(f"500 jobs are listed in {time.monotonic() - begun:.1f} s")
 
+    def handed_on(self, scan, archive):
+        """A program has run for the result, and a copy has gone elsewhere."""
+        with self.open("#/room") as opened:
+            page = opened.page
+            page.get_by_role("button", name="Run check for the newest result").click()
+            expect(page.get_by_text("check has done it")).to_be_visible(timeout=30_000)
+            page.get_by_role("button", name="Copy the newest result to archive").click()
+            expect(page.get_by_text("archive has done it")).to_be_visible(timeout=30_000)
+        assert (archive / scan / "manifest.json").is_file()
+
     def looks(self, scan):
         """Every view, small and large, light and dark, in both languages."""
         views = {
@@ -320,11 +330,23 @@ def main():
     # Slow enough to be watched.
     scanner = ["--columns", "240", "--samples", "256", "--line-rate", "10", "--noise-mm", "0.05"]
     with tempfile.TemporaryDirectory() as folder, browser() as opened:
-        with Bench(programs.resolve(), folder, scanner) as bench:
+        archive = pathlib.Path(folder) / "archive"
+        archive.mkdir()
+        doers = f"""
+[[hooks]]
+name = "check"
+command = ["/bin/sh", "-c", "echo $RELIEF_NAME"]
+[[uploads]]
+name = "archive"
+to = "folder"
+folder = "{archive}"
+"""
+        with Bench(programs.resolve(), folder, scanner, doers) as bench:
             story = Story(bench, opened, pictures)
             story.first_paint()
             story.wrong_token()
             scan = story.whole_story()
+            story.handed_on(scan, archive)
             story.preview(scan)
             story.failed_job(scan)
             story.aborted()
