@@ -1,5 +1,6 @@
 //! What is checked, in this order.
 
+mod hooks;
 mod life;
 mod package;
 mod service;
@@ -31,7 +32,7 @@ const fn long(name: &'static str, run: fn(&mut Bench) -> Result<()>) -> Check {
     }
 }
 
-pub(crate) fn all() -> [Check; 19] {
+pub(crate) fn all() -> [Check; 20] {
     [
         check("package: installed, enabled, started", package::install),
         check("service: in its sandbox", service::sandbox),
@@ -66,6 +67,10 @@ pub(crate) fn all() -> [Check; 19] {
         long(
             "webhooks: a closed network is told of, network.conf opens it",
             webhooks::drop_in,
+        ),
+        long(
+            "hooks and uploads: confined within the sandbox",
+            hooks::confined,
         ),
         long(
             "configuration: read again; unsound, not tried again",
