@@ -144,16 +144,15 @@ impl Gauges {
                 self.free.get_or_create(&labels).set(whole(free));
             }
         }
-        // Where the records cannot be read, these stay as they were.
-        for webhook in service.list_webhooks().into_iter().flatten() {
+        for backlog in service.receivers.backlogs() {
             let labels = OfWebhook {
-                webhook: webhook.name,
+                webhook: backlog.name,
             };
-            let waiting = whole(webhook.waiting as u64);
+            let waiting = whole(backlog.waiting);
             self.webhooks.get_or_create(&labels).set(waiting);
             self.dropped
                 .get_or_create(&labels)
-                .set(whole(webhook.dropped));
+                .set(whole(backlog.dropped));
         }
     }
 }

@@ -127,6 +127,15 @@ pub(crate) struct Receivers {
     outboxes: RwLock<Vec<Arc<Outbox>>>,
 }
 
+/// What waits for a receiver.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Backlog {
+    /// The receiver.
+    pub(crate) name: String,
+    pub(crate) waiting: u64,
+    pub(crate) dropped: u64,
+}
+
 /// A receiver, and what waits for it.
 pub(crate) struct Outbox {
     name: String,
@@ -312,6 +321,20 @@ impl Receivers {
             );
         }
         Ok(())
+    }
+
+    /// What waits for each receiver of any kind, hooks and uploads among them, and what had to make
+    /// room since the service started.
+    pub(crate) fn backlogs(&self) -> Vec<Backlog> {
+        let of = |outbox: &Arc<Outbox>| {
+            let state = lock(&outbox.state);
+            Backlog {
+                name: outbox.name.clone(),
+                waiting: state.due.len() as u64,
+                dropped: state.dropped,
+            }
+        };
+        self.all().iter().map(of).collect()
     }
 
     fn all(&self) -> Vec<Arc<Outbox>> {
