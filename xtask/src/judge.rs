@@ -48,6 +48,9 @@ pub(crate) struct Options {
     /// Leave out the recorded scan, which takes longer than all others together.
     #[arg(long)]
     pub(crate) no_recorded: bool,
+    /// Leave out the reader in Rust, which takes minutes to build
+    #[arg(long)]
+    pub(crate) no_cadmpeg: bool,
     /// Also judge recognised machining features: scans of the published part, random and odd ones.
     #[arg(long)]
     pub(crate) features: bool,
@@ -98,11 +101,10 @@ struct Case {
     is_shell: bool,
 }
 
-/// Installs and builds what judges.
+/// Installs and builds what judges in the first tier.
 pub(crate) fn prepare() -> Result<()> {
     let place = shell::root().join("target/judges");
     python(&place, &[])?;
-    cadmpeg(&place)?;
     shell::run("cargo", &["build", "--release", "--example", SAMPLES])
 }
 
@@ -115,7 +117,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     study::build()?;
     let judges = Judges {
         python,
-        cadmpeg: cadmpeg(&place)?,
+        cadmpeg: (!options.no_cadmpeg).then(|| cadmpeg(&place)).transpose()?,
         freecad: options.freecad,
         gmsh: options.gmsh,
         within_s: options.within_s.map(|seconds| seconds.to_string()),
@@ -199,7 +201,7 @@ fn cases(seeds: u32, no_recorded: bool) -> Vec<Case> {
 /// The programs that judge.
 struct Judges {
     python: String,
-    cadmpeg: String,
+    cadmpeg: Option<String>,
     freecad: bool,
     gmsh: bool,
     within_s: Option<String>,
@@ -251,7 +253,7 @@ impl Judges {
         }
         let mut words = vec![file.as_str()];
         words.extend(faces.as_deref());
-        shell::quiet(&self.cadmpeg, &words)?;
+        self.read(&words)?;
         if self.freecad {
             let mut with = vec![("IGES_FILE", file.clone())];
             with.extend(faces.map(|n| ("EXPECT_FACES", n)));
@@ -314,9 +316,15 @@ impl Judges {
             let words = [check, "--no-points", "--expect-faces", "1", iges];
             shell::quiet(&self.python, &words)?;
             self.step(step, &["--iges", iges, "--expect-faces", "1"])?;
-            shell::quiet(&self.cadmpeg, &[iges, "1"])?;
+            self.read(&[iges, "1"])?;
         }
         Ok(())
+    }
+
+    /// Has the independent reader read a file, if there is one.
+    fn read(&self, words: &[&str]) -> Result<()> {
+        let reader = self.cadmpeg.as_deref();
+        reader.map_or(Ok(()), |reader| shell::quiet(reader, words))
     }
 
     fn step(&self, file: &str, words: &[&str]) -> Result<()> {

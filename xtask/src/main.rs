@@ -203,6 +203,7 @@ fn full() -> anyhow::Result<()> {
         gmsh: true,
         within_s: Some(SLOWEST_S),
         no_recorded: false,
+        no_cadmpeg: false,
         features: false,
         out: None,
     })?;
