@@ -96,7 +96,9 @@ fn make_all(config: &Config) -> Result<Vec<Receiver>, ReceiverError> {
         let receiver = mail::receiver(config, public_url);
         made.push(receiver.map_err(failed(WebhookKind::Mail, &config.name))?);
     }
+    // Programs are run in folders of their own, where a relative path would lead elsewhere.
     let state_dir = &config.service.state_dir;
+    let state_dir = &std::path::absolute(state_dir).unwrap_or_else(|_| state_dir.clone());
     made.extend(
         config
             .hooks

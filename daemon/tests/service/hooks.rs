@@ -1,7 +1,7 @@
 //! Programs that are run for each result.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use relief_api::{Delivery, DeliveryState, HookList, HookRuns, Job, path};
@@ -334,4 +334,22 @@ fn hooks_are_programs_by_their_whole_path_and_have_names_of_their_own() {
     std::fs::write(&file, format!("[[hooks]]\nname = \"check\"\n{whole}")).unwrap();
     let sound = Config::load_with_files(&file).unwrap();
     assert_eq!(sound.hooks, [HookConfig::new("check", &["/bin/true"])]);
+}
+
+/// The state folder may be named from where the service was started.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_hook_has_a_folder_also_where_that_of_the_service_is_relative() {
+    let here = std::env::current_dir().unwrap();
+    let up: PathBuf = here.components().skip(1).map(|_| "..").collect();
+    let folder = tempfile::tempdir().unwrap();
+    let rig = Rig::start(folder, |config| {
+        let whole = &config.service.state_dir;
+        config.service.state_dir = up.join(whole.strip_prefix("/").unwrap());
+        config.hooks = vec![hook("writer", "echo x > here && cat here")];
+    })
+    .await;
+    rig.scan_to_result("roof").await;
+    let run = done(&rig, "writer").await;
+    assert!(says(&run, "x"), "{}", said(&run));
+    rig.daemon.shutdown().await;
 }
