@@ -105,11 +105,11 @@ format = "text"
         with self.request("POST", path, body, fields) as reply:
             return json.load(reply)
 
-    def scan(self, name):
-        """Takes a scan, and waits for its result. Gives the scan's id."""
+    def scan(self, name, longest=60):
+        """Takes a scan, and waits for its result so long at most. Gives the scan's id."""
         scan = self.post("/v1/scans", {"name": name})
         path = f"/v1/scans/{scan['id']}"
         self.wait(lambda: self.get(path)["state"] == "complete")
         job = self.get(path)["jobs"][0]
-        self.wait(lambda: self.get(f"/v1/jobs/{job}")["state"] == "done")
+        self.wait(lambda: self.get(f"/v1/jobs/{job}")["state"] == "done", longest)
         return scan["id"]
