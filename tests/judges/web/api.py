@@ -114,6 +114,21 @@ def promtool(bench):
     assert told.returncode in (0, 3), "promtool cannot read the metrics"
 
 
+def end_scans(bench):
+    """Ends what may still be under way, paused perhaps, and waits for the scanner."""
+    try:
+        bench.post("/v1/abort", {})
+    except urllib.error.HTTPError as error:
+        # Nothing was under way.
+        assert error.code == 409, error
+
+    def is_free():
+        status = bench.get("/v1/status")
+        return not status.get("scan") and status["scanner"]["link"] == "ready"
+
+    bench.wait(is_free)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("programs", type=pathlib.Path)
@@ -139,6 +154,7 @@ secret_file = "{secret}"
             assert refused(bench, "/v1/status", {}) == 401
             schemathesis(bench, options.seconds, options.seed)
             # It still works, once it has done what was asked of it meanwhile.
+            end_scans(bench)
             bench.scan("after", longest=60 + 2 * options.seconds)
 
 
