@@ -58,28 +58,30 @@ pub(super) fn scanner_name<'de, D: Deserializer<'de>>(
     Ok(Some(name))
 }
 
-pub(super) fn webhook_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+/// A name that is safe in a path and on a command line.
+fn safe_name<'de, D: Deserializer<'de>>(
+    deserializer: D,
+    of_what: &str,
+) -> Result<String, D::Error> {
     let name = String::deserialize(deserializer)?;
-    check_name(&name, "webhook").map_err(D::Error::custom)?;
+    check_name(&name, of_what).map_err(D::Error::custom)?;
     Ok(name)
+}
+
+pub(super) fn webhook_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    safe_name(deserializer, "webhook")
 }
 
 pub(super) fn broker_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
-    let name = String::deserialize(deserializer)?;
-    check_name(&name, "broker").map_err(D::Error::custom)?;
-    Ok(name)
+    safe_name(deserializer, "broker")
 }
 
 pub(super) fn hook_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
-    let name = String::deserialize(deserializer)?;
-    check_name(&name, "hook").map_err(D::Error::custom)?;
-    Ok(name)
+    safe_name(deserializer, "hook")
 }
 
 pub(super) fn upload_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
-    let name = String::deserialize(deserializer)?;
-    check_name(&name, "upload").map_err(D::Error::custom)?;
-    Ok(name)
+    safe_name(deserializer, "upload")
 }
 
 /// Patterns of names of files: at least one, and each of them one.
@@ -153,9 +155,7 @@ pub(super) fn hook_processes<'de, D: Deserializer<'de>>(deserializer: D) -> Resu
 }
 
 pub(super) fn mail_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
-    let name = String::deserialize(deserializer)?;
-    check_name(&name, "mail").map_err(D::Error::custom)?;
-    Ok(name)
+    safe_name(deserializer, "mail")
 }
 
 /// Where browsers find the page. It stands in mails, so that nothing secret may be in it.
