@@ -284,11 +284,11 @@ impl Service {
     pub(crate) fn list_webhooks(&self) -> Result<Vec<Webhook>, ServiceError> {
         let mut list = Vec::new();
         for outbox in self.receivers.all() {
-            let latest = latest(self.store.deliveries(&outbox.name)?);
             let settings = &outbox.receiver().settings;
             if is_for_results(settings.kind) {
                 continue;
             }
+            let latest = latest(self.store.deliveries(&outbox.name)?);
             let state = lock(&outbox.state);
             list.push(Webhook {
                 name: outbox.name.clone(),
