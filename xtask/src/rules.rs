@@ -74,6 +74,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("page", &[]),
     ("deliverables", &DELIVERABLES),
     ("relief-api", &[]),
+    ("job-queue", &["relief-api"]),
     ("reliefd", &DAEMON),
     ("relief", &COMMAND_LINE),
     (

@@ -1,0 +1,18 @@
+//! Where jobs wait for a worker.
+//!
+//! ```text
+//! bench --offer--> queue --take--> worker --settle--> queue --standing--> bench
+//! ```
+//!
+//! A bench offers what is to be made of its scans; a worker takes an order, and holds it by a
+//! [`Lease`] until it settles it. Whatever the queue, a job is run at least once, and settled
+//! once: of two workers that both believe to have it, the first one to settle it counts. So the
+//! bench, which publishes what was settled, publishes once.
+
+mod order;
+mod queue;
+
+pub use order::{BadName, BenchName, FORMAT, JobKey, Need, OLDEST_FORMAT, Order, Priority};
+pub use queue::{
+    Ending, JobQueue, Lease, MOST_CUT_SHORT, Outcome, QueueError, Standing, Stop, Worker,
+};
