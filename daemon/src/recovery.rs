@@ -253,7 +253,7 @@ impl Service {
             if job.state == JobState::Running {
                 self.take_up_job(&mut job)?;
             } else {
-                self.queue.add(job.id);
+                self.queue.add(self.order_of(&job));
             }
         }
         Ok(())

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError, RwLock};
 use std::time::Duration;
 
+use job_queue::BenchName;
 use regrid::RegridSettings;
 use relief_api::{LaserEntry, Scan, ScannerList, Status};
 use storage::Disk;
@@ -68,6 +69,8 @@ pub(crate) struct Service {
     pub(crate) starts: UnderWay,
     /// Room on the disks, as of the last look.
     pub(crate) measured: Mutex<Measured>,
+    /// What this service is called among others.
+    pub(crate) bench: BenchName,
     started_at: String,
     stopping: Mutex<bool>,
     stop_told: Condvar,
@@ -107,6 +110,7 @@ impl Service {
             queue: Queue::default(),
             liveness: Liveness::default(),
             promises: Arc::default(),
+            bench: config.nats.bench_name(),
             config: RwLock::new(Arc::new(config)),
             scans_dir,
             grids: Mutex::default(),

@@ -161,9 +161,10 @@ const DELIVERABLES: [&str; 18] = [
     "toolpath",
 ];
 
-const DAEMON: [&str; 18] = [
+const DAEMON: [&str; 19] = [
     "cad-exchange",
     "deliverables",
+    "job-queue",
     "nurbs",
     "pipeline",
     "range-image",

@@ -43,6 +43,54 @@ impl JobState {
     }
 }
 
+/// Which job goes first. Those of equal priority go in the order in which they were made.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Default,
+    Serialize,
+    Deserialize,
+    utoipa::ToSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Priority {
+    /// Before all others: somebody waits for it.
+    High,
+    /// As most are.
+    #[default]
+    Normal,
+    /// When there is nothing else to be done.
+    Low,
+}
+
+impl Priority {
+    /// All, the one that goes first in front.
+    pub const ALL: [Self; 3] = [Self::High, Self::Normal, Self::Low];
+
+    /// As it is spelt in JSON.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::High => "high",
+            Self::Normal => "normal",
+            Self::Low => "low",
+        }
+    }
+
+    /// True for what goes without saying.
+    #[must_use]
+    #[allow(clippy::trivially_copy_pass_by_ref)] // As serde calls it.
+    pub fn is_normal(&self) -> bool {
+        *self == Self::Normal
+    }
+}
+
 /// A job.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, utoipa::ToSchema)]
 pub struct Job {
@@ -65,6 +113,12 @@ pub struct Job {
     /// What to do about it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hint: Option<String>,
+    /// Which goes first, of those that wait.
+    #[serde(default, skip_serializing_if = "Priority::is_normal")]
+    pub priority: Priority,
+    /// How often somebody had it queued again.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub turn: u32,
     /// How often it was begun.
     #[serde(default)]
     pub attempts: u32,
@@ -80,6 +134,9 @@ pub struct Job {
     /// When the last attempt ended.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ended_at: Option<String>,
+    /// Who worked on it last, where that was another machine.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub worker: Option<String>,
     /// What the worker is at; `None` unless running.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stage: Option<String>,
@@ -135,6 +192,9 @@ pub struct Rerun {
     /// Names the deliverables; the scan's name if empty.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub name: String,
+    /// Whether it goes before other jobs, or after them.
+    #[serde(skip_serializing_if = "Priority::is_normal")]
+    pub priority: Priority,
     /// Settings that differ from those of the scan.
     #[serde(skip_serializing_if = "SettingOverrides::is_empty")]
     #[schema(schema_with = crate::scan::settings_schema)]

@@ -76,7 +76,7 @@ mod webhook;
 pub use event::{Event, LiveColumn};
 pub use hook::{Hook, HookList, HookRuns};
 pub use image::{DEFAULT_NODES, ImageRequest, MAX_NODES, Regrid, RegridImage, ScanImage};
-pub use job::{Job, JobId, JobList, JobState, Rerun, SpoolEntry, SpoolFile, StageTiming};
+pub use job::{Job, JobId, JobList, JobState, Priority, Rerun, SpoolEntry, SpoolFile, StageTiming};
 pub use laser::{LaserEntry, LaserLog, LaserState};
 pub use list::{MAX_LIMIT, Part};
 pub use preview::ScanPreview;

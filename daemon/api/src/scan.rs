@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::job::JobId;
+use crate::job::{JobId, Priority};
 
 /// Settings that differ from the service's configuration for one scan or rerun, keyed as
 /// in the configuration file: `regrid.neighbours`, `reconstruct.tolerance_mm`.
@@ -45,6 +45,9 @@ pub struct StartScan {
     /// Name of the scanner; needed where there are several.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub scanner: String,
+    /// Whether its job goes before others, or after them.
+    #[serde(skip_serializing_if = "Priority::is_normal")]
+    pub priority: Priority,
     /// What to measure, where it differs from the configured plan.
     #[serde(
         skip_serializing_if = "PlanRequest::is_empty",
@@ -187,6 +190,9 @@ pub struct Scan {
     /// but one.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub scanner: String,
+    /// Whether its first job goes before others, or after them.
+    #[serde(default, skip_serializing_if = "Priority::is_normal")]
+    pub priority: Priority,
     /// Where it stands.
     pub state: ScanState,
     /// What went wrong, or who ended it; of a paused scan, why.

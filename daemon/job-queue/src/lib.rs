@@ -12,7 +12,8 @@
 mod order;
 mod queue;
 
-pub use order::{BadName, BenchName, FORMAT, JobKey, Need, OLDEST_FORMAT, Order, Priority};
+pub use order::{BadName, BenchName, FORMAT, JobKey, Need, OLDEST_FORMAT, Order};
 pub use queue::{
     Ending, JobQueue, Lease, MOST_CUT_SHORT, Outcome, QueueError, Standing, Stop, Worker,
 };
+pub use relief_api::Priority;

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use relief_api::JobId;
+use relief_api::{JobId, Priority};
 use serde::{Deserialize, Serialize};
 
 /// Version of the format of orders, and of what stands in them, that this program writes.
@@ -73,36 +73,6 @@ pub struct JobKey {
 impl fmt::Display for JobKey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}.{}", self.bench, self.job)
-    }
-}
-
-/// Who goes first. Orders of equal priority go in the order in which they were offered.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
-)]
-#[serde(rename_all = "lowercase")]
-pub enum Priority {
-    /// Somebody waits for it.
-    High,
-    /// As most are.
-    #[default]
-    Normal,
-    /// When nothing else is to be done.
-    Low,
-}
-
-impl Priority {
-    /// All, the one that goes first in front.
-    pub const ALL: [Self; 3] = [Self::High, Self::Normal, Self::Low];
-
-    /// As it is spelt.
-    #[must_use]
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::High => "high",
-            Self::Normal => "normal",
-            Self::Low => "low",
-        }
     }
 }
 

@@ -137,6 +137,13 @@ impl Config {
         let traces = config.traces.check();
         traces.map_err(|message| inconsistent(path, "traces", message))?;
         config
+            .nats
+            .check()
+            .map_err(|message| inconsistent(path, "nats", message))?;
+        config
+            .check_roles()
+            .map_err(|message| inconsistent(path, "service", message))?;
+        config
             .storage
             .check()
             .map_err(|message| inconsistent(path, "storage", message))?;

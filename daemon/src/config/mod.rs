@@ -12,12 +12,14 @@ mod http;
 mod load;
 mod mail;
 mod mqtt;
+mod nats;
 mod network;
 mod overrides;
 mod processing;
 mod receivers;
 mod regularities;
 mod reload;
+mod roles;
 mod scanner;
 mod scanners;
 mod storage;
@@ -26,7 +28,7 @@ mod uploads;
 mod value;
 mod webhooks;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -46,6 +48,7 @@ pub use load::ConfigError;
 pub use mail::{MailConfig, MailSecurity};
 pub use mqtt::MqttConfig;
 pub(crate) use mqtt::Place;
+pub use nats::NatsConfig;
 pub use network::{NetworkChoice, NetworkContent};
 pub use overrides::OverrideError;
 pub use processing::{
@@ -55,6 +58,7 @@ pub use processing::{
 pub use receivers::Retry;
 pub use regularities::{Regularize, RegularizeUnits};
 pub use reload::Reloaded;
+pub use roles::Role;
 pub use scanner::{ScannerConfig, Transport};
 pub use storage::{Acknowledged, Limits, StorageConfig, Unacknowledged};
 pub use traces::TracesConfig;
@@ -94,6 +98,8 @@ pub struct Config {
     pub deliverables: DeliverablesConfig,
     /// How jobs are run.
     pub queue: QueueConfig,
+    /// Whether jobs go to workers elsewhere.
+    pub nats: NatsConfig,
     /// Who is told when something is done.
     pub webhooks: Vec<WebhookConfig>,
     /// Brokers that are told, too.
@@ -114,6 +120,9 @@ pub struct Config {
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ServiceConfig {
+    /// What this service is there for: all of it unless set.
+    #[serde(deserialize_with = "roles::roles")]
+    pub roles: BTreeSet<Role>,
     /// Unix socket of the HTTP API.
     pub socket: PathBuf,
     /// Group whose users may use the socket; that of the service unless set.
@@ -137,6 +146,7 @@ pub struct ServiceConfig {
 impl Default for ServiceConfig {
     fn default() -> Self {
         Self {
+            roles: BTreeSet::from(Role::ALL),
             socket: "/run/relief/reliefd.sock".into(),
             socket_group: None,
             socket_mode: 0o660,

@@ -47,7 +47,7 @@ impl Config {
             hooks,
             uploads
         );
-        leave!(service, http, discovery, queue, traces);
+        leave!(service, http, discovery, queue, nats, traces);
         merged.scanner = reloaded_scanner("scanner", &self.scanner, &new.scanner, &mut outcome);
         for (name, scanner) in &self.scanners {
             let section = format!("scanners.{name}");

@@ -4,11 +4,14 @@
 //! waiting, and the result's folder, which appears by one rename, says what is done.
 
 mod acknowledge;
-mod process;
+mod embedded;
+mod local;
+mod make;
 mod progress;
 mod queue;
 mod worker;
 
+use job_queue::MOST_CUT_SHORT;
 use relief_api::{Event, Job, JobId, JobState, Rerun, Scan};
 use scan_record::JournalReader;
 
@@ -18,12 +21,8 @@ use crate::ids::{now, shown_name};
 use crate::service::Service;
 use crate::store::Outgoing;
 
+pub(crate) use local::work;
 pub(crate) use queue::Queue;
-pub(crate) use worker::work;
-
-/// A job that was cut short so often is not begun again by itself: it may be what ends the
-/// service, as by the memory that it takes.
-const MOST_CUT_SHORT: u32 = 3;
 
 impl Service {
     /// Queues the job of a scan that has just been completed, and keeps the scan with it, and
@@ -78,6 +77,7 @@ impl Service {
         });
         let mut job = new_job(&scan, result, name);
         job.settings.clone_from(&request.settings);
+        job.priority = request.priority;
         self.add_job(job, &mut scan, |_| Vec::new())
     }
 
@@ -90,7 +90,7 @@ impl Service {
         let (job, added) = self.store.add_job(job, scan, tell)?;
         self.receivers.added(added);
         self.hub.tell(Event::Job(job.clone()));
-        self.queue.add(job.id);
+        self.queue.add(self.order_of(&job));
         Ok(job)
     }
 
@@ -111,15 +111,10 @@ impl Service {
                 action: "retried",
             });
         }
-        job.state = JobState::Queued;
-        job.cut_short = 0;
-        job.error = None;
-        job.hint = None;
-        job.ended_at = None;
-        job.timings.clear();
-        job.left_out.clear();
+        let turn = job.turn + 1;
+        wait_again(&mut job, turn);
         self.keep_job(&job)?;
-        self.queue.add(id);
+        self.queue.add(self.order_of(&job));
         Ok(job)
     }
 
@@ -130,7 +125,7 @@ impl Service {
             tracing::info!(job = job.id, scan = %job.scan, "taking up a job that was cut short");
             job.state = JobState::Queued;
             self.store.put_job(job)?;
-            self.queue.add(job.id);
+            self.queue.add(self.order_of(job));
             return Ok(());
         }
         self.spool.discard(&job.result);
@@ -179,6 +174,18 @@ impl Service {
     }
 }
 
+/// A job that came to an end is queued anew.
+fn wait_again(job: &mut Job, turn: u32) {
+    job.turn = turn;
+    job.state = JobState::Queued;
+    job.cut_short = 0;
+    job.error = None;
+    job.hint = None;
+    job.ended_at = None;
+    job.timings.clear();
+    job.left_out.clear();
+}
+
 /// A job as it is queued; its number is given when it is kept.
 fn new_job(scan: &Scan, result: String, name: String) -> Job {
     Job {
@@ -190,11 +197,14 @@ fn new_job(scan: &Scan, result: String, name: String) -> Job {
         state: JobState::Queued,
         error: None,
         hint: None,
+        priority: scan.priority,
+        turn: 0,
         attempts: 0,
         cut_short: 0,
         queued_at: now(),
         started_at: None,
         ended_at: None,
+        worker: None,
         stage: None,
         timings: Vec::new(),
         directory: None,

@@ -1,14 +1,13 @@
-//! Telling how far a job is, stage by stage.
+//! Telling how far an attempt is, stage by stage.
 
 use std::sync::Mutex;
 use std::time::Instant;
 
+use job_queue::Lease;
 use pipeline::{Observer, Stage};
 use range_image::Monitor;
-use relief_api::{Event, Job, StageTiming};
+use relief_api::StageTiming;
 
-use super::queue::StopFlag;
-use crate::events::Hub;
 use crate::liveness::Pulse;
 use crate::service::lock;
 
@@ -17,9 +16,7 @@ const STEP: f64 = 0.02;
 
 /// Watches over one attempt at a job.
 pub(crate) struct Progress<'a> {
-    hub: &'a Hub,
-    job: &'a Job,
-    flag: &'a StopFlag,
+    lease: &'a dyn Lease,
     pulse: &'a Pulse,
     state: Mutex<State>,
 }
@@ -37,11 +34,9 @@ struct Running {
 }
 
 impl<'a> Progress<'a> {
-    pub(crate) fn new(hub: &'a Hub, job: &'a Job, flag: &'a StopFlag, pulse: &'a Pulse) -> Self {
+    pub(crate) fn new(lease: &'a dyn Lease, pulse: &'a Pulse) -> Self {
         Self {
-            hub,
-            job,
-            flag,
+            lease,
             pulse,
             state: Mutex::default(),
         }
@@ -56,7 +51,7 @@ impl<'a> Progress<'a> {
             since: Instant::now(),
             told: 0.0,
         });
-        self.tell(stage, 0.0, None);
+        self.lease.tell(stage, 0.0, None);
     }
 
     /// Ends the stage under way; gives all stages and how long they took.
@@ -69,30 +64,19 @@ impl<'a> Progress<'a> {
     fn close(&self, state: &mut State) {
         if let Some(running) = state.running.take() {
             let seconds = running.since.elapsed().as_secs_f64();
-            self.tell(&running.stage, 1.0, Some(seconds));
+            self.lease.tell(&running.stage, 1.0, Some(seconds));
             state.finished.push(StageTiming {
                 stage: running.stage,
                 seconds,
             });
         }
     }
-
-    fn tell(&self, stage: &str, fraction: f64, seconds: Option<f64>) {
-        self.hub.tell(Event::Progress {
-            job: self.job.id,
-            scan: self.job.scan.clone(),
-            scanner: self.job.scanner.clone(),
-            stage: stage.to_owned(),
-            fraction,
-            seconds,
-        });
-    }
 }
 
 impl Monitor for Progress<'_> {
     fn is_cancelled(&self) -> bool {
         self.pulse.beat();
-        self.flag.is_set()
+        self.lease.stop().is_some()
     }
 
     fn progress(&self, fraction: f64) {
@@ -105,7 +89,7 @@ impl Monitor for Progress<'_> {
             running.told = fraction;
             let stage = running.stage.clone();
             drop(state);
-            self.tell(&stage, fraction, None);
+            self.lease.tell(&stage, fraction, None);
         }
     }
 }

@@ -1,10 +1,12 @@
 //! Which jobs wait and which run, in memory; the records say the same on disk.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
-use relief_api::JobId;
+use job_queue::{Order, Stop};
+use relief_api::{JobId, Priority};
 
 use crate::service::lock;
 
@@ -19,10 +21,9 @@ pub(crate) struct Queue {
 
 #[derive(Debug, Default)]
 struct State {
-    waiting: BTreeSet<JobId>,
+    /// In the order in which they go.
+    waiting: BTreeMap<(Priority, JobId), Order>,
     running: BTreeMap<JobId, Arc<StopFlag>>,
-    /// Of those that wait after an attempt whose outcome could not be kept.
-    begun: BTreeMap<JobId, Arc<StopFlag>>,
     stopping: bool,
 }
 
@@ -35,14 +36,14 @@ const CANCELLED: u8 = 1;
 const SERVICE_STOPS: u8 = 2;
 
 impl StopFlag {
-    /// True once the job should stop, for whatever reason.
-    pub(crate) fn is_set(&self) -> bool {
-        self.0.load(Ordering::Relaxed) != RUN
-    }
-
-    /// True when somebody cancelled the job, which outlasts the service's own end.
-    pub(crate) fn is_cancelled(&self) -> bool {
-        self.0.load(Ordering::Relaxed) == CANCELLED
+    /// Why the job should stop, if it should. That somebody cancelled it outlasts the service's
+    /// own end.
+    pub(crate) fn why(&self) -> Option<Stop> {
+        match self.0.load(Ordering::Relaxed) {
+            CANCELLED => Some(Stop::Cancelled),
+            SERVICE_STOPS => Some(Stop::WorkerEnds),
+            _ => None,
+        }
     }
 
     fn set(&self, why: u8) {
@@ -60,28 +61,18 @@ impl Queue {
     }
 
     /// A job waits.
-    pub(crate) fn add(&self, id: JobId) {
-        lock(&self.state).waiting.insert(id);
-        self.wake.notify_one();
-    }
-
-    /// A job counts as running although its attempt has ended, so that it can be cancelled.
-    pub(crate) fn hold(&self, id: JobId, flag: &Arc<StopFlag>) {
-        lock(&self.state).running.insert(id, Arc::clone(flag));
-    }
-
-    /// A job that is held waits for another attempt, which stops if this one was to stop.
-    pub(crate) fn add_again(&self, id: JobId, flag: Arc<StopFlag>) {
-        self.end(id, &flag);
-        lock(&self.state).begun.insert(id, flag);
-        self.add(id);
+    pub(crate) fn add(&self, order: Order) {
+        let place = (order.priority, order.key.job);
+        lock(&self.state).waiting.insert(place, order);
+        // Whoever is woken may be one that cannot do it.
+        self.wake.notify_all();
     }
 
     /// Takes a job out; false if it does not wait.
     pub(crate) fn remove(&self, id: JobId) -> bool {
         let mut state = lock(&self.state);
-        state.begun.remove(&id);
-        state.waiting.remove(&id)
+        let place = state.waiting.keys().find(|(_, job)| *job == id).copied();
+        place.is_some_and(|place| state.waiting.remove(&place).is_some())
     }
 
     /// Asks a running job to stop; false if it does not run.
@@ -94,22 +85,35 @@ impl Queue {
         flag.is_some()
     }
 
-    /// The oldest waiting job, now running; waits for one. `None` once the service stops.
-    pub(crate) fn take(&self) -> Option<(JobId, Arc<StopFlag>)> {
+    /// The first waiting job that is fit, now running; waits so long for one. `None` at once when
+    /// the service stops.
+    pub(crate) fn take(
+        &self,
+        is_fit: impl Fn(&Order) -> bool,
+        longest: Duration,
+    ) -> Option<(Order, Arc<StopFlag>)> {
+        let end = Instant::now() + longest;
         let mut state = lock(&self.state);
         loop {
             if state.stopping {
                 return None;
             }
-            if let Some(id) = state.waiting.pop_first() {
-                let flag = state.begun.remove(&id).unwrap_or_default();
-                state.running.insert(id, Arc::clone(&flag));
-                return Some((id, flag));
+            let fit = state.waiting.iter().find(|(_, order)| is_fit(order));
+            let place = fit.map(|(place, _)| *place);
+            if let Some(order) = place.and_then(|place| state.waiting.remove(&place)) {
+                let flag = Arc::new(StopFlag::default());
+                state.running.insert(order.key.job, Arc::clone(&flag));
+                return Some((order, flag));
+            }
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return None;
             }
             state = self
                 .wake
-                .wait(state)
-                .unwrap_or_else(PoisonError::into_inner);
+                .wait_timeout(state, left)
+                .unwrap_or_else(PoisonError::into_inner)
+                .0;
         }
     }
 
@@ -139,37 +143,5 @@ impl Queue {
     pub(crate) fn counts(&self) -> (usize, usize) {
         let state = lock(&self.state);
         (state.waiting.len(), state.running.len())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_cancel_outlasts_an_attempt_whose_outcome_is_not_kept() {
-        for cancelled_while_held in [false, true] {
-            let queue = Queue::default();
-            queue.add(1);
-            let (id, flag) = queue.take().unwrap();
-            if !cancelled_while_held {
-                assert!(queue.cancel_running(id));
-            }
-            queue.end(id, &flag);
-            assert!(!queue.cancel_running(id));
-            queue.hold(id, &flag);
-            if cancelled_while_held {
-                assert!(queue.cancel_running(id));
-            }
-            queue.add_again(id, flag);
-            assert_eq!(queue.counts(), (1, 0));
-            let (again, flag) = queue.take().unwrap();
-            assert_eq!(again, id);
-            assert!(flag.is_cancelled());
-            // A job that is retried later begins afresh.
-            queue.end(id, &flag);
-            queue.add(id);
-            assert!(!queue.take().unwrap().1.is_set());
-        }
     }
 }

@@ -1,28 +1,23 @@
-//! A worker: takes job after job, until the service stops.
+//! A worker: takes order after order, from whatever queue, until it is to stop.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Duration;
 
-use relief_api::{Event, Job, JobState};
+use job_queue::{Ending, JobQueue, Lease, Outcome, QueueError, Stop, Worker};
+use serde_json::Value;
 
-use super::process::process;
 use super::progress::Progress;
-use super::queue::StopFlag;
 use crate::error::panic_text;
-use crate::ids::now;
 use crate::liveness::Pulse;
-use crate::service::Service;
 
 /// What became of an attempt.
 #[derive(Debug)]
-pub(crate) enum JobOutcome {
-    /// The result is in the spool.
-    Published {
-        /// Its folder.
-        directory: PathBuf,
-        /// What is not in it that was asked for, and why.
+pub(crate) enum Made {
+    /// What was asked for is where the bench finds it.
+    Done {
+        /// Where that is.
+        result: Value,
+        /// What is not there that was asked for, and why.
         left_out: Vec<String>,
     },
     /// It was asked to stop.
@@ -36,146 +31,136 @@ pub(crate) enum JobOutcome {
     },
 }
 
-/// By how much jobs are nicer than the taking of scans.
-const NICER: i32 = 10;
+/// How what is ordered is made.
+pub(crate) trait Craft {
+    /// Makes what is ordered, and puts it where the bench finds it.
+    fn make(&self, lease: &dyn Lease, progress: &Progress<'_>) -> Made;
 
-/// How long a job waits whose record the disk refused.
+    /// What was begun is given up.
+    fn discard(&self, lease: &dyn Lease);
+}
+
+/// How long a worker waits before it tries again what the queue refused.
 const RETRY: Duration = Duration::from_secs(2);
+/// How long it waits for an order before it looks whether it is to stop.
+const LOOK: Duration = Duration::from_secs(1);
 /// A job looks whether it should stop far more often than this, on any machine; one that
 /// does not is stuck.
 const LONGEST_SILENCE: Duration = Duration::from_secs(15 * 60);
 
-/// Works until the service stops. Runs on a thread of its own.
-pub(crate) fn work(service: &Arc<Service>) {
-    // On Linux this holds for this thread, and for those that it starts.
-    if let Err(error) = rustix::process::nice(NICER) {
-        tracing::warn!(%error, "jobs run with the priority of scans");
-    }
-    let name = std::thread::current().name().unwrap_or("worker").to_owned();
-    let pulse = service.liveness.begin(name);
-    while let Some((id, flag)) = service.queue.take() {
-        pulse.work(LONGEST_SILENCE);
-        let kept = attempt(service, id, &flag, &pulse);
-        service.queue.end(id, &flag);
-        pulse.rest();
-        if let Err(error) = kept {
-            // The record still says that the job waits or runs. A result that is in its place
-            // is not made again.
-            tracing::error!(job = id, %error, "cannot keep the record of a job; trying again");
-            service.queue.hold(id, &flag);
-            if service.wait_for_stop(RETRY) {
-                return;
-            }
-            service.queue.add_again(id, flag);
-        }
-    }
+/// A worker at its bench.
+pub(crate) struct Hand<'a> {
+    pub(crate) queue: &'a dyn JobQueue,
+    pub(crate) worker: &'a Worker,
+    pub(crate) craft: &'a dyn Craft,
+    pub(crate) pulse: &'a Pulse,
+    /// Waits so long, and tells whether the worker is to stop.
+    pub(crate) is_to_stop: &'a dyn Fn(Duration) -> bool,
 }
 
-fn attempt(
-    service: &Service,
-    id: relief_api::JobId,
-    flag: &Arc<StopFlag>,
-    pulse: &Pulse,
-) -> Result<(), crate::error::ServiceError> {
-    let mut job = {
-        let _order = service.queue.changing();
-        let mut job = service.job(id)?;
-        job.attempts += 1;
-        // Kept before the work begins, which may be the end of this process. One that runs by
-        // its record has come to an end that the disk refused to keep.
-        if job.state != JobState::Running {
-            job.cut_short += 1;
-        }
-        job.state = JobState::Running;
-        job.started_at = Some(now());
-        job.ended_at = None;
-        service.keep_job(&job)?;
-        job
-    };
-    tracing::info!(job = id, scan = %job.scan, attempt = job.attempts, "job begins");
-    let (outcome, timings) = {
-        let progress = Progress::new(&service.hub, &job, flag, pulse);
-        // A defect in the processing of one scan must not end the service.
-        let outcome = catch_unwind(AssertUnwindSafe(|| process(service, &job, &progress)))
-            .unwrap_or_else(|panic| JobOutcome::Failed {
-                error: format!("the processing ended unexpectedly: {}", panic_text(&*panic)),
-                hint: Some(
-                    "this is a defect of the program: please report it together with the \
-                     scan's journal"
-                        .into(),
-                ),
-            });
-        (outcome, progress.finish())
-    };
-    if !matches!(outcome, JobOutcome::Published { .. }) {
-        service.spool.discard(&job.result);
-    }
-    let _order = service.queue.changing();
-    // Before anybody is told: who hears of the end may cancel or retry at once, and must
-    // not meet this attempt.
-    service.queue.end(id, flag);
-    job.timings = timings;
-    job.cut_short = 0;
-    job.ended_at = Some(now());
-    let mut published = None;
-    match outcome {
-        JobOutcome::Published {
-            directory,
-            left_out,
-        } => {
-            job.state = JobState::Done;
-            job.error = None;
-            job.hint = None;
-            job.directory = Some(directory.display().to_string());
-            for told in &left_out {
-                tracing::warn!(job = id, scan = %job.scan, "{told}");
-            }
-            job.left_out = left_out;
-            tracing::info!(job = id, directory = %directory.display(), "job done");
-            published = Some(published_event(service, &job));
-            if job.result == job.scan {
-                service.forget_grid(&job.scan);
-            }
-        }
-        JobOutcome::Stopped if flag.is_cancelled() => {
-            job.state = JobState::Cancelled;
-            tracing::info!(job = id, "job cancelled");
-        }
-        JobOutcome::Stopped => {
-            job.state = JobState::Queued;
-            job.ended_at = None;
-            job.timings.clear();
-            tracing::info!(job = id, "job put back, since the service stops");
-        }
-        JobOutcome::Failed { error, hint } => {
-            job.state = JobState::Failed;
-            tracing::warn!(job = id, %error, "job failed");
-            job.error = Some(error);
-            job.hint = hint;
+impl Hand<'_> {
+    /// Works until it is to stop.
+    pub(crate) fn work(&self) {
+        while !(self.is_to_stop)(Duration::ZERO) {
+            self.work_once(LOOK);
         }
     }
-    // Before anybody can see it.
-    service.metrics.job_ended(&job);
-    if let Some(traces) = service.traces.get() {
-        traces.job_ended(&job);
-    }
-    service.keep_job(&job)?;
-    if let Some(event) = published {
-        service.hub.tell(event);
-    }
-    Ok(())
-}
 
-fn published_event(service: &Service, job: &Job) -> Event {
-    let entry = service.spool.entry(&job.result).ok().flatten();
-    Event::Published {
-        job: job.id,
-        scan: job.scan.clone(),
-        scanner: job.scanner.clone(),
-        result: job.result.clone(),
-        directory: job.directory.clone().unwrap_or_default(),
-        files: entry.map_or_else(Vec::new, |entry| {
-            entry.files.into_iter().map(|file| file.name).collect()
-        }),
+    /// Takes an order if there is one within so long, and sees it to its end; false if there was
+    /// none.
+    pub(crate) fn work_once(&self, longest: Duration) -> bool {
+        match self.queue.take(self.worker, longest) {
+            Ok(Some(mut lease)) => {
+                self.pulse.work(LONGEST_SILENCE);
+                self.see_to(&mut *lease);
+                self.pulse.rest();
+                true
+            }
+            Ok(None) => false,
+            Err(error) => {
+                tracing::warn!(%error, "cannot take a job; trying again");
+                (self.is_to_stop)(RETRY);
+                false
+            }
+        }
+    }
+
+    fn see_to(&self, lease: &mut dyn Lease) {
+        let key = lease.order().key.clone();
+        tracing::info!(job = %key, attempt = lease.begun().attempts, "job begins");
+        let (made, timings) = {
+            let progress = Progress::new(lease, self.pulse);
+            // A defect in the processing of one scan must not end the worker.
+            let made = catch_unwind(AssertUnwindSafe(|| self.craft.make(lease, &progress)))
+                .unwrap_or_else(|panic| Made::Failed {
+                    error: format!("the processing ended unexpectedly: {}", panic_text(&*panic)),
+                    hint: Some(
+                        "this is a defect of the program: please report it together with the \
+                         scan's journal"
+                            .into(),
+                    ),
+                });
+            (made, progress.finish())
+        };
+        if !matches!(made, Made::Done { .. }) {
+            self.craft.discard(lease);
+        }
+        let ending = match made {
+            Made::Done { result, left_out } => Ending::Done { result, left_out },
+            Made::Failed { error, hint } => Ending::Failed { error, hint },
+            Made::Stopped => match lease.stop() {
+                Some(Stop::Cancelled) => Ending::Cancelled,
+                Some(Stop::Lost) => {
+                    tracing::warn!(job = %key, "a job is another worker's by now");
+                    return;
+                }
+                Some(Stop::WorkerEnds) | None => {
+                    tracing::info!(job = %key, "job put back");
+                    if let Err(error) = lease.give_back() {
+                        tracing::warn!(job = %key, %error, "cannot put a job back; its turn comes again");
+                    }
+                    return;
+                }
+            },
+        };
+        self.settle(lease, Outcome { ending, timings });
+    }
+
+    fn settle(&self, lease: &mut dyn Lease, mut outcome: Outcome) {
+        let key = lease.order().key.clone();
+        loop {
+            // Who cancelled it was told that it ends so.
+            if matches!(outcome.ending, Ending::Failed { .. })
+                && lease.stop() == Some(Stop::Cancelled)
+            {
+                outcome.ending = Ending::Cancelled;
+            }
+            match lease.settle(&outcome) {
+                Ok(standing) => {
+                    let state = standing.state.as_str();
+                    match &outcome.ending {
+                        Ending::Failed { error, .. } => {
+                            tracing::warn!(job = %key, %error, "job failed");
+                        }
+                        _ => tracing::info!(job = %key, state, "job ends"),
+                    }
+                    return;
+                }
+                Err(QueueError::Lost(_)) => {
+                    tracing::warn!(job = %key, "a job was settled by another worker");
+                    return;
+                }
+                Err(error) => {
+                    // The records still say that it runs. A result that is in its place is not
+                    // made again.
+                    tracing::error!(job = %key, %error, "cannot keep what became of a job; trying again");
+                    self.pulse.rest();
+                    if (self.is_to_stop)(RETRY) {
+                        return;
+                    }
+                    self.pulse.work(LONGEST_SILENCE);
+                }
+            }
+        }
     }
 }

@@ -105,6 +105,7 @@ async fn a_rerun_has_other_settings_and_a_folder_of_its_own() {
             ("deliverables.step_units".to_owned(), json!("inch")),
         ]
         .into(),
+        ..Rerun::default()
     };
     let job: Job = rig.client.post(&path::scan_rerun(&scan.id), &rerun).await;
     assert_ne!(job.result, scan.id);
@@ -130,6 +131,7 @@ async fn a_rerun_has_other_settings_and_a_folder_of_its_own() {
             ("deliverables.page".to_owned(), json!(["pdf"])),
         ]
         .into(),
+        ..Rerun::default()
     };
     let last: Job = rig.client.post(&path::scan_rerun(&scan.id), &without).await;
     let last = job_over(&mut events, &rig, last.id).await;

@@ -56,7 +56,10 @@ fn state(job: &Job) -> String {
     match (&job.error, &job.hint, &job.stage) {
         (Some(error), Some(hint), _) => format!("{state}: {error}; {hint}"),
         (Some(error), None, _) => format!("{state}: {error}"),
-        (None, _, Some(stage)) => format!("{state}: {stage}"),
+        (None, _, Some(stage)) => match &job.worker {
+            Some(worker) => format!("{state}: {stage}, on {worker}"),
+            None => format!("{state}: {stage}"),
+        },
         (None, _, None) if !job.left_out.is_empty() => {
             format!("{state}{}: {}", acknowledged(job), job.left_out.join("; "))
         }

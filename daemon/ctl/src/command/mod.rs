@@ -24,6 +24,7 @@ mod pages;
 mod part;
 pub(crate) mod pause;
 mod places;
+mod priority;
 mod regularize;
 pub(crate) mod rerun;
 pub(crate) mod resume;

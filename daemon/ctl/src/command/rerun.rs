@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use deliverables::features::read_edits;
-use relief_api::{Job, Rerun, path};
+use relief_api::{Job, Priority, Rerun, path};
 
 use super::named;
 use super::part::PartArgs;
+use super::priority;
 use super::regularize::RegularizeArgs;
 use super::setting::{self, Setting};
 use crate::failure::Failure;
@@ -36,6 +37,9 @@ pub(crate) struct Args {
         hide_default_value = true
     )]
     name: String,
+    /// Whether it goes before other jobs that wait, or after them: high, normal or low
+    #[arg(long, value_name = "PRIORITY", default_value = "normal", value_parser = priority::parse)]
+    priority: Priority,
     /// Stay until the deliverables are published
     #[arg(long)]
     wait: bool,
@@ -66,6 +70,7 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
     }
     let request = Rerun {
         name: args.name,
+        priority: args.priority,
         settings,
     };
     let scan = named::scan_id(&client, args.scan).await?;

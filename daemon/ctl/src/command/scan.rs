@@ -2,10 +2,11 @@
 
 mod preview;
 
-use relief_api::{Job, PlanRequest, Scan, StartScan, path};
+use relief_api::{Job, PlanRequest, Priority, Scan, StartScan, path};
 use serde::Serialize;
 
 use super::part::PartArgs;
+use super::priority;
 use super::regularize::RegularizeArgs;
 use super::setting::{self, Setting};
 use crate::failure::Failure;
@@ -51,6 +52,9 @@ pub(crate) struct Args {
         hide_default_value = true
     )]
     scanner: String,
+    /// Whether its job goes before others that wait, or after them: high, normal or low
+    #[arg(long, value_name = "PRIORITY", default_value = "normal", value_parser = priority::parse)]
+    priority: Priority,
     /// Stay until the deliverables are published
     #[arg(long)]
     wait: bool,
@@ -132,6 +136,7 @@ impl Args {
             operator: self.operator,
             note: self.note,
             scanner: self.scanner,
+            priority: self.priority,
             plan: PlanRequest {
                 x_first_mm: plan.x_first_mm,
                 x_last_mm: plan.x_last_mm,

@@ -1,7 +1,7 @@
-//! One attempt at a job: from the kept columns to a folder in the spool.
+//! What an attempt at a job makes: from the kept columns to a folder of deliverables.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use deliverables::{
@@ -10,27 +10,34 @@ use deliverables::{
 };
 use pipeline::{Columns, Observer, PipelineError, ReadAgainError, Stage, View};
 use range_image::{Cancelled, Column, Lattice, Monitor, RangeImage};
+use regrid::RegridSettings;
 use relief_api::{Job, Scan};
 use scan_record::{Ending, Header, JournalReader, ReadError};
+use storage::Disk;
 
 use super::kept_processing;
 use super::progress::Progress;
-use super::worker::JobOutcome;
 use crate::acquisition::grid_file;
 use crate::calibration::InForce;
 use crate::config::{PageChoice, Processing, StepChoice, StepUnits};
 use crate::fit::Fit;
-use crate::service::{KeptGrid, Service};
 use crate::spool::SpoolError;
 
 /// Why an attempt led to nothing.
-enum Stop {
+pub(crate) enum Halt {
+    /// It was asked to stop.
     Asked,
-    Failed { error: String, hint: Option<String> },
+    /// It cannot be done, or not now.
+    Failed {
+        /// Why not.
+        error: String,
+        /// What to do about it.
+        hint: Option<String>,
+    },
 }
 
-impl Stop {
-    fn failed(error: impl std::fmt::Display, hint: Option<&str>) -> Self {
+impl Halt {
+    pub(crate) fn failed(error: impl std::fmt::Display, hint: Option<&str>) -> Self {
         Self::Failed {
             error: error.to_string(),
             hint: hint.map(str::to_owned),
@@ -38,13 +45,13 @@ impl Stop {
     }
 }
 
-impl From<Cancelled> for Stop {
+impl From<Cancelled> for Halt {
     fn from(_: Cancelled) -> Self {
         Self::Asked
     }
 }
 
-impl From<PipelineError> for Stop {
+impl From<PipelineError> for Halt {
     fn from(error: PipelineError) -> Self {
         match error {
             PipelineError::Cancelled => Self::Asked,
@@ -53,7 +60,7 @@ impl From<PipelineError> for Stop {
     }
 }
 
-impl From<DeliverError> for Stop {
+impl From<DeliverError> for Halt {
     fn from(error: DeliverError) -> Self {
         match error {
             DeliverError::Cancelled(_) => Self::Asked,
@@ -65,121 +72,157 @@ impl From<DeliverError> for Stop {
     }
 }
 
-impl From<SpoolError> for Stop {
+impl From<SpoolError> for Halt {
     fn from(error: SpoolError) -> Self {
         let hint = error.hint();
         Self::failed(error, Some(&hint))
     }
 }
 
-impl From<ReadError> for Stop {
+impl From<ReadError> for Halt {
     fn from(error: ReadError) -> Self {
         Self::failed(error, None)
     }
 }
 
-/// Makes the job's result and publishes it.
-pub(super) fn process(service: &Service, job: &Job, progress: &Progress<'_>) -> JobOutcome {
-    match attempt(service, job, progress) {
-        Ok((directory, left_out)) => JobOutcome::Published {
-            directory,
-            left_out,
-        },
-        Err(Stop::Asked) => JobOutcome::Stopped,
-        Err(Stop::Failed { error, hint }) => JobOutcome::Failed { error, hint },
-    }
+/// What an attempt works on. It may be on another machine than the scanner.
+pub(crate) struct Workpiece<'a> {
+    /// Where files are written.
+    pub(crate) disk: &'a dyn Disk,
+    pub(crate) job: &'a Job,
+    pub(crate) scan: &'a Scan,
+    /// The scan's columns.
+    pub(crate) journal: &'a Path,
+    /// The range image that was made while the scanner moved, and with which settings.
+    pub(crate) grid: Option<(&'a Path, &'a RegridSettings)>,
+    pub(crate) threads: usize,
+    pub(crate) pictures: Pictures,
+    /// The empty folder in which the result is made.
+    pub(crate) incoming: &'a Path,
 }
 
-fn attempt(
-    service: &Service,
-    job: &Job,
-    progress: &Progress<'_>,
-) -> Result<(PathBuf, Vec<String>), Stop> {
-    if let Some(directory) = service.spool.published(&job.result)? {
-        return Ok((directory, job.left_out.clone()));
-    }
-    // First, so that an unwritable spool is told at once and not after minutes.
-    let incoming = service.spool.begin(&job.result)?;
-    let scan = service
-        .scan(&job.scan)
-        .map_err(|error| Stop::failed(error, None))?;
-    let mut journal = JournalReader::open(&service.journal_path(&job.scan))?;
-    let header = journal.header().clone();
-    let processing = kept_processing(&header.settings)
-        .and_then(|kept| {
-            kept.with_overrides(&job.settings)
-                .map_err(|e| e.to_string())
-        })
-        .map_err(|error| Stop::failed(error, None))?;
-    let mut settings =
-        processing.pipeline_settings(header.column_pitch_mm, header.sample_spacing_mm);
-    settings.regrid.threads = service.threads_of_a_job();
+impl Workpiece<'_> {
+    /// Makes the job's result; gives what is not in it that was asked for, and why.
+    pub(crate) fn make(&self, progress: &Progress<'_>) -> Result<Vec<String>, Halt> {
+        let (job, scan) = (self.job, self.scan);
+        let mut journal = JournalReader::open(self.journal)?;
+        let header = journal.header().clone();
+        let processing = kept_processing(&header.settings)
+            .and_then(|kept| {
+                kept.with_overrides(&job.settings)
+                    .map_err(|e| e.to_string())
+            })
+            .map_err(|error| Halt::failed(error, None))?;
+        let mut settings =
+            processing.pipeline_settings(header.column_pitch_mm, header.sample_spacing_mm);
+        settings.regrid.threads = self.threads;
 
-    let watch = Stopwatch::new(progress);
-    let (image, mut kept) = match streamed(service, job, &settings.regrid) {
-        Some(image) => (image, count(&mut journal, &header, progress)?),
-        None => {
-            watch.stage(Stage::Regrid);
-            let mut fit = Fit::of_journal(&settings.regrid, &service.journal_path(&job.scan));
-            regrid(
-                &mut journal,
-                &header,
-                &settings.regrid,
-                &mut fit,
-                &scan,
-                &watch,
-            )?
+        let watch = Stopwatch::new(progress);
+        let (image, mut kept) = match self.streamed(&settings.regrid) {
+            Some(image) => (image, count(&mut journal, &header, progress)?),
+            None => {
+                watch.stage(Stage::Regrid);
+                let mut fit = Fit::of_journal(&settings.regrid, self.journal);
+                regrid(
+                    &mut journal,
+                    &header,
+                    &settings.regrid,
+                    &mut fit,
+                    scan,
+                    &watch,
+                )?
+            }
+        };
+        let columns = KeptColumns {
+            path: self.journal,
+            camera_mm: header.calibration.camera_mm(),
+        };
+        let view = &kept.view;
+        let outcome = pipeline::process_in_view(&image, Some(&columns), view, &settings, &watch)
+            .map_err(|error| self.explained(error, kept.samples))?;
+        kept.warnings.extend(pipeline::unusual_size(&image));
+        let timestamp = scan
+            .started_at
+            .parse()
+            .map_err(|error| Halt::failed(format!("the scan's time is damaged: {error}"), None))?;
+        let overdue = |own: InForce| own.overdue(timestamp);
+        kept.warnings
+            .extend(InForce::kept_with(&header).and_then(overdue));
+        let cad = cad_options(&processing, scan)?;
+        let inputs = Inputs {
+            name: &job.name,
+            timestamp,
+            image: &image,
+            outcome: &outcome,
+            settings: &settings,
+            cad: &cad,
+            points: Some(MeasuredPoints(&columns)),
+            page: page_formats(&processing),
+            scan: scan_report(scan, &header, &kept),
+            warnings: kept.warnings,
+            versions: versions(&header),
+        };
+        let delivered =
+            deliverables::write(self.disk, self.incoming, &inputs, self.pictures, &watch)?;
+        Ok(delivered.left_out)
+    }
+
+    /// The error in terms of what was measured, where that alone explains it.
+    fn explained(&self, error: PipelineError, samples: u64) -> Halt {
+        let unexplained = matches!(
+            error,
+            PipelineError::NothingMeasured | PipelineError::NoSurface { .. }
+        );
+        if unexplained && samples <= MOST_EXPLAINED_SAMPLES {
+            let why = || -> Result<Option<String>, ReadError> {
+                let mut journal = JournalReader::open(self.journal)?;
+                let header = journal.header().clone();
+                let mut columns = Vec::new();
+                while let Some(raw) = journal.next_column()? {
+                    columns.push(raw.calibrated(&header.calibration));
+                }
+                Ok(pipeline::no_surface(&columns, header.column_pitch_mm))
+            };
+            if let Ok(Some(why)) = why() {
+                return Halt::failed(
+                    format!("scan {}: {why}", self.job.scan),
+                    PipelineError::NothingMeasured.hint(),
+                );
+            }
         }
-    };
-    let columns = KeptColumns {
-        path: service.journal_path(&job.scan),
-        camera_mm: header.calibration.camera_mm(),
-    };
-    let outcome = pipeline::process_in_view(&image, Some(&columns), &kept.view, &settings, &watch)
-        .map_err(|error| explained(error, service, job, kept.samples))?;
-    kept.warnings.extend(pipeline::unusual_size(&image));
-    let timestamp = scan
-        .started_at
-        .parse()
-        .map_err(|error| Stop::failed(format!("the scan's time is damaged: {error}"), None))?;
-    let overdue = |own: InForce| own.overdue(timestamp);
-    kept.warnings
-        .extend(InForce::kept_with(&header).and_then(overdue));
-    let cad = cad_options(&processing, &scan)?;
-    let inputs = Inputs {
-        name: &job.name,
-        timestamp,
-        image: &image,
-        outcome: &outcome,
-        settings: &settings,
-        cad: &cad,
-        points: Some(MeasuredPoints(&columns)),
-        page: page_formats(&processing),
-        scan: scan_report(&scan, &header, &kept),
-        warnings: kept.warnings,
-        versions: versions(&header),
-    };
-    let pictures = if service.is_short_of_room(service.spool.root()) {
-        Pictures::LeftOut
-    } else {
-        Pictures::Drawn
-    };
-    let delivered = deliverables::write(&*service.disk, &incoming, &inputs, pictures, &watch)?;
-    // The last moment at which a cancelled job leaves nothing behind.
-    progress.check()?;
-    progress.begin("publish");
-    Ok((service.spool.publish(&job.result)?, delivered.left_out))
+        error.into()
+    }
+
+    /// The range image that was made while the scanner moved, if it is the one wanted. It is
+    /// the same, bit for bit, as regridding would give.
+    fn streamed(&self, settings: &RegridSettings) -> Option<RangeImage> {
+        let (path, made) = self.grid?;
+        // The number of threads leaves no trace in the result.
+        let same = RegridSettings {
+            threads: settings.threads,
+            ..*made
+        } == *settings;
+        if !same {
+            return None;
+        }
+        let lattice = Lattice {
+            pitch_mm: settings.pitch_mm,
+        };
+        grid_file::read(path, lattice)
+            .inspect_err(|error| tracing::warn!(scan = %self.job.scan, %error, "regridding anew"))
+            .ok()
+    }
 }
 
 /// The columns of a journal, read anew each time.
-struct KeptColumns {
-    path: PathBuf,
+struct KeptColumns<'a> {
+    path: &'a Path,
     camera_mm: Option<[f64; 2]>,
 }
 
-impl Columns for KeptColumns {
+impl Columns for KeptColumns<'_> {
     fn visit(&self, take: &mut dyn FnMut(&Column) -> bool) -> Result<(), ReadAgainError> {
-        let mut journal = JournalReader::open(&self.path)?;
+        let mut journal = JournalReader::open(self.path)?;
         let calibration = journal.header().calibration;
         while let Some(raw) = journal.next_column()? {
             if !take(&raw.calibrated(&calibration)) {
@@ -196,32 +239,6 @@ impl Columns for KeptColumns {
 
 /// Larger scans than this are not read again to find out why there is no surface.
 const MOST_EXPLAINED_SAMPLES: u64 = 1 << 22;
-
-/// The error in terms of what was measured, where that alone explains it.
-fn explained(error: PipelineError, service: &Service, job: &Job, samples: u64) -> Stop {
-    let unexplained = matches!(
-        error,
-        PipelineError::NothingMeasured | PipelineError::NoSurface { .. }
-    );
-    if unexplained && samples <= MOST_EXPLAINED_SAMPLES {
-        let why = || -> Result<Option<String>, ReadError> {
-            let mut journal = JournalReader::open(&service.journal_path(&job.scan))?;
-            let header = journal.header().clone();
-            let mut columns = Vec::new();
-            while let Some(raw) = journal.next_column()? {
-                columns.push(raw.calibrated(&header.calibration));
-            }
-            Ok(pipeline::no_surface(&columns, header.column_pitch_mm))
-        };
-        if let Ok(Some(why)) = why() {
-            return Stop::failed(
-                format!("scan {}: {why}", job.scan),
-                PipelineError::NothingMeasured.hint(),
-            );
-        }
-    }
-    error.into()
-}
 
 /// What the journal held.
 #[derive(Default, Clone)]
@@ -254,28 +271,8 @@ impl Kept {
 
 type Journal = JournalReader<std::io::BufReader<std::fs::File>>;
 
-/// The range image that was made while the scanner moved, if it is the one wanted. It is
-/// the same, bit for bit, as regridding would give.
-fn streamed(service: &Service, job: &Job, settings: &regrid::RegridSettings) -> Option<RangeImage> {
-    let KeptGrid { settings: made } = service.kept_grid(&job.scan)?;
-    // The number of threads leaves no trace in the result.
-    let same = regrid::RegridSettings {
-        threads: settings.threads,
-        ..made
-    } == *settings;
-    if !same {
-        return None;
-    }
-    let lattice = Lattice {
-        pitch_mm: settings.pitch_mm,
-    };
-    grid_file::read(&service.grid_path(&job.scan), lattice)
-        .inspect_err(|error| tracing::warn!(scan = %job.scan, %error, "regridding anew"))
-        .ok()
-}
-
 /// Counts what the journal holds, and whether it is whole.
-fn count(journal: &mut Journal, header: &Header, progress: &Progress<'_>) -> Result<Kept, Stop> {
+fn count(journal: &mut Journal, header: &Header, progress: &Progress<'_>) -> Result<Kept, Halt> {
     let mut kept = Kept::default();
     while let Some(column) = journal.next_column()? {
         kept.add(&column, header);
@@ -305,11 +302,11 @@ impl Monitor for Reading<'_> {
 fn regrid(
     journal: &mut Journal,
     header: &Header,
-    settings: &regrid::RegridSettings,
+    settings: &RegridSettings,
     fit: &mut Fit,
     scan: &Scan,
     watch: &Stopwatch<'_>,
-) -> Result<(RangeImage, Kept), Stop> {
+) -> Result<(RangeImage, Kept), Halt> {
     let mut kept = Kept::default();
     let reading = Reading {
         watch,
@@ -344,9 +341,9 @@ fn regrid(
     }
     let image = image.map_err(|error| {
         if watch.is_cancelled() {
-            Stop::Asked
+            Halt::Asked
         } else {
-            Stop::from(PipelineError::Regrid(error))
+            Halt::from(PipelineError::Regrid(error))
         }
     })?;
     kept.end(journal.ending());
@@ -361,24 +358,24 @@ fn missed(
     fit: &mut Fit,
     scan: &Scan,
     watch: &Stopwatch<'_>,
-) -> Stop {
+) -> Halt {
     loop {
         match journal.next_column() {
-            _ if watch.is_cancelled() => return Stop::Asked,
+            _ if watch.is_cancelled() => return Halt::Asked,
             Ok(Some(raw)) => fit.add(&raw.calibrated(&header.calibration)),
             Ok(None) => break,
             Err(error) => return error.into(),
         }
     }
     let (error, hint) = fit.told().unwrap_or_default();
-    Stop::failed(format!("scan {}: {error}", scan.id), Some(&hint))
+    Halt::failed(format!("scan {}: {error}", scan.id), Some(&hint))
 }
 
-fn cad_options(processing: &Processing, scan: &Scan) -> Result<CadOptions, Stop> {
+fn cad_options(processing: &Processing, scan: &Scan) -> Result<CadOptions, Halt> {
     let wanted = &processing.deliverables;
     let further = wanted.further();
     let further =
-        further.map_err(|(section, why)| Stop::failed(format!("{section}: {why}"), None))?;
+        further.map_err(|(section, why)| Halt::failed(format!("{section}: {why}"), None))?;
     Ok(CadOptions {
         entities: match wanted.entities {
             Some(128) => Entities::Rational128,

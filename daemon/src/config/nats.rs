@@ -1,0 +1,251 @@
+//! The section `[nats]`: a NATS server with JetStream, by which jobs go to workers elsewhere.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use job_queue::BenchName;
+use serde::{Deserialize, Deserializer, de::Error};
+
+/// Where jobs go that are to be worked on elsewhere, and what comes from there.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct NatsConfig {
+    /// Servers of one cluster, as `nats://HOST:4222` or `tls://HOST:4222`; without any, all is done
+    /// on this machine.
+    #[serde(deserialize_with = "servers")]
+    pub servers: Vec<String>,
+    /// What this service is called among the others; made of the host's name unless set.
+    #[serde(deserialize_with = "bench")]
+    pub bench: Option<BenchName>,
+    /// File with a token.
+    pub token_file: Option<PathBuf>,
+    /// File with the seed of an nkey.
+    pub nkey_file: Option<PathBuf>,
+    /// File with the certificates of the authorities that are trusted; without it, those that the
+    /// machine trusts.
+    pub ca_file: Option<PathBuf>,
+    /// What every subject, stream and bucket of this fleet begins with.
+    #[serde(deserialize_with = "prefix")]
+    pub prefix: String,
+    /// How many servers of a cluster keep what is kept.
+    #[serde(deserialize_with = "replicas")]
+    pub replicas: usize,
+    /// How long a worker may be silent before another one gets its job.
+    #[serde(deserialize_with = "seconds")]
+    pub silence_s: u32,
+    /// Most jobs of this service that wait or run elsewhere; the rest waits here, so that no
+    /// bench takes up all workers. As many as there are workers for it unless set.
+    #[serde(deserialize_with = "hand_over")]
+    pub hand_over: Option<usize>,
+    /// Most bytes of this service's columns and results on their way.
+    #[serde(deserialize_with = "quota_mb")]
+    pub quota_mb: u32,
+    /// Whether this service's own jobs are done here while the servers are away.
+    pub compute_when_away: bool,
+    /// How long they are to be away for that.
+    #[serde(deserialize_with = "away")]
+    pub away_s: u32,
+    /// What must be installed where this service's jobs are done.
+    #[serde(deserialize_with = "tools")]
+    pub needs: BTreeSet<String>,
+    /// What is installed here, for the jobs of others.
+    #[serde(deserialize_with = "tools")]
+    pub tools: BTreeSet<String>,
+    /// Most memory of a job that is done here for others; three quarters of the machine's, shared by
+    /// its workers, unless set.
+    #[serde(deserialize_with = "memory_mb")]
+    pub memory_mb: Option<u64>,
+    /// The silence in milliseconds, shorter than a file can say; no key of the file.
+    #[serde(skip)]
+    pub silence_ms: Option<u64>,
+}
+
+impl Default for NatsConfig {
+    fn default() -> Self {
+        Self {
+            servers: Vec::new(),
+            bench: None,
+            token_file: None,
+            nkey_file: None,
+            ca_file: None,
+            prefix: "relief".to_owned(),
+            replicas: 1,
+            silence_s: 30,
+            hand_over: None,
+            quota_mb: 4096,
+            compute_when_away: true,
+            away_s: 30,
+            needs: BTreeSet::new(),
+            tools: BTreeSet::new(),
+            memory_mb: None,
+            silence_ms: None,
+        }
+    }
+}
+
+impl NatsConfig {
+    /// Whether jobs go elsewhere at all.
+    #[must_use]
+    pub fn is_used(&self) -> bool {
+        !self.servers.is_empty()
+    }
+
+    /// What this service is called.
+    #[must_use]
+    pub fn bench_name(&self) -> BenchName {
+        self.bench.clone().unwrap_or_else(host_as_name)
+    }
+
+    /// How long a worker may be silent.
+    #[must_use]
+    pub fn silence(&self) -> Duration {
+        let configured = u64::from(self.silence_s) * 1000;
+        Duration::from_millis(self.silence_ms.unwrap_or(configured))
+    }
+
+    /// What does not go together.
+    pub(super) fn check(&self) -> Result<(), String> {
+        if self.token_file.is_some() && self.nkey_file.is_some() {
+            return Err(
+                "`token_file` and `nkey_file` are two ways to say the same: one of them is \
+                        enough"
+                    .to_owned(),
+            );
+        }
+        for (key, file) in [
+            ("token_file", &self.token_file),
+            ("nkey_file", &self.nkey_file),
+            ("ca_file", &self.ca_file),
+        ] {
+            if file.is_some() && !self.is_used() {
+                return Err(format!("`{key}` is for `servers`: name one, or remove it"));
+            }
+        }
+        let is_secure = |server: &String| server.starts_with("tls:");
+        if self.ca_file.is_some() && !self.servers.iter().all(is_secure) {
+            return Err(
+                "`ca_file` is for tls, but not all `servers` are: remove it, or change the \
+                        addresses"
+                    .to_owned(),
+            );
+        }
+        Ok(())
+    }
+}
+
+/// The host's name with what cannot be in one left out.
+fn host_as_name() -> BenchName {
+    let system = rustix::system::uname();
+    let host = system.nodename().to_string_lossy();
+    let first = host.split('.').next().unwrap_or_default();
+    let name: String = first
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
+        .take(32)
+        .collect();
+    let fallback = || BenchName::try_from("bench".to_owned());
+    // The fallback is a name.
+    #[allow(clippy::unwrap_used)]
+    BenchName::try_from(name).or_else(|_| fallback()).unwrap()
+}
+
+/// What is refused is told without what may be secret in it: others see the log.
+fn servers<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<String>, D::Error> {
+    let all = Vec::<String>::deserialize(deserializer)?;
+    for server in &all {
+        let rest = ["nats://", "tls://"]
+            .iter()
+            .find_map(|scheme| server.strip_prefix(scheme));
+        let is_host = |c: char| c.is_ascii_alphanumeric() || "-._[]:".contains(c);
+        let why = match rest {
+            Some(rest) if rest.contains('@') => {
+                "an address holds a name or password, which others would see: use `token_file` or \
+                 `nkey_file`"
+            }
+            Some(rest) if !rest.is_empty() && rest.chars().all(is_host) => continue,
+            _ => "addresses such as \"tls://nats.lab.example:4222\" are needed",
+        };
+        return Err(D::Error::custom(why));
+    }
+    Ok(all)
+}
+
+fn bench<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<BenchName>, D::Error> {
+    let name = String::deserialize(deserializer)?;
+    BenchName::try_from(name)
+        .map(Some)
+        .map_err(D::Error::custom)
+}
+
+fn prefix<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+    if (1..=32).contains(&text.len()) && text.chars().all(plain) {
+        Ok(text)
+    } else {
+        Err(D::Error::custom(format!(
+            "{text:?} is no prefix: 1 to 32 small letters, digits and `-` are"
+        )))
+    }
+}
+
+fn replicas<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
+    let count = usize::deserialize(deserializer)?;
+    if [1, 3, 5].contains(&count) {
+        Ok(count)
+    } else {
+        Err(D::Error::custom(format!(
+            "{count} replicas are not possible: 1, 3 or 5 are, and a cluster of at least as many \
+             servers"
+        )))
+    }
+}
+
+fn tools<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeSet<String>, D::Error> {
+    let all = BTreeSet::<String>::deserialize(deserializer)?;
+    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+    let sound = |tool: &&String| !((1..=24).contains(&tool.len()) && tool.chars().all(plain));
+    match all.iter().find(sound) {
+        Some(tool) => Err(D::Error::custom(format!(
+            "{tool:?} is no name of a tool: 1 to 24 small letters, digits and `_` are"
+        ))),
+        None => Ok(all),
+    }
+}
+
+/// A number within limits.
+fn within<'de, D, T>(deserializer: D, least: T, most: T, of: &str) -> Result<T, D::Error>
+where
+    D: Deserializer<'de>,
+    T: Copy + Deserialize<'de> + PartialOrd + std::fmt::Display,
+{
+    let number = T::deserialize(deserializer)?;
+    if (least..=most).contains(&number) {
+        Ok(number)
+    } else {
+        Err(D::Error::custom(format!(
+            "{number} {of} are not possible: {least} to {most} are"
+        )))
+    }
+}
+
+fn seconds<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    within(deserializer, 2, 3600, "seconds")
+}
+
+fn away<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    within(deserializer, 0, 86_400, "seconds")
+}
+
+fn quota_mb<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    within(deserializer, 16, 10_000_000, "MB")
+}
+
+fn hand_over<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<usize>, D::Error> {
+    within(deserializer, 1, 10_000, "jobs").map(Some)
+}
+
+fn memory_mb<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u64>, D::Error> {
+    within(deserializer, 64, 100_000_000, "MB").map(Some)
+}
