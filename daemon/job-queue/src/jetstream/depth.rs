@@ -34,8 +34,7 @@ impl JetStreamQueue {
 impl Shared {
     async fn depth(&self) -> Result<Depth, QueueError> {
         let stores = self.stores().await?;
-        let away =
-            |error: &dyn std::fmt::Display| QueueError::Away(format!("the orders: {error}"));
+        let away = |error: &dyn std::fmt::Display| QueueError::Away(format!("the orders: {error}"));
         let consumers: Vec<_> = stores
             .orders
             .consumers()

@@ -113,10 +113,7 @@ impl Stores {
             .collect())
     }
 
-    async fn standings_of(
-        &self,
-        bench: &BenchName,
-    ) -> Result<Vec<(JobKey, Standing)>, QueueError> {
+    async fn standings_of(&self, bench: &BenchName) -> Result<Vec<(JobKey, Standing)>, QueueError> {
         let keys = Self::keys(&self.standings, &format!("{bench}.*")).await?;
         let keys = keys.iter().filter_map(|key| parse_key(key));
         let read = async |key: JobKey| match self.read(&key).await {
@@ -137,11 +134,7 @@ impl Stores {
 }
 
 /// Tells what happens until the connection is lost.
-async fn report(
-    shared: &Arc<Shared>,
-    bench: &BenchName,
-    tell: &Sender<News>,
-) -> Result<(), Deaf> {
+async fn report(shared: &Arc<Shared>, bench: &BenchName, tell: &Sender<News>) -> Result<(), Deaf> {
     let mut up = shared.link.watch();
     if !up.borrow_and_update().there {
         tell.send(News::Away)?;
@@ -155,7 +148,10 @@ async fn report(
     let subject = shared.names.every_progress(bench);
     let (Ok(mut progress), Ok(mut standings)) = (
         stores.client.subscribe(subject).await,
-        stores.standings.watch_with_history(format!("{bench}.*")).await,
+        stores
+            .standings
+            .watch_with_history(format!("{bench}.*"))
+            .await,
     ) else {
         return Ok(());
     };

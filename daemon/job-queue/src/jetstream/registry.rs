@@ -91,7 +91,11 @@ impl JetStreamQueue {
             let stores = self.shared.stores().await?;
             let mut nodes = Vec::new();
             for key in Stores::keys(&stores.nodes, ">").await? {
-                let entry = stores.nodes.entry(key).await.map_err(|error| away(&error))?;
+                let entry = stores
+                    .nodes
+                    .entry(key)
+                    .await
+                    .map_err(|error| away(&error))?;
                 let put = entry.filter(|entry| entry.operation == Operation::Put);
                 // What another version wrote may be something else.
                 if let Some(node) = put.and_then(|put| serde_json::from_slice(&put.value).ok()) {

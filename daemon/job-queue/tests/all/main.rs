@@ -1,0 +1,6 @@
+//! The queue on a real `nats-server`.
+//!
+//! Without that program the tests are skipped, unless `RELIEF_NEEDS_NATS` is set.
+
+mod jetstream;
+mod server;
