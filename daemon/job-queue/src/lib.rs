@@ -11,6 +11,7 @@
 
 #[cfg(feature = "conformance")]
 pub mod conformance;
+pub mod depot;
 pub mod jetstream;
 mod order;
 mod queue;

@@ -127,6 +127,11 @@ impl JetStreamQueue {
         self.shared.link.away_since()
     }
 
+    /// What calls and tasks share.
+    pub(crate) fn share(&self) -> Arc<Shared> {
+        Arc::clone(&self.shared)
+    }
+
     /// Takes back what was offered: the bench has what it needs of it, or wants it no more and
     /// does not ask what becomes of it. A worker that has it finds it lost.
     ///

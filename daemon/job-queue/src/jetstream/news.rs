@@ -1,5 +1,6 @@
 //! What a bench hears of its orders.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SendError, Sender, channel};
 use std::time::Duration;
@@ -97,7 +98,7 @@ impl Stores {
     pub(crate) async fn keys(
         store: &async_nats::jetstream::kv::Store,
         filter: &str,
-    ) -> Result<Vec<String>, QueueError> {
+    ) -> Result<BTreeSet<String>, QueueError> {
         let away =
             |error: &dyn std::fmt::Display| QueueError::Away(format!("{}: {error}", store.name));
         let subjects = store

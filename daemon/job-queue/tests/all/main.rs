@@ -2,5 +2,6 @@
 //!
 //! Without that program the tests are skipped, unless `RELIEF_NEEDS_NATS` is set.
 
+mod depot;
 mod jetstream;
 mod server;
