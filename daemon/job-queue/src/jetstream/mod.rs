@@ -14,6 +14,7 @@ mod names;
 mod news;
 mod offer;
 mod options;
+mod pull;
 mod registry;
 mod stores;
 mod take;

@@ -5,15 +5,14 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use async_nats::jetstream::consumer::{Consumer, FromConsumer, pull};
 use async_nats::jetstream::{AckKind, Message};
-use futures_util::{StreamExt, TryStreamExt};
+use futures_util::TryStreamExt;
 use relief_api::JobState;
 
 use super::kept::{Kept, TRIES, crowded};
 use super::lease::{Attempt, JetLease};
 use super::names::Line;
-use super::options::ANSWER;
+use super::pull::{Pulled, pull};
 use super::stores::{Stores, is_there, random_name};
 use super::{Shared, locked};
 use crate::order::{JobKey, Order};
@@ -32,7 +31,7 @@ const UNFIT_PAUSE: Duration = Duration::from_secs(5);
 /// Lines that there are, as far as is known.
 #[derive(Debug, Default)]
 pub(crate) struct Lines {
-    known: Vec<(Line, Consumer<pull::Config>)>,
+    known: Vec<Line>,
     names: HashSet<String>,
     read_at: Option<Instant>,
 }
@@ -50,24 +49,13 @@ impl Lines {
         }
     }
 
-    fn for_worker(
-        &self,
-        worker: &Worker,
-        lowest_first: bool,
-    ) -> Option<Vec<Consumer<pull::Config>>> {
+    /// Consumers of the lines that the worker takes orders from.
+    fn for_worker(&self, worker: &Worker, lowest_first: bool) -> Option<Vec<String>> {
         self.read_at.filter(|at| at.elapsed() < LINES_AGE)?;
-        let mut lines: Vec<_> = self
-            .known
-            .iter()
-            .filter(|(line, _)| line.fits(worker))
-            .collect();
-        lines.sort_by_key(|(line, _)| line.rank(lowest_first));
-        Some(
-            lines
-                .into_iter()
-                .map(|(_, consumer)| consumer.clone())
-                .collect(),
-        )
+        let fit = self.known.iter().filter(|line| line.fits(worker));
+        let mut lines: Vec<_> = fit.collect();
+        lines.sort_by_key(|line| line.rank(lowest_first));
+        Some(lines.into_iter().map(Line::consumer).collect())
     }
 }
 
@@ -83,7 +71,7 @@ pub(super) async fn take(
         bell.mark_unchanged();
         let stores = shared.stores().await?;
         for consumer in shared.lines_for(&stores, worker).await? {
-            while let Some(message) = fetch(shared, &consumer).await? {
+            while let Some(message) = fetch(shared, &stores, &consumer).await? {
                 if let Some(lease) = begin(shared, &stores, worker, message).await? {
                     shared.given.fetch_add(1, Ordering::Relaxed);
                     return Ok(Some(lease));
@@ -102,11 +90,7 @@ pub(super) async fn take(
 }
 
 impl Shared {
-    async fn lines_for(
-        &self,
-        stores: &Stores,
-        worker: &Worker,
-    ) -> Result<Vec<Consumer<pull::Config>>, QueueError> {
+    async fn lines_for(&self, stores: &Stores, worker: &Worker) -> Result<Vec<String>, QueueError> {
         let next = self.given.load(Ordering::Relaxed) + 1;
         let lowest_first = next.is_multiple_of(LOWEST_EVERY);
         if let Some(lines) = locked(&self.lines).for_worker(worker, lowest_first) {
@@ -115,24 +99,17 @@ impl Shared {
         // Whatever is heard of from here on has it read once more.
         let read_at = Instant::now();
         locked(&self.lines).read_at = Some(read_at);
-        let infos: Result<Vec<_>, _> = stores.orders.consumers().try_collect().await;
-        let infos = match infos {
-            Ok(infos) => infos,
+        let names: Result<HashSet<String>, _> = stores.orders.consumer_names().try_collect().await;
+        let names = match names {
+            Ok(names) => names,
             Err(error) => {
                 self.doubt_stores().await;
                 return Err(QueueError::Away(format!("the orders' consumers: {error}")));
             }
         };
         let mut lines = locked(&self.lines);
-        lines.names = infos.iter().map(|info| info.name.clone()).collect();
-        lines.known = infos
-            .into_iter()
-            .filter_map(|info| {
-                let line = Line::parse(&info.name)?;
-                let config = pull::Config::try_from_consumer_config(info.config.clone()).ok()?;
-                Some((line, Consumer::new(config, info, stores.context.clone())))
-            })
-            .collect();
+        lines.known = names.iter().filter_map(|name| Line::parse(name)).collect();
+        lines.names = names;
         let outdated = lines.read_at != Some(read_at);
         lines.read_at = Some(read_at);
         let found = lines.for_worker(worker, lowest_first);
@@ -146,21 +123,17 @@ impl Shared {
 /// The next message of a line, if it has one.
 async fn fetch(
     shared: &Shared,
-    consumer: &Consumer<pull::Config>,
+    stores: &Stores,
+    consumer: &str,
 ) -> Result<Option<Message>, QueueError> {
-    let away = |why: &dyn std::fmt::Display| QueueError::Away(format!("the next order: {why}"));
-    let batch = consumer.fetch().max_messages(1).messages().await;
-    let mut batch = batch.map_err(|error| away(&error))?;
-    match tokio::time::timeout(ANSWER, batch.next()).await {
-        Ok(None) => Ok(None),
-        Ok(Some(Ok(message))) => Ok(Some(message)),
-        // The consumer is there no more, or moves to another server.
-        Ok(Some(Err(error))) => {
-            tracing::debug!(%error, "a line of orders is read anew");
+    match pull(stores, consumer).await? {
+        Pulled::Message(message) => Ok(Some(*message)),
+        Pulled::Nothing => Ok(None),
+        Pulled::Gone(why) => {
+            tracing::debug!(%why, consumer, "lines of orders are read anew");
             locked(&shared.lines).outdate();
             Ok(None)
         }
-        Err(_) => Err(away(&"no answer")),
     }
 }
 

@@ -2,6 +2,9 @@
 //!
 //! Without that program the tests are skipped, unless `RELIEF_NEEDS_NATS` is set.
 
+mod bench;
 mod depot;
 mod jetstream;
+mod link;
+mod login;
 mod server;

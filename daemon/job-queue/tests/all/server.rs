@@ -63,6 +63,11 @@ fn is_installed() -> bool {
 }
 
 impl Server {
+    /// Whether there is a nats-server.
+    pub(crate) fn is_there() -> bool {
+        is_installed()
+    }
+
     /// One that runs. None where there is no nats-server, unless there has to be one.
     pub(crate) fn start() -> Option<Arc<Self>> {
         Self::configured("")
