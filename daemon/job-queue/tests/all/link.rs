@@ -59,7 +59,7 @@ impl Cable {
 }
 
 /// Does it again until the network is there.
-fn insist<T>(mut what: impl FnMut() -> Result<T, QueueError>) -> T {
+pub(crate) fn insist<T>(mut what: impl FnMut() -> Result<T, QueueError>) -> T {
     let begun = Instant::now();
     loop {
         match what() {
@@ -71,7 +71,7 @@ fn insist<T>(mut what: impl FnMut() -> Result<T, QueueError>) -> T {
     }
 }
 
-fn work(queue: &JetStreamQueue, name: &str, over: &AtomicBool) -> u32 {
+pub(crate) fn work(queue: &JetStreamQueue, name: &str, over: &AtomicBool) -> u32 {
     let mut settled = 0;
     while !over.load(Ordering::Relaxed) {
         let taken = queue.take(&Worker::named(name), Duration::from_millis(100));

@@ -3,8 +3,11 @@
 //! Without that program the tests are skipped, unless `RELIEF_NEEDS_NATS` is set.
 
 mod bench;
+mod cluster;
+mod cost;
 mod depot;
 mod jetstream;
 mod link;
 mod login;
+mod roles;
 mod server;
