@@ -1,13 +1,16 @@
 //! The connection: made for as long as it takes, and again whenever it is lost.
 
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use async_nats::{Client, ClientError, ConnectErrorKind, Event, ServerError, connection};
 use tokio::sync::watch;
 
 use super::options::{Options, pause};
 use crate::QueueError;
+
+/// How long is waited for an answer after something was forbidden.
+const FORBIDDEN: Duration = Duration::from_secs(1);
 
 /// How often the connection was made, and whether it is there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,6 +37,8 @@ pub(crate) struct Link {
     servers: String,
     known: Mutex<Known>,
     up: watch::Sender<Up>,
+    /// How often something was forbidden.
+    forbidden: watch::Sender<u64>,
 }
 
 impl Link {
@@ -51,6 +56,7 @@ impl Link {
                 there: false,
                 times: 0,
             }),
+            forbidden: watch::Sender::new(0),
         })
     }
 
@@ -151,6 +157,7 @@ impl Link {
                 if lower.contains("permissions violation") {
                     tracing::error!(%text, "NATS forbids what a queue needs");
                     self.known().forbidden = Some((Instant::now(), text));
+                    self.forbidden.send_modify(|times| *times += 1);
                 } else if lower.contains("authentication") || lower.contains("authorization") {
                     self.failed(&text, true);
                 } else {
@@ -208,8 +215,24 @@ impl Link {
     /// Ends when the connection does.
     pub(crate) async fn lost(&self) -> QueueError {
         let mut up = self.up.subscribe();
-        let _ = up.wait_for(|up| !up.there).await;
+        // From now on: what was is seen by whoever asks for the client.
+        up.mark_unchanged();
+        while up.changed().await.is_ok() {
+            if !up.borrow_and_update().there {
+                break;
+            }
+        }
         self.away(&self.known())
+    }
+
+    /// Ends a while after something was forbidden: it may have been what is waited for, which
+    /// then never comes, or something else, so that what is waited for comes meanwhile.
+    pub(crate) async fn forbidden(&self) -> QueueError {
+        let mut forbidden = self.forbidden.subscribe();
+        forbidden.mark_unchanged();
+        let _ = forbidden.changed().await;
+        tokio::time::sleep(FORBIDDEN).await;
+        QueueError::Away("NATS does not answer".to_owned())
     }
 
     /// A server does not answer what it forbids, but tells of it elsewhere: what seems to have

@@ -14,7 +14,7 @@ use crate::queue::QueueError;
 pub struct Depth {
     /// Orders that wait, by priority; all priorities are there.
     pub waiting: BTreeMap<Priority, u64>,
-    /// Orders that workers have.
+    /// Orders that workers have, or had and that are about to be given out again.
     pub running: u64,
     /// For how long the oldest of those waits that no worker had yet, by the server's clock;
     /// `None` if none does.

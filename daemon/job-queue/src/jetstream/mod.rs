@@ -192,6 +192,7 @@ impl Shared {
             tokio::select! {
                 done = work => done,
                 lost = self.link.lost() => Err(lost),
+                forbidden = self.link.forbidden() => Err(forbidden),
                 () = tokio::time::sleep(longest) => Err(QueueError::Away(format!(
                     "NATS did not answer within {} s",
                     longest.as_secs()

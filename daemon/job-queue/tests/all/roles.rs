@@ -13,7 +13,6 @@ use crate::server::{LIMIT, Server, connect, options};
 /// What each role may publish; all listen on their own inbox. `{p}` is the prefix, `{P}` the same
 /// in capitals.
 const BENCH: &[&str] = &[
-    "$JS.API.INFO",
     "$JS.API.STREAM.INFO.{P}_JOBS",
     "$JS.API.STREAM.CREATE.{P}_JOBS",
     "$JS.API.STREAM.PURGE.{P}_JOBS",
