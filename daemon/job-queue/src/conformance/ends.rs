@@ -1,5 +1,9 @@
 //! How orders end.
 
+use std::sync::Barrier;
+use std::thread;
+use std::time::Duration;
+
 use relief_api::JobState;
 
 use super::{
@@ -119,4 +123,36 @@ pub(super) fn done_though_cancelled(setting: &mut dyn Setting) {
     ));
     assert_eq!(wait_for(setting, &order, settled.state), settled);
     nothing_for(setting, &worker("w"));
+}
+
+/// Of two that change an order at the same time, one is first, and the other sees it.
+pub(super) fn cancelled_while_taken(setting: &mut dyn Setting) {
+    let (queue, glance) = (setting.queue(), setting.glance());
+    let mut taken_first = 0;
+    for n in 1..=30 {
+        let order = order(setting, n);
+        offer(setting, &order);
+        let together = Barrier::new(2);
+        let taken = thread::scope(|scope| {
+            let takes = scope.spawn(|| {
+                together.wait();
+                queue.take(&worker("w"), Duration::ZERO)
+            });
+            together.wait();
+            queue.cancel(&order.key).expect("it is cancelled");
+            takes.join().expect("no panic").expect("it is looked for")
+        });
+        if let Some(mut lease) = taken {
+            taken_first += 1;
+            assert_eq!(wait_for_stop(setting, &*lease), Stop::Cancelled);
+            let settled = lease.settle(&outcome(Ending::Cancelled));
+            settled.expect("it is settled");
+        }
+        assert_eq!(standing(setting, &order).state, JobState::Cancelled);
+    }
+    let taken = queue.take(&worker("w"), glance).expect("it is looked for");
+    assert!(
+        taken.is_none(),
+        "{taken_first} of 30 were taken, and one more"
+    );
 }

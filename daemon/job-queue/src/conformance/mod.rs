@@ -103,6 +103,7 @@ pub const CASES: &[Case] = &[
     case("cancelled_while_running", ends::cancelled_while_running),
     case("cancelled_too_late", ends::cancelled_too_late),
     case("done_though_cancelled", ends::done_though_cancelled),
+    case("cancelled_while_taken", ends::cancelled_while_taken),
     case("alive_beyond_deadline", workers::alive_beyond_deadline),
     case("late_settle_counts_once", workers::late_settle_counts_once),
     restarting(

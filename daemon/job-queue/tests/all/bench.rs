@@ -388,3 +388,41 @@ fn nodes_tell_that_they_are_there() {
     queue.leave(&node).unwrap();
     assert_eq!(queue.nodes().unwrap().len(), 2);
 }
+
+/// A message may be left behind, as when a server does not hear that it was answered. Without a
+/// standing that speaks for it, it is nothing.
+#[test]
+fn a_message_that_nothing_speaks_for_is_dropped() {
+    let Some((server, options, queue)) = rig() else {
+        return;
+    };
+    let leave_behind = |order: &Order| {
+        let subject = format!(
+            "{}.jobs.v1.normal.m0.{}-{}",
+            options.prefix, order.key, order.turn
+        );
+        let payload = serde_json::to_vec(order).unwrap();
+        server::RUNTIME.block_on(async {
+            let client = async_nats::connect(server.url()).await.unwrap();
+            let context = async_nats::jetstream::new(client);
+            let sent = context.publish(subject, payload.into()).await.unwrap();
+            sent.await.unwrap();
+        });
+    };
+    let mut settled = order(1);
+    settled.turn = 2;
+    queue.offer(&settled).unwrap();
+    take(&queue, "w").settle(&done()).unwrap();
+    for order in [settled, order(1), order(2)] {
+        leave_behind(&order);
+        assert_eq!(queue.depth().unwrap().waiting[&Priority::Normal], 1);
+        let nothing = queue.take(&Worker::named("w"), Duration::ZERO).unwrap();
+        assert!(nothing.is_none(), "{order:?}");
+        let depth = queue.depth().unwrap();
+        assert_eq!(depth.running + depth.waiting[&Priority::Normal], 0);
+    }
+    // One that is cancelled leaves none.
+    queue.offer(&order(3)).unwrap();
+    queue.cancel(&key(3)).unwrap();
+    assert_eq!(queue.depth().unwrap().waiting[&Priority::Normal], 0);
+}

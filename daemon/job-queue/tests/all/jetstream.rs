@@ -108,6 +108,7 @@ cases!(
     cancelled_while_running,
     cancelled_too_late,
     done_though_cancelled,
+    cancelled_while_taken,
     alive_beyond_deadline,
     late_settle_counts_once,
     waiting_survives_restart_in_order,
