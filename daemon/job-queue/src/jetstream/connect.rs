@@ -133,12 +133,10 @@ impl Link {
 
     fn heard(&self, event: Event) {
         match event {
-            Event::Connected => {
-                // The first one is told by who has the client.
-                if self.known().client.is_some() {
-                    tracing::info!(servers = %self.servers, "connected with NATS again");
-                    self.connected();
-                }
+            // The first one is told by who has the client.
+            Event::Connected if self.known().client.is_some() => {
+                tracing::info!(servers = %self.servers, "connected with NATS again");
+                self.connected();
             }
             Event::Disconnected | Event::Closed => {
                 tracing::warn!(servers = %self.servers, "the connection with NATS is lost");

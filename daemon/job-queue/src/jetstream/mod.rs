@@ -51,7 +51,7 @@ const CALL: Duration = Duration::from_secs(15);
 #[derive(Debug)]
 pub struct JetStreamQueue {
     shared: Arc<Shared>,
-    tasks: Vec<JoinHandle<()>>,
+    tasks: Mutex<Vec<JoinHandle<()>>>,
 }
 
 /// What calls and tasks share.
@@ -95,7 +95,7 @@ impl JetStreamQueue {
         let listening = handle.spawn(Arc::clone(&shared).listen_to_the_bell());
         Ok(Self {
             shared,
-            tasks: vec![connecting, listening],
+            tasks: Mutex::new(vec![connecting, listening]),
         })
     }
 
@@ -134,7 +134,7 @@ impl JetStreamQueue {
     }
 
     /// Takes back what was offered: the bench has what it needs of it, or wants it no more and
-    /// does not ask what becomes of it. A worker that has it finds it lost.
+    /// does not ask what becomes of it. A worker that has it finds it lost; no [`News`] tell of it.
     ///
     /// # Errors
     /// Any but [`QueueError::Lost`].
@@ -145,7 +145,7 @@ impl JetStreamQueue {
 
 impl Drop for JetStreamQueue {
     fn drop(&mut self) {
-        for task in &self.tasks {
+        for task in locked(&self.tasks).iter() {
             task.abort();
         }
     }

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::kept::parse;
 use super::names::parse_key;
 use super::stores::Stores;
-use super::{CALL, JetStreamQueue, Shared};
+use super::{CALL, JetStreamQueue, Shared, locked};
 use crate::order::{BenchName, JobKey};
 use crate::queue::{QueueError, Standing};
 
@@ -78,17 +78,16 @@ impl JetStreamQueue {
     #[must_use]
     pub fn news(&self, bench: &BenchName) -> Receiver<News> {
         let (tell, hear) = channel();
-        let shared = Arc::downgrade(&self.shared);
+        let shared = Arc::clone(&self.shared);
         let bench = bench.clone();
-        self.shared.handle.spawn(async move {
-            while let Some(shared) = shared.upgrade() {
-                if report(&shared, &bench, &tell).await.is_err() {
-                    return;
-                }
-                drop(shared);
+        let task = self.shared.handle.spawn(async move {
+            while report(&shared, &bench, &tell).await.is_ok() {
                 tokio::time::sleep(PAUSE).await;
             }
         });
+        let mut tasks = locked(&self.tasks);
+        tasks.retain(|task| !task.is_finished());
+        tasks.push(task);
         hear
     }
 }

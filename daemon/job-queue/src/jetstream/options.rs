@@ -55,7 +55,7 @@ pub enum Login {
 }
 
 /// How a queue on NATS is reached, and how it is kept there.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub struct Options {
     /// Addresses of servers (`nats://host:4222`, `tls://host`); others of their cluster are found
     /// by themselves.
@@ -94,6 +94,17 @@ pub struct Options {
     pub quota_bytes: Option<u64>,
 }
 
+impl fmt::Debug for Options {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Options")
+            .field("servers", &self.shown_servers())
+            .field("name", &self.name)
+            .field("login", &self.login)
+            .field("prefix", &self.prefix)
+            .finish_non_exhaustive()
+    }
+}
+
 impl Options {
     /// Usual ones, for these servers.
     #[must_use]
@@ -110,7 +121,7 @@ impl Options {
             makes_missing: true,
             replicas: 1,
             ack_wait: Duration::from_secs(30),
-            silence: Duration::from_mins(15),
+            silence: Duration::from_secs(15 * 60),
             poll: Duration::from_secs(2),
             quota_jobs: 100_000,
             quota_bytes: None,
@@ -247,15 +258,17 @@ mod tests {
     fn secrets_are_not_shown() {
         let mut options = Options::new(vec!["nats://me:hunter2@host:4222".to_owned()]);
         options.login = Login::Token(Secret::new("hunter3"));
-        assert!(!format!("{:?}", options.login).contains("hunter3"));
+        assert!(!format!("{options:?}").contains("hunter"), "{options:?}");
         assert_eq!(options.shown_servers(), "nats://host:4222");
     }
+
+    type Spoil = fn(&mut Options);
 
     #[test]
     fn what_cannot_work_is_refused_with_what_to_give() {
         let good = Options::new(vec!["nats://host".to_owned()]);
         good.check().unwrap();
-        let bad: [(&str, fn(&mut Options)); 6] = [
+        let bad: [(&str, Spoil); 6] = [
             ("prefix", |o| o.prefix = "a.b".to_owned()),
             ("replicas", |o| o.replicas = 2),
             ("ack_wait", |o| o.ack_wait = Duration::ZERO),

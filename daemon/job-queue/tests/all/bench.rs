@@ -1,7 +1,7 @@
 //! What benches and workers find besides what every queue gives.
 
 use std::sync::Arc;
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
 use job_queue::jetstream::{JetStreamQueue, News, Node, Options, Role};
@@ -320,6 +320,10 @@ fn a_bench_hears_what_happens_to_its_orders() {
     let standings = queue.standings(&key(1).bench).unwrap();
     assert_eq!(standings.len(), 1);
     assert_eq!(standings[0].1.state, JobState::Done);
+    // Nobody tells once the queue is gone.
+    drop((lease, queue));
+    while news.recv_timeout(LIMIT).is_ok() {}
+    assert!(matches!(news.try_recv(), Err(TryRecvError::Disconnected)));
 }
 
 #[test]
