@@ -129,7 +129,7 @@ pub(super) fn done_though_cancelled(setting: &mut dyn Setting) {
 pub(super) fn cancelled_while_taken(setting: &mut dyn Setting) {
     let (queue, glance) = (setting.queue(), setting.glance());
     let mut taken_first = 0;
-    for n in 1..=30 {
+    for n in 1..=12 {
         let order = order(setting, n);
         offer(setting, &order);
         let together = Barrier::new(2);
@@ -153,6 +153,6 @@ pub(super) fn cancelled_while_taken(setting: &mut dyn Setting) {
     let taken = queue.take(&worker("w"), glance).expect("it is looked for");
     assert!(
         taken.is_none(),
-        "{taken_first} of 30 were taken, and one more"
+        "{taken_first} of 12 were taken, and one more"
     );
 }

@@ -10,9 +10,10 @@ use super::options::ANSWER;
 use super::stores::Stores;
 use crate::queue::QueueError;
 
-/// How long a request stays that the server does not answer at once: it has promised what there is
-/// to others, and keeps the request for what may come.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// How long a request stays that the server does not answer at once: it believes that there is
+/// something, which others were given or which was taken back, and keeps the request for what may
+/// come.
+const PATIENCE: Duration = Duration::from_millis(500);
 
 /// What the server has in a line.
 pub(super) enum Pulled {
@@ -53,6 +54,8 @@ pub(super) async fn pull(stores: &Stores, consumer: &str) -> Result<Pulled, Queu
         }
     };
     let Some(answer) = answer else {
+        // Asked for its figures, a server counts anew, and believes it no more.
+        let _ = stores.orders.consumer_info(consumer).await;
         return Ok(Pulled::Nothing);
     };
     Ok(match answer.status {

@@ -47,6 +47,7 @@ const WORKER: &[&str] = &[
     "$JS.API.STREAM.INFO.{P}_JOBS",
     "$JS.API.STREAM.MSG.GET.{P}_JOBS",
     "$JS.API.CONSUMER.NAMES.{P}_JOBS",
+    "$JS.API.CONSUMER.INFO.{P}_JOBS.*",
     "$JS.API.CONSUMER.MSG.NEXT.{P}_JOBS.*",
     "$JS.ACK.{P}_JOBS.>",
     "$JS.API.STREAM.INFO.KV_{p}-jobs",
