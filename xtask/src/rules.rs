@@ -102,7 +102,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("relief-tests", &EVERYTHING),
     ("relief-studies", &STUDIES),
-    ("relief-test-libraries", &[]),
+    ("relief-test-libraries", &["job-queue"]),
     (
         "relief-benches",
         &[

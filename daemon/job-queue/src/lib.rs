@@ -9,6 +9,10 @@
 //! once: of two workers that both believe to have it, the first one to settle it counts. So the
 //! bench, which publishes what was settled, publishes once.
 
+#[cfg(feature = "conformance")]
+pub mod conformance;
+pub mod depot;
+pub mod jetstream;
 mod order;
 mod queue;
 
