@@ -15,6 +15,7 @@ mod safety;
 mod shell;
 mod solids;
 mod study;
+mod targets;
 mod toolpath;
 mod units;
 mod vm;
@@ -37,8 +38,8 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Chore {
-    /// Check who depends on whom, how long files are, that sources are ASCII, and that every
-    /// hazard in `docs/safety.md` has its tests.
+    /// Check who depends on whom, how long files are, that sources are ASCII, that no manifest
+    /// switches tests off which are there, and that every hazard in `docs/safety.md` has its tests.
     Rules,
     /// Scan the simulated objects and let OpenCASCADE judge the IGES files.
     ///
