@@ -15,6 +15,7 @@ mod safety;
 mod shell;
 mod solids;
 mod study;
+mod targets;
 mod toolpath;
 mod units;
 mod vm;
@@ -37,8 +38,8 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Chore {
-    /// Check who depends on whom, how long files are, that sources are ASCII, and that every
-    /// hazard in `docs/safety.md` has its tests.
+    /// Check who depends on whom, how long files are, that sources are ASCII, that no manifest
+    /// switches tests off which are there, and that every hazard in `docs/safety.md` has its tests.
     Rules,
     /// Scan the simulated objects and let OpenCASCADE judge the IGES files.
     ///
@@ -114,8 +115,8 @@ enum Chore {
     ///
     /// Needs `systemd-analyze`, which it installs on Debian as root.
     Units,
-    /// Build the studies, judges and other programs of the checks, all at once, and install what the
-    /// judges need.
+    /// Build the studies, judges and other programs of the first tier's checks, all at once, and install
+    /// what the judges need.
     Programs,
     /// Make the Debian package of service, command line, units, manual pages and completions.
     ///
@@ -153,7 +154,7 @@ fn main() -> anyhow::Result<()> {
         Chore::Units => units::check(),
         Chore::Programs => {
             study::build()?;
-            instructions::build()?;
+            instructions::build_beside_tests()?;
             judge::prepare()
         }
         Chore::Deb(options) => deb::run(&options),
@@ -188,7 +189,12 @@ fn full() -> anyhow::Result<()> {
     )?;
     rules::check()?;
     units::check()?;
-    shell::run("cargo", &["test", "--workspace"])?;
+    // More of what the first tier shows with few.
+    shell::run_with(
+        "cargo",
+        &["test", "--workspace"],
+        &[("RELIEF_SEEDS", "10".to_owned())],
+    )?;
     // The first tier's random tests have one seed; here each run has another, and prints it.
     let seed = std::time::UNIX_EPOCH.elapsed()?.as_secs().to_string();
     eprintln!("PROPTEST_RNG_SEED={seed}");
@@ -207,6 +213,8 @@ fn full() -> anyhow::Result<()> {
         features: false,
         out: None,
     })?;
+    instructions::run(&instructions::Options::default())?;
+    reproduce::run(&reproduce::Options::CHECK)?;
     cross::check(&cross::Options { whole: true })?;
     peers::run(&peers::Peers::Skin(peers::Options { short: false }))?;
     toolpath::run(&toolpath::Options {

@@ -24,6 +24,9 @@ pub(crate) struct Options {
     /// Compare the figures with those of the page instead, and fail where they differ.
     #[arg(long, conflicts_with_all = ["print", "no_pictures"])]
     check: bool,
+    /// With `--check`: of Shim & Lee only the first seed's scans, and the figures that are of it.
+    #[arg(long, requires = "check")]
+    short: bool,
     /// Print the part of the page whose heading has these words, and write nothing.
     #[arg(long, value_name = "WORDS", conflicts_with = "no_pictures")]
     print: Option<String>,
@@ -35,6 +38,17 @@ pub(crate) struct Options {
     /// Leave the pictures as they are.
     #[arg(long)]
     no_pictures: bool,
+}
+
+impl Options {
+    /// Every page's figures compared.
+    pub(crate) const CHECK: Self = Self {
+        check: true,
+        short: false,
+        print: None,
+        features: false,
+        no_pictures: false,
+    };
 }
 
 pub(crate) fn run(options: &Options) -> Result<()> {
@@ -49,7 +63,9 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     };
     if options.check {
         drawn("--check-paper")?;
-        return study::program(PROGRAM, &words(&["--check", PAGE]));
+        let short = options.short.then_some("--short");
+        let all: Vec<&str> = ["--check", PAGE].into_iter().chain(short).collect();
+        return study::program(PROGRAM, &words(&all));
     }
     if let Some(part) = &options.print {
         return study::program(PROGRAM, &words(&["--print", part]));

@@ -6,7 +6,7 @@ use std::fs;
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
-use crate::shell;
+use crate::{shell, targets};
 
 /// Longest source file we accept, in lines.
 const LONGEST_FILE_LINES: usize = 600;
@@ -263,7 +263,12 @@ const KEPT_FROM_GEOMETRY: [&str; 6] = [
 /// Checks every rule and reports all that are broken.
 pub(crate) fn check() -> Result<()> {
     let mut broken = Vec::new();
-    dependencies(&mut broken)?;
+    let metadata: Value = serde_json::from_str(&shell::output(
+        "cargo",
+        &["metadata", "--no-deps", "--format-version", "1"],
+    )?)?;
+    dependencies(&metadata, &mut broken)?;
+    targets::check(&metadata, &mut broken)?;
     sources(&mut broken)?;
     crate::safety::check(&mut broken)?;
     if broken.is_empty() {
@@ -277,11 +282,7 @@ pub(crate) fn check() -> Result<()> {
     );
 }
 
-fn dependencies(broken: &mut Vec<String>) -> Result<()> {
-    let metadata: Value = serde_json::from_str(&shell::output(
-        "cargo",
-        &["metadata", "--no-deps", "--format-version", "1"],
-    )?)?;
+fn dependencies(metadata: &Value, broken: &mut Vec<String>) -> Result<()> {
     let allowed: BTreeMap<_, _> = ALLOWED.iter().copied().collect();
     for package in metadata["packages"]
         .as_array()

@@ -6,9 +6,20 @@ use range_image::Unmonitored;
 use scenes::{Pose, Scene, Spoil, Surface, convex, cylinder, house};
 use segment::{Method, SegmentSettings, segment_with_report};
 
-/// Ten seeds: dropouts from none to 20 %, outlines from clean to ragged.
+/// Among the first three are outlines from clean to ragged, dropouts of none and of 20 %, both noises, and
+/// both methods.
+const SEEDS: [u64; 10] = [4, 5, 9, 0, 1, 2, 3, 6, 7, 8];
+
+/// So many of them in the first tier; `RELIEF_SEEDS` asks for more, as `cargo xtask full` does.
+fn seeds(few: usize) -> impl Iterator<Item = u64> {
+    let wanted = std::env::var("RELIEF_SEEDS").ok();
+    let count = wanted.and_then(|text| text.parse().ok()).unwrap_or(few);
+    SEEDS.into_iter().take(count)
+}
+
+/// Dropouts from none to 20 %, outlines from clean to ragged.
 fn check(name: &str, surface: Surface<'_>, faces: usize) {
-    for seed in 0..10 {
+    for seed in seeds(3) {
         let spoil = Spoil {
             noise_mm: if seed % 2 == 0 { 0.05 } else { 0.03 },
             dropouts: 0.05 * (seed % 5) as f64,
@@ -87,7 +98,7 @@ fn ridge(tilt_degrees: f64, degrees: f64) -> impl Fn(f64, f64) -> Option<(f64, u
 fn shallow_creases_stay_and_shallower_ones_are_smooth() {
     check("ridge 20", &ridge(0.0, 20.0), 2);
     check("ridge 15", &ridge(30.0, 15.0), 2);
-    for seed in 0..5 {
+    for seed in seeds(2) {
         let spoil = Spoil {
             noise_mm: 0.05,
             dropouts: 0.02,
@@ -99,7 +110,7 @@ fn shallow_creases_stay_and_shallower_ones_are_smooth() {
         let verdict = scene.judge(&done.regions);
         assert!(verdict.regions == 2 && verdict.right > 0.99, "{verdict:?}");
     }
-    for seed in 0..5 {
+    for seed in seeds(2) {
         let spoil = Spoil {
             noise_mm: 0.05,
             dropouts: 0.02,

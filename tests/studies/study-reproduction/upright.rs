@@ -1,6 +1,8 @@
 //! The house upright, so that silhouettes run along the axes of the grid. The cylinder has none:
 //! where its side ends, light comes back no more, which is no straight line.
 
+use std::ops::RangeInclusive;
+
 use anyhow::{Context, Result, bail};
 use pipeline::Settings;
 use range_image::Unmonitored;
@@ -27,12 +29,12 @@ pub(crate) struct Found {
     pub(crate) silhouette: AxisSilhouette,
 }
 
-/// All silhouettes along an axis, of all seeds.
+/// All silhouettes along an axis, of scans with these seeds.
 ///
 /// # Errors
 /// When a scan cannot be taken, or a true face has no region.
-pub(crate) fn measure() -> Result<Vec<Found>> {
-    let seeds: Vec<u64> = SEEDS.collect();
+pub(crate) fn measure(seeds: RangeInclusive<u64>) -> Result<Vec<Found>> {
+    let seeds: Vec<u64> = seeds.collect();
     let found: Vec<Vec<Found>> = seeds.into_par_iter().map(of).collect::<Result<_>>()?;
     Ok(found.into_iter().flatten().collect())
 }

@@ -129,8 +129,8 @@ impl Options {
     }
 
     fn seeds(&self, set: Set) -> Vec<u64> {
-        /// Scenes of each set in the short form.
-        const SHORT: usize = 4;
+        // One of the ABW kind takes as long as several others, and has as many regions.
+        let few = if set == Set::Abw { 2 } else { 4 };
         let purpose = match self.purpose {
             PurposeName::Tune => Purpose::Tune,
             PurposeName::Judge => Purpose::Judge,
@@ -142,7 +142,7 @@ impl Options {
         let seeds = set.seeds(purpose);
         match self.scene {
             Some(seed) => vec![seed],
-            None if self.short => seeds.take(SHORT).collect(),
+            None if self.short => seeds.take(few).collect(),
             None => seeds.collect(),
         }
     }

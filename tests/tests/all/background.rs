@@ -1,7 +1,9 @@
 //! With a table and a back plane in view the part's faces are as without.
 //!
 //! Every scene is scanned twice with the same noise: as it stands, and with everything but
-//! the part taken away. `RELIEF_SEEDS=10` takes ten seeds in place of two.
+//! the part taken away. `RELIEF_SEEDS=10`, as in `cargo xtask full`, takes ten seeds in place of one.
+
+use std::sync::LazyLock;
 
 use pipeline::{BackgroundKind, BackgroundPolicy, Outcome, Settings, process_columns};
 use range_image::{RangeImage, Unmonitored};
@@ -17,7 +19,7 @@ const AREA_LIMIT: f64 = 0.01;
 
 fn seeds() -> std::ops::Range<u64> {
     let wanted = std::env::var("RELIEF_SEEDS").ok();
-    let count = wanted.and_then(|text| text.parse().ok()).unwrap_or(2);
+    let count = wanted.and_then(|text| text.parse().ok()).unwrap_or(1);
     FIRST_SEED..FIRST_SEED + count
 }
 
@@ -38,6 +40,12 @@ fn scanned(scene: Scene, seed: u64, policy: BackgroundPolicy) -> (RangeImage, Ou
     settings.background = policy;
     process_columns(&columns, &settings, &Unmonitored).expect("there is a part")
 }
+
+/// The scan that both tests begin with.
+static HOUSE_ON_TABLE: LazyLock<(RangeImage, Outcome)> = LazyLock::new(|| {
+    let scene = scene("house-on-table");
+    scanned(scene, FIRST_SEED, BackgroundPolicy::Remove)
+});
 
 fn scene(name: &str) -> Scene {
     preset::object(name, Preset::Paper.material()).expect("built in")
@@ -115,7 +123,13 @@ fn the_part_is_as_it_is_without_table_and_back_plane() {
         ("house-before-plane", &[BackgroundKind::BackPlane]),
     ] {
         for seed in seeds() {
-            let with = scanned(scene(name), seed, BackgroundPolicy::Remove);
+            let other;
+            let with = if (name, seed) == ("house-on-table", FIRST_SEED) {
+                &*HOUSE_ON_TABLE
+            } else {
+                other = scanned(scene(name), seed, BackgroundPolicy::Remove);
+                &other
+            };
             let without = scanned(part_alone(scene(name)), seed, BackgroundPolicy::Remove);
             let found = &with.1.background;
             for kind in removed {
@@ -127,7 +141,7 @@ fn the_part_is_as_it_is_without_table_and_back_plane() {
             assert!(without.1.background.regions.is_empty());
             let regions = (with.1.regions.regions(), without.1.regions.regions());
             assert_eq!(regions.0, regions.1, "{name}, seed {seed}");
-            let pairs = common(&with, &without);
+            let pairs = common(with, &without);
             let index = rand_index(&pairs);
             let mut worst = 0.0_f64;
             for without_fit in &without.1.reconstruction.regions {
@@ -164,11 +178,7 @@ fn counterpart(pairs: &[(u16, u16)], without: u16) -> u16 {
 
 #[test]
 fn kept_on_request_the_surroundings_are_faces() {
-    let (_, removed) = scanned(
-        scene("house-on-table"),
-        FIRST_SEED,
-        BackgroundPolicy::Remove,
-    );
+    let (_, removed) = &*HOUSE_ON_TABLE;
     let (_, kept) = scanned(scene("house-on-table"), FIRST_SEED, BackgroundPolicy::Keep);
     assert!(kept.background.regions.is_empty());
     let removed_regions = removed.background.regions.len();
@@ -177,5 +187,5 @@ fn kept_on_request_the_surroundings_are_faces() {
         usize::from(removed.regions.regions()) + removed_regions
     );
     let faces = |outcome: &Outcome| outcome.reconstruction.model.faces.len();
-    assert!(faces(&kept) > faces(&removed));
+    assert!(faces(&kept) > faces(removed));
 }

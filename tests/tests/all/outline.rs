@@ -25,10 +25,11 @@ fn outlines_of_the_house() -> Result<()> {
 }
 
 // With seed 26 samples suggest corners that are none; with seed 135 a junction lies
-// beside the curve that ends there.
+// beside the curve that ends there. A plain one is the second tier's.
 #[test]
 fn outlines_of_the_cylinder() -> Result<()> {
-    for seed in [1, 26, 135] {
+    let plain = std::env::var_os("RELIEF_SEEDS").map(|_| 1);
+    for seed in [26, 135].into_iter().chain(plain) {
         assert_within_a_pitch("cylinder", seed)?;
     }
     Ok(())

@@ -52,17 +52,15 @@ impl Bench {
     }
 
     /// Converting this file succeeds, and remarks on this in the report and on standard
-    /// error, with `--json` and without.
+    /// error.
     fn remarks(&self, name: &str, content: impl AsRef<[u8]>, on: &str) -> Value {
         self.write(name, content);
-        let told = relief(self.0.path(), &["convert", name, "-o", "part.igs"]);
-        let said = String::from_utf8_lossy(&told.stderr).into_owned();
-        assert!(told.status.success(), "{name}: {said}");
         let output = relief(
             self.0.path(),
             &["convert", name, "-o", "part.igs", "--json"],
         );
-        let with_json = String::from_utf8_lossy(&output.stderr);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{name}: {said}");
         let report: Value =
             serde_json::from_slice::<Value>(&output.stdout).unwrap()["report"].take();
         let warnings = report["warnings"].as_array().unwrap();
@@ -70,12 +68,7 @@ impl Bench {
             warnings.iter().any(|w| w.as_str().unwrap().contains(on)),
             "{name}: {warnings:?}"
         );
-        for said in [&*said, &*with_json] {
-            let remark = said.lines().find(|line| line.contains(on));
-            let remark = remark.unwrap_or_else(|| panic!("{name}: {said}"));
-            assert!(remark.starts_with("relief: note: "), "{remark}");
-            assert!(remark.contains(name), "{remark}");
-        }
+        is_remarked(&said, name, on);
         report
     }
 
@@ -85,6 +78,14 @@ impl Bench {
         files.sort();
         files
     }
+}
+
+/// Among what was said is a note about the file.
+fn is_remarked(said: &str, name: &str, on: &str) {
+    let remark = said.lines().find(|line| line.contains(on));
+    let remark = remark.unwrap_or_else(|| panic!("{name}: {said}"));
+    assert!(remark.starts_with("relief: note: "), "{remark}");
+    assert!(remark.contains(name), "{remark}");
 }
 
 fn gzip(bytes: &[u8]) -> Vec<u8> {
@@ -309,6 +310,11 @@ fn duplicates_and_background() {
         "2401 of 4802 points were repeated",
     );
     assert_eq!(report["scan"]["samples"], 2401);
+    // The same is said to whoever reads no JSON.
+    let told = relief(bench.0.path(), &["convert", "twice.xyz", "-o", "part.igs"]);
+    assert!(told.status.success());
+    let said = String::from_utf8_lossy(&told.stderr);
+    is_remarked(&said, "twice.xyz", "points were repeated");
     bench.write(
         "table.xyz",
         text(&grid(60, 60, |i, j| [0.5 * i, 0.5 * j, 0.0])),

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test file uses its own part")]
 
+use std::sync::LazyLock;
+
 use compare::{Alignment, CompareSettings, Comparison, Nominal, Tolerance, compare};
 use range_image::{Column, RangeImage, Sample, Unmonitored};
 use regrid::RegridSettings;
@@ -148,9 +150,12 @@ pub(crate) const DENT: Dent = Dent {
 };
 
 /// The block without a dent.
-pub(crate) fn nominal() -> Nominal {
-    let (vertices, facets) = block(&[]);
-    Nominal::new(&vertices, &facets).expect("a closed mesh")
+pub(crate) fn nominal() -> &'static Nominal {
+    static NOMINAL: LazyLock<Nominal> = LazyLock::new(|| {
+        let (vertices, facets) = block(&[]);
+        Nominal::new(&vertices, &facets).expect("a closed mesh")
+    });
+    &NOMINAL
 }
 
 /// A scan of the block, regridded and as it was taken.
@@ -170,5 +175,5 @@ pub(crate) fn held(
         tolerance,
         ..CompareSettings::default()
     };
-    compare(image, columns, &nominal(), &settings, &Unmonitored).expect("they fit")
+    compare(image, columns, nominal(), &settings, &Unmonitored).expect("they fit")
 }

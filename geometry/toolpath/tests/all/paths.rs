@@ -135,9 +135,14 @@ fn shapes() -> [(&'static str, Facets); 5] {
 
 #[test]
 fn cusps_of_parallel_passes_are_as_high_as_asked_for() {
+    // As `cargo xtask full` sets it: where it is not, a bull-nose is asked of two shapes only.
+    let is_second_tier = std::env::var_os("RELIEF_SEEDS").is_some();
     for (name, facets) in shapes() {
         let surface = surface(&facets);
         for cutter in ["ball:6", "bull:6:1.5"] {
+            if cutter != "ball:6" && !(is_second_tier || ["askew", "dome"].contains(&name)) {
+                continue;
+            }
             let machine = machine(&surface, &[cutter]);
             let plan = planned(&surface, &machine, &settings(cutter, 0.02));
             // A bull-nose's cusps on a dome are highest midway, where slopes are across the passes: these
