@@ -13,10 +13,11 @@ use storage::{Disk, LocalDisk, create_dir_all};
 use tokio_util::sync::CancellationToken;
 
 use crate::acquisition::watch;
-use crate::config::{Config, HttpConfig, Reloaded};
+use crate::config::{Config, HttpConfig, Reloaded, Role};
 use crate::discovery::Announcement;
 use crate::error::ServiceError;
 use crate::events::Hub;
+use crate::fleet::{self, Fleet, FleetError};
 use crate::http::{ListenError, on_loopback, on_socket, serve};
 use crate::jobs::work;
 use crate::laser::LaserLogError;
@@ -66,6 +67,9 @@ pub enum StartError {
     /// The collector of traces cannot be.
     #[error(transparent)]
     Traces(#[from] TracesError),
+    /// Jobs cannot go elsewhere.
+    #[error(transparent)]
+    Fleet(#[from] FleetError),
     /// The log of the laser does not work.
     #[error(transparent)]
     Laser(#[from] LaserLogError),
@@ -183,9 +187,19 @@ impl Daemon {
         )?;
         let receivers = Receivers::open(&config, &store)?;
         let traces = Traces::start(&config.traces)?;
+        let nats = &config.nats;
+        let fleet = nats
+            .is_used()
+            .then(|| Fleet::open(nats, tokio::runtime::Handle::current()))
+            .transpose()?;
         let hub = Arc::new(Hub::default());
         let stations = make_all(&config, scanners, &hub, &*disk)?;
-        let offered = inherited.or_bind(&config.service).await?;
+        let serves = config.has(Role::Serve);
+        let offered = if serves {
+            Some(inherited.or_bind(&config.service).await?)
+        } else {
+            None
+        };
         let workers = config.queue.workers;
         let limits = Arc::new(config.http.clone());
         let kept = Kept {
@@ -198,6 +212,9 @@ impl Daemon {
         let service = Arc::new(Service::new(config, stations, hub, kept, scans_dir));
         // It is new: there are none yet.
         let _ = service.traces.set(traces);
+        if let Some(fleet) = fleet {
+            let _ = service.fleet.set(Arc::new(fleet));
+        }
         let cut_short = service.recover_scans().map_err(StartError::Recover)?;
         service.adopt_journals().map_err(StartError::Recover)?;
         service.recover_jobs().map_err(StartError::Recover)?;
@@ -205,40 +222,46 @@ impl Daemon {
         service.measure_free();
 
         let stop = CancellationToken::new();
+        let socket = offered.as_ref().map(|one| one.socket.clone());
+        let socket = socket.unwrap_or_default();
         let mut daemon = Self {
             service,
             stop,
             servers: Vec::new(),
             threads: Vec::new(),
-            socket: offered.socket,
-            socket_is_ours: offered.socket_is_ours,
-            listen: offered.listen,
+            socket,
+            socket_is_ours: offered.as_ref().is_some_and(|one| one.socket_is_ours),
+            listen: offered.as_ref().and_then(|one| one.listen),
             announcement: None,
         };
         daemon.start_threads(workers).map_err(StartError::Thread)?;
         // Nothing can fail any more that would end the service, and nobody can ask for a scan yet.
         daemon.service.take_up_scans(cut_short);
-        daemon.serve(
-            offered.unix,
-            on_socket(&daemon.service, &daemon.stop),
-            Arc::clone(&limits),
-        );
-        if let Some(tcp) = offered.tcp {
-            daemon.serve(tcp, on_loopback(&daemon.service, &daemon.stop), limits);
+        if let Some(offered) = offered {
+            let app = on_socket(&daemon.service, &daemon.stop);
+            daemon.serve(offered.unix, app, Arc::clone(&limits));
+            if let Some(tcp) = offered.tcp {
+                daemon.serve(tcp, on_loopback(&daemon.service, &daemon.stop), limits);
+            }
+            daemon.announcement = Announcement::begin(&daemon.service.config());
         }
-        daemon.announcement = Announcement::begin(&daemon.service.config());
         tracing::info!(socket = %daemon.socket.display(), "reliefd {} is ready", env!("CARGO_PKG_VERSION"));
         Ok(daemon)
     }
 
     fn start_threads(&mut self, workers: usize) -> io::Result<()> {
-        for number in 1..=workers {
-            let service = Arc::clone(&self.service);
-            self.threads.push(
-                std::thread::Builder::new()
-                    .name(format!("worker-{number}"))
-                    .spawn(move || work(&service))?,
-            );
+        if let Some(fleet) = self.service.fleet.get() {
+            let threads = fleet::begin(&self.service, fleet, workers)?;
+            self.threads.extend(threads);
+        } else {
+            for number in 1..=workers {
+                let service = Arc::clone(&self.service);
+                self.threads.push(
+                    std::thread::Builder::new()
+                        .name(format!("worker-{number}"))
+                        .spawn(move || work(&service))?,
+                );
+            }
         }
         let service = Arc::clone(&self.service);
         self.threads.push(
@@ -252,7 +275,8 @@ impl Daemon {
                 .name("show".into())
                 .spawn(move || receivers::show(&service))?,
         );
-        for station in &self.service.stations {
+        let acquires = self.service.config().has(Role::Acquire);
+        for station in self.service.stations.iter().filter(|_| acquires) {
             let (service, station) = (Arc::clone(&self.service), Arc::clone(station));
             self.threads.push(
                 std::thread::Builder::new()
@@ -272,7 +296,7 @@ impl Daemon {
         self.servers.push(tokio::spawn(serving));
     }
 
-    /// The Unix socket of the API.
+    /// The Unix socket of the API; empty if it is not offered.
     #[must_use]
     pub fn socket(&self) -> &Path {
         &self.socket

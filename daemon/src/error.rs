@@ -19,6 +19,9 @@ pub enum ServiceError {
     /// It is about to end.
     #[error("the service is stopping")]
     Stopping,
+    /// It is there for something else.
+    #[error("this service takes no scans: its roles ([service] roles) are without \"acquire\"")]
+    TakesNoScans,
     /// One scan at a time on each scanner.
     #[error("{}", match .scan {
         Some(scan) => format!("{} is taking the scan {scan}", the_scanner(.scanner)),

@@ -86,5 +86,8 @@ fn goes_to_journal() -> bool {
 }
 
 fn filter(level: &str) -> Result<EnvFilter, LogError> {
-    EnvFilter::try_new(level).map_err(|error| LogError::Filter(error.to_string()))
+    // It tells of each attempt to connect; that the servers are away is told here, once. What is
+    // asked for by name goes before.
+    EnvFilter::try_new(format!("async_nats=warn,{level}"))
+        .map_err(|error| LogError::Filter(error.to_string()))
 }

@@ -3,6 +3,7 @@
 //! Counters begin at 0 with the service, as is usual. What can be asked for at any moment is
 //! measured when somebody asks.
 
+mod fleet;
 mod gauges;
 mod labels;
 

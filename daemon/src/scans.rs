@@ -11,7 +11,7 @@ use scanner_protocol::Identity;
 use crate::acquisition::{
     AbortRequest, ResolvedPlan, Task, Ticket, check_grid, preview, resolve, run,
 };
-use crate::config::Processing;
+use crate::config::{Processing, Role};
 use crate::error::ServiceError;
 use crate::ids::{now, shown_name};
 use crate::service::{Service, lock};
@@ -27,6 +27,7 @@ impl Service {
         mark: Option<RequestMark>,
     ) -> Result<Scan, ServiceError> {
         self.check_running()?;
+        self.check_acquires()?;
         let name = shown_name(&request.name)?;
         let station = Arc::clone(self.station(&request.scanner)?);
         let processing = self
@@ -72,6 +73,15 @@ impl Service {
         };
         self.begin_scan(reservation, &scan, task, processing, room)?;
         Ok(scan)
+    }
+
+    /// Refuses scans where they are not what the service is there for.
+    fn check_acquires(&self) -> Result<(), ServiceError> {
+        if self.config().has(Role::Acquire) {
+            Ok(())
+        } else {
+            Err(ServiceError::TakesNoScans)
+        }
     }
 
     /// Puts a scan into the place that was kept for it, with a thread of its own.
@@ -125,6 +135,7 @@ impl Service {
     /// What a scan would come to, with nothing moved and nothing kept. Blocks until the scanner
     /// has said who it is.
     pub(crate) fn preview_scan(&self, request: &StartScan) -> Result<ScanPreview, ServiceError> {
+        self.check_acquires()?;
         shown_name(&request.name)?;
         let station = self.station(&request.scanner)?;
         let processing = self
@@ -433,64 +444,14 @@ mod tests {
     use std::os::unix::fs::MetadataExt;
 
     use super::*;
-    use crate::config::Config;
-    use crate::events::Hub;
-    use crate::laser::Laser;
-    use crate::receivers::Receivers;
-    use crate::service::Kept;
-    use crate::spool::Spool;
-    use crate::store::Store;
-    use crate::tokens::Tokens;
+    use crate::service::testing::service_in;
     use range_image::{Calibration, calibration::Head};
-    use relief_api::THE_SCANNER;
     use scan_record::{Header, JournalWriter, RawColumn};
-    use scanner_driver::{DeviceStatus, ScanStream, Scanner};
-    use scanner_protocol::{Identity, ScanPlan};
-    use storage::LocalDisk;
-
-    /// Nothing is attached.
-    struct Absent;
-
-    impl Scanner for Absent {
-        fn identify(&self) -> Result<Identity, ScannerError> {
-            Err(ScannerError::Closed)
-        }
-        fn home(&self) -> Result<(), ScannerError> {
-            Err(ScannerError::Closed)
-        }
-        fn status(&self) -> Result<DeviceStatus, ScannerError> {
-            Err(ScannerError::Closed)
-        }
-        fn start_scan(&self, _plan: &ScanPlan) -> Result<ScanStream, ScannerError> {
-            Err(ScannerError::Closed)
-        }
-        fn abort(&self) -> Result<(), ScannerError> {
-            Err(ScannerError::Closed)
-        }
-    }
 
     #[test]
     fn a_scan_cut_short_by_a_crash_is_found_with_its_columns() {
         let folder = tempfile::tempdir().unwrap();
-        let config = Config::default();
-        let hub = Arc::new(Hub::default());
-        let laser = Laser::open(&LocalDisk, folder.path(), THE_SCANNER).unwrap();
-        let configured = config.each_scanner()[0];
-        let station = Station::new(configured, Arc::new(Absent), laser, Arc::clone(&hub));
-        let service = Service::new(
-            config,
-            vec![Arc::new(station)],
-            hub,
-            Kept {
-                disk: Arc::new(LocalDisk),
-                store: Store::open(Arc::new(LocalDisk), &folder.path().join("store")).unwrap(),
-                spool: Spool::open(Arc::new(LocalDisk), &folder.path().join("spool")).unwrap(),
-                tokens: Tokens::open(Arc::new(LocalDisk), &folder.path().join("tokens.json"))
-                    .unwrap(),
-                receivers: Receivers::default(),
-            },
-            folder.path().to_owned(),
-        );
+        let service = service_in(folder.path());
         let scan = Scan {
             id: "20261121T110830.123Z-a".into(),
             name: "a".into(),

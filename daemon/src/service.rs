@@ -1,8 +1,11 @@
 //! What all parts of the service share.
 
+#[cfg(test)]
+pub(crate) mod testing;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock};
 use std::time::Duration;
 
 use job_queue::BenchName;
@@ -14,6 +17,7 @@ use crate::acquisition::presence::Presence;
 use crate::config::{Config, Reloaded};
 use crate::error::ServiceError;
 use crate::events::Hub;
+use crate::fleet::Fleet;
 use crate::ids::{Ids, now};
 use crate::jobs::Queue;
 use crate::laser::MOST_SHOWN;
@@ -24,6 +28,7 @@ use crate::space::{Measured, Promises};
 use crate::spool::Spool;
 use crate::starts::UnderWay;
 use crate::station::Station;
+use crate::stopping::Stopping;
 use crate::store::Store;
 use crate::tokens::Tokens;
 use crate::traces::Traces;
@@ -63,6 +68,8 @@ pub(crate) struct Service {
     pub(crate) metrics: Metrics,
     /// Who is told how long things took; nobody until the service has set it up.
     pub(crate) traces: OnceLock<Traces>,
+    /// The way to workers elsewhere, where there is one.
+    pub(crate) fleet: OnceLock<Arc<Fleet>>,
     /// Held by whoever regrids for showing.
     pub(crate) regridding: Mutex<()>,
     /// Keyed requests that are just being done.
@@ -72,8 +79,7 @@ pub(crate) struct Service {
     /// What this service is called among others.
     pub(crate) bench: BenchName,
     started_at: String,
-    stopping: Mutex<bool>,
-    stop_told: Condvar,
+    stopping: Stopping,
 }
 
 /// A range image that acquisition has put aside on disk.
@@ -117,12 +123,12 @@ impl Service {
             unkept: Mutex::default(),
             metrics: Metrics::default(),
             traces: OnceLock::new(),
+            fleet: OnceLock::new(),
             regridding: Mutex::default(),
             starts: UnderWay::default(),
             measured: Mutex::default(),
             started_at: now(),
-            stopping: Mutex::new(false),
-            stop_told: Condvar::new(),
+            stopping: Stopping::default(),
         }
     }
 
@@ -209,6 +215,11 @@ impl Service {
         &self.scans_dir
     }
 
+    /// Folder of what is worked on for other services; nothing in it outlives a job.
+    pub(crate) fn elsewhere_dir(&self) -> PathBuf {
+        self.scans_dir.with_file_name("elsewhere")
+    }
+
     /// Where a scan's columns are kept.
     pub(crate) fn journal_path(&self, scan: &str) -> PathBuf {
         self.scans_dir.join(format!("{scan}.scan"))
@@ -255,7 +266,7 @@ impl Service {
 
     /// Refuses new work once the service stops.
     pub(crate) fn check_running(&self) -> Result<(), ServiceError> {
-        if *lock(&self.stopping) {
+        if self.stopping.has_come() {
             Err(ServiceError::Stopping)
         } else {
             Ok(())
@@ -264,17 +275,12 @@ impl Service {
 
     /// No new work from now on.
     pub(crate) fn begin_stop(&self) {
-        *lock(&self.stopping) = true;
-        self.stop_told.notify_all();
+        self.stopping.begin();
     }
 
     /// Waits, and tells whether the service stops.
     pub(crate) fn wait_for_stop(&self, longest: Duration) -> bool {
-        let stopping = lock(&self.stopping);
-        let waited = self
-            .stop_told
-            .wait_timeout_while(stopping, longest, |stopping| !*stopping);
-        *waited.unwrap_or_else(PoisonError::into_inner).0
+        self.stopping.wait(longest)
     }
 }
 

@@ -66,6 +66,8 @@ enum Chore {
     ///
     /// Needs Python 3; installs the judge's packages into `target/judges`.
     JudgeSolids(solids::Options),
+    /// Install the NATS server that tests of jobs on other machines run with, on Debian as root.
+    Nats,
     /// Let a broker that is not ours, mosquitto, judge what the service publishes.
     ///
     /// Needs mosquitto and its clients, which it installs on Debian as root.
@@ -138,6 +140,7 @@ fn main() -> anyhow::Result<()> {
         Chore::JudgeToolpath(options) => toolpath::run(&options),
         Chore::JudgeFill(options) => fillings::run(&options),
         Chore::JudgeSolids(options) => solids::run(&options),
+        Chore::Nats => notify::install_nats(),
         Chore::JudgeNotify => notify::judge(),
         Chore::JudgeWeb(options) => web::run(&options),
         Chore::Reproduce(options) => reproduce::run(&options),
@@ -245,6 +248,9 @@ fn full() -> anyhow::Result<()> {
     })?;
     vm::run(&vm::Vm::Systemd(vm::SystemdOptions::default()))?;
     study::run(&study::Study::Mutations {
+        options: Vec::new(),
+    })?;
+    study::run(&study::Study::Fleet {
         options: Vec::new(),
     })?;
     study::run(&study::Study::Crashes {

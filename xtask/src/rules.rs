@@ -183,12 +183,13 @@ const DAEMON: [&str; 19] = [
     "toolpath",
 ];
 
-const COMMAND_LINE: [&str; 25] = [
+const COMMAND_LINE: [&str; 26] = [
     "cad-exchange",
     "compare",
     "deliverables",
     "features",
     "fill",
+    "job-queue",
     "mesh-files",
     "metrology",
     "nurbs",
@@ -229,9 +230,10 @@ const EVERYTHING: [&str; 15] = [
     "storage",
 ];
 
-const STUDIES: [&str; 18] = [
+const STUDIES: [&str; 19] = [
     "cad-exchange",
     "deliverables",
+    "job-queue",
     "nurbs",
     "pipeline",
     "range-image",

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Subcommand;
 
-use crate::{judge, shell, vm};
+use crate::{judge, notify, shell, vm};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Study {
@@ -21,6 +21,13 @@ pub(crate) enum Study {
     /// Kill the service at random moments of scan and job, and see what it has kept.
     #[command(disable_help_flag = true)]
     Crashes {
+        /// Options of the study; `--help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
+    /// Work on many jobs elsewhere while workers, NATS servers and links die.
+    #[command(disable_help_flag = true)]
+    Fleet {
         /// Options of the study; `--help` lists them.
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
@@ -114,6 +121,12 @@ pub(crate) enum Study {
 
 pub(crate) fn run(study: &Study) -> Result<()> {
     match study {
+        Study::Fleet { options } => {
+            notify::install_nats()?;
+            let programs = ["build", "--release", "--bin", "reliefd", "--bin", "relief"];
+            shell::run("cargo", &programs)?;
+            program("study-fleet", options)
+        }
         Study::Crashes { options } => {
             service()?;
             program("study-crashes", options)

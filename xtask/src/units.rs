@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::{apt, shell};
 
-const UNITS: [&str; 2] = ["reliefd.service", "reliefd.socket"];
+const UNITS: [&str; 3] = ["reliefd.service", "reliefd.socket", "relief-worker.service"];
 
 /// Drop-ins that users may install, and the units that they are for.
 const DROP_INS: [(&str, &str); 3] = [
@@ -20,6 +20,9 @@ const DROP_INS: [(&str, &str); 3] = [
 
 /// Most exposed that the service may be as it comes, from 0 (safest) to 10.
 const MOST_EXPOSED: f64 = 1.2;
+
+/// The same of a worker, which speaks with a server somewhere on the network.
+const MOST_EXPOSED_WORKER: f64 = 1.6;
 
 /// Where the package puts the program; while it is not there, another stands in for it.
 const PROGRAM: &str = "/usr/bin/reliefd";
@@ -40,12 +43,18 @@ pub(crate) fn check() -> Result<()> {
             said.is_empty(),
             "systemd-analyze finds fault ({name}):\n{said}"
         );
-        let exposure = exposure(&folder)?;
+        let exposure = exposure(&folder, "reliefd.service")?;
         println!("reliefd.service, {name}: nothing to find fault with, exposure {exposure}");
         if variant.is_none() && exposure > MOST_EXPOSED {
             bail!("the service is more exposed than {MOST_EXPOSED}");
         }
     }
+    let worker = exposure(&home.join("plain"), "relief-worker.service")?;
+    println!("relief-worker.service: nothing to find fault with, exposure {worker}");
+    ensure!(
+        worker <= MOST_EXPOSED_WORKER,
+        "a worker is more exposed than {MOST_EXPOSED_WORKER}"
+    );
     notices_mistakes(&home)
 }
 
@@ -60,6 +69,7 @@ fn stage(home: &Path, drop_in: Option<(&str, &str)>) -> Result<PathBuf> {
     for unit in UNITS {
         let text = fs::read_to_string(ours.join(unit))?;
         let text = text.replace(PROGRAM, &program.display().to_string());
+        let text = text.replace("/usr/bin/relief ", &format!("{} ", program.display()));
         fs::write(folder.join(unit), text)?;
     }
     if let Some((file, unit)) = drop_in {
@@ -86,8 +96,8 @@ fn verify(folder: &Path) -> Result<String> {
     Ok(said)
 }
 
-fn exposure(folder: &Path) -> Result<f64> {
-    let unit = folder.join("reliefd.service").display().to_string();
+fn exposure(folder: &Path, unit: &str) -> Result<f64> {
+    let unit = folder.join(unit).display().to_string();
     let words = ["security", "--offline=true", "--no-pager", &unit];
     let table = shell::output("systemd-analyze", &words)?;
     table

@@ -48,6 +48,7 @@
 //! | `GET /v1/uploads` | | [`UploadList`] |
 //! | `GET /v1/uploads/{upload}/runs` | | [`UploadRuns`], newest first |
 //! | `POST /v1/uploads/{upload}/test` | | the copy of the newest result: [`Delivery`] |
+//! | `GET /v1/fleet` | | [`Fleet`] |
 //! | `POST /v1/tickets` | [`CreateTicket`] | 201 [`Ticket`] |
 //! | `GET /v1/metrics` | | for Prometheus, as text |
 //! | `GET /v1/openapi.json` | | this table for programs (OpenAPI 3.1) |
@@ -57,6 +58,7 @@
 //! not know.
 
 mod event;
+mod fleet;
 mod hook;
 mod image;
 mod job;
@@ -74,6 +76,7 @@ mod upload;
 mod webhook;
 
 pub use event::{Event, LiveColumn};
+pub use fleet::{Fleet, FleetBench, FleetJobs, FleetWorker};
 pub use hook::{Hook, HookList, HookRuns};
 pub use image::{DEFAULT_NODES, ImageRequest, MAX_NODES, Regrid, RegridImage, ScanImage};
 pub use job::{Job, JobId, JobList, JobState, Priority, Rerun, SpoolEntry, SpoolFile, StageTiming};

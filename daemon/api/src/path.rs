@@ -68,6 +68,8 @@ pub const HOOKS: &str = "/v1/hooks";
 pub const HOOK_RUNS: &str = "/v1/hooks/{hook}/runs";
 /// Pattern of a hook's test.
 pub const HOOK_TEST: &str = "/v1/hooks/{hook}/test";
+/// Workers elsewhere.
+pub const FLEET: &str = "/v1/fleet";
 /// The uploads.
 pub const UPLOADS: &str = "/v1/uploads";
 /// Pattern of an upload's log.

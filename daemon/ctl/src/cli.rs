@@ -7,8 +7,8 @@ use clap::{Parser, Subcommand};
 
 use crate::command::{
     abort, accept, calibrate, change, compare, config, convert, demo, discover, doctor, features,
-    fetch, fill, hooks, jobs, laser, manual, pause, rerun, resume, scan, scans, skin, status,
-    surface, token, toolpath, uploads, watch, webhooks,
+    fetch, fill, fleet, hooks, jobs, laser, manual, pause, rerun, resume, scan, scans, skin,
+    status, surface, token, toolpath, uploads, watch, webhooks, worker,
 };
 
 /// Turns scans of slide-table laser scanners into CAD models.
@@ -60,6 +60,8 @@ pub(crate) enum Command {
     Webhooks(webhooks::Args),
     Hooks(hooks::Args),
     Uploads(uploads::Args),
+    Fleet(fleet::Args),
+    Worker(worker::Args),
     Config(config::Args),
     Discover(discover::Args),
     Doctor(doctor::Args),

@@ -75,6 +75,8 @@ impl Config {
             .map_err(|(start, message)| wrong(&text, path, start, message))?;
         let traces = config.traces.check_files();
         traces.map_err(|error| inconsistent(path, "traces", error.to_string()))?;
+        let nats = crate::fleet::check_files(&config.nats);
+        nats.map_err(|error| inconsistent(path, "nats", error.to_string()))?;
         Ok(config)
     }
 

@@ -7,6 +7,9 @@ use std::time::Duration;
 use job_queue::BenchName;
 use serde::{Deserialize, Deserializer, de::Error};
 
+/// Longest prefix of names on the servers.
+const MOST_PREFIX_CHARS: usize = 24;
+
 /// Where jobs go that are to be worked on elsewhere, and what comes from there.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -41,6 +44,9 @@ pub struct NatsConfig {
     /// Most bytes of this service's columns and results on their way.
     #[serde(deserialize_with = "quota_mb")]
     pub quota_mb: u32,
+    /// How long columns and results that nobody needs stay on the servers at least.
+    #[serde(deserialize_with = "unneeded_s")]
+    pub unneeded_s: u32,
     /// Whether this service's own jobs are done here while the servers are away.
     pub compute_when_away: bool,
     /// How long they are to be away for that.
@@ -54,8 +60,8 @@ pub struct NatsConfig {
     pub tools: BTreeSet<String>,
     /// Most memory of a job that is done here for others; three quarters of the machine's, shared by
     /// its workers, unless set.
-    #[serde(deserialize_with = "memory_mb")]
-    pub memory_mb: Option<u64>,
+    #[serde(deserialize_with = "memory_mib")]
+    pub memory_mib: Option<u64>,
     /// The silence in milliseconds, shorter than a file can say; no key of the file.
     #[serde(skip)]
     pub silence_ms: Option<u64>,
@@ -74,11 +80,12 @@ impl Default for NatsConfig {
             silence_s: 30,
             hand_over: None,
             quota_mb: 4096,
+            unneeded_s: 3600,
             compute_when_away: true,
             away_s: 30,
             needs: BTreeSet::new(),
             tools: BTreeSet::new(),
-            memory_mb: None,
+            memory_mib: None,
             silence_ms: None,
         }
     }
@@ -104,8 +111,15 @@ impl NatsConfig {
         Duration::from_millis(self.silence_ms.unwrap_or(configured))
     }
 
-    /// What does not go together.
-    pub(super) fn check(&self) -> Result<(), String> {
+    /// Refuses what cannot be, and what does not go together.
+    ///
+    /// # Errors
+    /// What is wrong, and what to do about it.
+    pub fn check(&self) -> Result<(), String> {
+        check_servers(&self.servers)?;
+        check_prefix(&self.prefix)?;
+        check_tools(&self.needs)?;
+        check_tools(&self.tools)?;
         if self.token_file.is_some() && self.nkey_file.is_some() {
             return Err(
                 "`token_file` and `nkey_file` are two ways to say the same: one of them is \
@@ -151,23 +165,31 @@ fn host_as_name() -> BenchName {
 }
 
 /// What is refused is told without what may be secret in it: others see the log.
-fn servers<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<String>, D::Error> {
-    let all = Vec::<String>::deserialize(deserializer)?;
-    for server in &all {
+fn check_servers(servers: &[String]) -> Result<(), String> {
+    for server in servers {
         let rest = ["nats://", "tls://"]
             .iter()
             .find_map(|scheme| server.strip_prefix(scheme));
         let is_host = |c: char| c.is_ascii_alphanumeric() || "-._[]:".contains(c);
         let why = match rest {
             Some(rest) if rest.contains('@') => {
-                "an address holds a name or password, which others would see: use `token_file` or \
-                 `nkey_file`"
+                "an address holds a name or password, which others would see: use a file with a \
+                 token or the seed of an nkey"
             }
             Some(rest) if !rest.is_empty() && rest.chars().all(is_host) => continue,
-            _ => "addresses such as \"tls://nats.lab.example:4222\" are needed",
+            _ => {
+                "addresses of servers such as \"nats://10.0.0.5:4222\" or \
+                 \"tls://nats.lab.example:4222\" are needed"
+            }
         };
-        return Err(D::Error::custom(why));
+        return Err(why.to_owned());
     }
+    Ok(())
+}
+
+fn servers<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<String>, D::Error> {
+    let all = Vec::<String>::deserialize(deserializer)?;
+    check_servers(&all).map_err(D::Error::custom)?;
     Ok(all)
 }
 
@@ -178,16 +200,20 @@ fn bench<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<BenchName>
         .map_err(D::Error::custom)
 }
 
+fn check_prefix(text: &str) -> Result<(), String> {
+    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+    if (1..=MOST_PREFIX_CHARS).contains(&text.len()) && text.chars().all(plain) {
+        return Ok(());
+    }
+    Err(format!(
+        "{text:?} is no prefix: 1 to {MOST_PREFIX_CHARS} small letters, digits and `-` are"
+    ))
+}
+
 fn prefix<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
     let text = String::deserialize(deserializer)?;
-    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
-    if (1..=32).contains(&text.len()) && text.chars().all(plain) {
-        Ok(text)
-    } else {
-        Err(D::Error::custom(format!(
-            "{text:?} is no prefix: 1 to 32 small letters, digits and `-` are"
-        )))
-    }
+    check_prefix(&text).map_err(D::Error::custom)?;
+    Ok(text)
 }
 
 fn replicas<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
@@ -202,16 +228,21 @@ fn replicas<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Erro
     }
 }
 
-fn tools<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeSet<String>, D::Error> {
-    let all = BTreeSet::<String>::deserialize(deserializer)?;
+fn check_tools(tools: &BTreeSet<String>) -> Result<(), String> {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
-    let sound = |tool: &&String| !((1..=24).contains(&tool.len()) && tool.chars().all(plain));
-    match all.iter().find(sound) {
-        Some(tool) => Err(D::Error::custom(format!(
+    let is_none = |tool: &&String| !((1..=24).contains(&tool.len()) && tool.chars().all(plain));
+    match tools.iter().find(is_none) {
+        Some(tool) => Err(format!(
             "{tool:?} is no name of a tool: 1 to 24 small letters, digits and `_` are"
-        ))),
-        None => Ok(all),
+        )),
+        None => Ok(()),
     }
+}
+
+fn tools<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeSet<String>, D::Error> {
+    let all = BTreeSet::deserialize(deserializer)?;
+    check_tools(&all).map_err(D::Error::custom)?;
+    Ok(all)
 }
 
 /// A number within limits.
@@ -242,10 +273,14 @@ fn quota_mb<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error>
     within(deserializer, 16, 10_000_000, "MB")
 }
 
+fn unneeded_s<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    within(deserializer, 10, 31_536_000, "seconds")
+}
+
 fn hand_over<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<usize>, D::Error> {
     within(deserializer, 1, 10_000, "jobs").map(Some)
 }
 
-fn memory_mb<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u64>, D::Error> {
-    within(deserializer, 64, 100_000_000, "MB").map(Some)
+fn memory_mib<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u64>, D::Error> {
+    within(deserializer, 64, 100_000_000, "MiB").map(Some)
 }

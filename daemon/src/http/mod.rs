@@ -7,6 +7,7 @@ mod body;
 mod download;
 mod events;
 mod files;
+mod fleet;
 mod guard;
 mod hooks;
 mod images;

@@ -15,7 +15,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::{
-    Context, events, files, hooks, images, jobs, metrics, scanners, scans, tickets, uploads,
+    Context, events, files, fleet, hooks, images, jobs, metrics, scanners, scans, tickets, uploads,
     webhooks,
 };
 
@@ -100,6 +100,7 @@ pub(super) fn described() -> OpenApiRouter<Context> {
         .routes(routes!(uploads::list))
         .routes(routes!(uploads::runs))
         .routes(routes!(uploads::test))
+        .routes(routes!(fleet::get))
         .routes(routes!(webhooks::list))
         .routes(routes!(webhooks::deliveries))
         .routes(routes!(webhooks::test))

@@ -79,6 +79,11 @@ impl From<ServiceError> for Refusal {
                 "service-stopping",
                 Some("try again once it runs again".into()),
             ),
+            ServiceError::TakesNoScans => (
+                S::CONFLICT,
+                "takes-no-scans",
+                Some("ask a service that has scanners".into()),
+            ),
             ServiceError::ScannerBusy { .. } => (
                 S::CONFLICT,
                 "scanner-busy",

@@ -41,8 +41,8 @@ impl Service {
         }
     }
 
-    /// Notes that a job has been begun, by somebody elsewhere if one is named.
-    pub(crate) fn begin_job(&self, id: JobId, worker: Option<&str>) -> Result<Job, ServiceError> {
+    /// Notes that a job has been begun.
+    pub(crate) fn begin_job(&self, id: JobId) -> Result<Job, ServiceError> {
         let _order = self.queue.changing();
         let mut job = self.job(id)?;
         job.attempts += 1;
@@ -52,10 +52,34 @@ impl Service {
             job.cut_short += 1;
         }
         job.state = JobState::Running;
-        job.worker = worker.map(str::to_owned);
+        job.worker = None;
         job.started_at = Some(now());
         job.ended_at = None;
         self.keep_job(&job)?;
+        Ok(job)
+    }
+
+    /// Notes that a job is worked on elsewhere, or waits there again.
+    pub(crate) fn note_elsewhere(
+        &self,
+        id: JobId,
+        worker: Option<&str>,
+    ) -> Result<Job, ServiceError> {
+        let _order = self.queue.changing();
+        let mut job = self.job(id)?;
+        // Who works counts how often it was cut short.
+        job.cut_short = 0;
+        job.stage = None;
+        if let Some(worker) = worker {
+            job.state = JobState::Running;
+            job.attempts += 1;
+            job.worker = Some(worker.to_owned());
+            job.started_at = Some(now());
+        } else {
+            job.state = JobState::Queued;
+        }
+        self.keep_job(&job)?;
+        self.queue.waits_elsewhere(id, worker.is_none());
         Ok(job)
     }
 
@@ -166,6 +190,13 @@ fn standing_of(job: &Job) -> Standing {
     }
 }
 
+fn by(worker: &str, standing: Standing) -> Standing {
+    Standing {
+        worker: Some(worker.to_owned()),
+        ..standing
+    }
+}
+
 fn told(error: ServiceError) -> QueueError {
     QueueError::Records(error.to_string())
 }
@@ -228,10 +259,11 @@ impl JobQueue for Embedded {
         let Some((order, flag)) = taken else {
             return Ok(None);
         };
-        match service.begin_job(order.key.job, None) {
+        match service.begin_job(order.key.job) {
             Ok(job) => Ok(Some(Box::new(Held {
                 service: Arc::clone(service),
-                begun: standing_of(&job),
+                begun: by(&worker.name, standing_of(&job)),
+                worker: worker.name.clone(),
                 job,
                 order,
                 flag,
@@ -251,6 +283,8 @@ struct Held {
     service: Arc<Service>,
     job: Job,
     begun: Standing,
+    /// Which thread of this service it is, is not kept.
+    worker: String,
     order: Order,
     flag: Arc<StopFlag>,
 }
@@ -290,8 +324,7 @@ impl Lease for Held {
         let let_go = || queue.end(id, &self.flag);
         let ended = self.service.end_job(id, outcome, let_go);
         ended
-            .as_ref()
-            .map(standing_of)
+            .map(|job| by(&self.worker, standing_of(&job)))
             .map_err(|error| QueueError::Records(error.to_string()))
     }
 
@@ -299,5 +332,74 @@ impl Lease for Held {
         let (queue, id) = (&self.service.queue, self.job.id);
         let let_go = || queue.end(id, &self.flag);
         self.service.put_back_job(id, let_go).map_err(told)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use job_queue::conformance::{CASES, Setting};
+    use tempfile::TempDir;
+
+    use super::*;
+    use crate::service::testing::service_in;
+
+    /// A service's records, without anybody who works on them.
+    struct OnRecords {
+        service: Arc<Service>,
+        folder: TempDir,
+    }
+
+    impl OnRecords {
+        fn new() -> Self {
+            let folder = tempfile::tempdir().unwrap();
+            Self {
+                service: Arc::new(service_in(folder.path())),
+                folder,
+            }
+        }
+    }
+
+    impl Setting for OnRecords {
+        fn queue(&self) -> Arc<dyn JobQueue> {
+            Arc::new(Embedded(Arc::clone(&self.service)))
+        }
+
+        fn key(&self, n: u64) -> JobKey {
+            self.service.key_of(n)
+        }
+
+        fn prepare(&mut self, order: &Order) {
+            let store = &self.service.store;
+            if store.job(order.key.job).unwrap().is_none() {
+                let (id, result) = (order.key.job, format!("result-{}", order.key.job));
+                let job = serde_json::json!({
+                    "id": id, "scan": "scan", "result": result, "name": "a", "state": "queued",
+                    "priority": order.priority, "turn": order.turn, "queued_at": now(),
+                });
+                store
+                    .put_job(&serde_json::from_value(job).unwrap())
+                    .unwrap();
+            }
+        }
+
+        /// Workers are threads of the service: one that dies without a word takes it along.
+        fn worker_dies(&mut self, lease: Box<dyn Lease>) {
+            drop(lease);
+            self.restart();
+        }
+
+        fn restart(&mut self) {
+            self.service.store.close();
+            self.service = Arc::new(service_in(self.folder.path()));
+            self.service.recover_jobs().unwrap();
+        }
+    }
+
+    #[test]
+    fn the_queue_of_one_machine_is_a_queue() {
+        for case in CASES {
+            println!("{}", case.name);
+            (case.run)(&mut OnRecords::new());
+        }
     }
 }

@@ -21,8 +21,12 @@ use crate::ids::{now, shown_name};
 use crate::service::Service;
 use crate::store::Outgoing;
 
-pub(crate) use local::work;
-pub(crate) use queue::Queue;
+pub(crate) use embedded::Embedded;
+pub(crate) use local::{Local, be_nice, work};
+pub(crate) use make::{Halt, Workpiece};
+pub(crate) use progress::Progress;
+pub(crate) use queue::{Queue, StopFlag};
+pub(crate) use worker::{Craft, Hand, Made};
 
 impl Service {
     /// Queues the job of a scan that has just been completed, and keeps the scan with it, and
@@ -116,6 +120,14 @@ impl Service {
         self.keep_job(&job)?;
         self.queue.add(self.order_of(&job));
         Ok(job)
+    }
+
+    /// Has a job offered anew elsewhere, as another order.
+    pub(crate) fn turn_job(&self, id: JobId) -> Result<(), ServiceError> {
+        let _order = self.queue.changing();
+        let mut job = self.job(id)?;
+        job.turn += 1;
+        self.keep_job(&job)
     }
 
     /// Queues a job again that was cut short when the service last ended, or gives it up.

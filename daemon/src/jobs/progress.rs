@@ -1,7 +1,7 @@
 //! Telling how far an attempt is, stage by stage.
 
 use std::sync::Mutex;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use job_queue::Lease;
 use pipeline::{Observer, Stage};
@@ -18,6 +18,7 @@ const STEP: f64 = 0.02;
 pub(crate) struct Progress<'a> {
     lease: &'a dyn Lease,
     pulse: &'a Pulse,
+    is_to_stop: &'a (dyn Fn(Duration) -> bool + Sync),
     state: Mutex<State>,
 }
 
@@ -34,10 +35,15 @@ struct Running {
 }
 
 impl<'a> Progress<'a> {
-    pub(crate) fn new(lease: &'a dyn Lease, pulse: &'a Pulse) -> Self {
+    pub(crate) fn new(
+        lease: &'a dyn Lease,
+        pulse: &'a Pulse,
+        is_to_stop: &'a (dyn Fn(Duration) -> bool + Sync),
+    ) -> Self {
         Self {
             lease,
             pulse,
+            is_to_stop,
             state: Mutex::default(),
         }
     }
@@ -76,7 +82,7 @@ impl<'a> Progress<'a> {
 impl Monitor for Progress<'_> {
     fn is_cancelled(&self) -> bool {
         self.pulse.beat();
-        self.lease.stop().is_some()
+        self.lease.stop().is_some() || (self.is_to_stop)(Duration::ZERO)
     }
 
     fn progress(&self, fraction: f64) {

@@ -1,6 +1,6 @@
 //! Which jobs wait and which run, in memory; the records say the same on disk.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -24,6 +24,8 @@ struct State {
     /// In the order in which they go.
     waiting: BTreeMap<(Priority, JobId), Order>,
     running: BTreeMap<JobId, Arc<StopFlag>>,
+    /// Of those that count as running, the ones that wait elsewhere for somebody to begin.
+    handed_over: BTreeSet<JobId>,
     stopping: bool,
 }
 
@@ -126,6 +128,17 @@ impl Queue {
             .is_some_and(|running| Arc::ptr_eq(running, flag))
         {
             state.running.remove(&id);
+            state.handed_over.remove(&id);
+        }
+    }
+
+    /// A job that was taken waits elsewhere for somebody to begin, or does so no more.
+    pub(crate) fn waits_elsewhere(&self, id: JobId, waits: bool) {
+        let mut state = lock(&self.state);
+        if waits && state.running.contains_key(&id) {
+            state.handed_over.insert(id);
+        } else {
+            state.handed_over.remove(&id);
         }
     }
 
@@ -142,6 +155,15 @@ impl Queue {
     /// Jobs waiting and running.
     pub(crate) fn counts(&self) -> (usize, usize) {
         let state = lock(&self.state);
-        (state.waiting.len(), state.running.len())
+        let elsewhere = state.handed_over.len();
+        (
+            state.waiting.len() + elsewhere,
+            state.running.len() - elsewhere,
+        )
+    }
+
+    /// Jobs that nobody has taken yet.
+    pub(crate) fn untaken(&self) -> usize {
+        lock(&self.state).waiting.len()
     }
 }

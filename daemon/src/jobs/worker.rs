@@ -55,7 +55,7 @@ pub(crate) struct Hand<'a> {
     pub(crate) craft: &'a dyn Craft,
     pub(crate) pulse: &'a Pulse,
     /// Waits so long, and tells whether the worker is to stop.
-    pub(crate) is_to_stop: &'a dyn Fn(Duration) -> bool,
+    pub(crate) is_to_stop: &'a (dyn Fn(Duration) -> bool + Sync),
 }
 
 impl Hand<'_> {
@@ -78,7 +78,11 @@ impl Hand<'_> {
             }
             Ok(None) => false,
             Err(error) => {
-                tracing::warn!(%error, "cannot take a job; trying again");
+                match error {
+                    // Told by the connection, once.
+                    QueueError::Away(_) => tracing::debug!(%error, "no jobs can be taken"),
+                    _ => tracing::warn!(%error, "cannot take a job; trying again"),
+                }
                 (self.is_to_stop)(RETRY);
                 false
             }
@@ -89,7 +93,7 @@ impl Hand<'_> {
         let key = lease.order().key.clone();
         tracing::info!(job = %key, attempt = lease.begun().attempts, "job begins");
         let (made, timings) = {
-            let progress = Progress::new(lease, self.pulse);
+            let progress = Progress::new(lease, self.pulse, self.is_to_stop);
             // A defect in the processing of one scan must not end the worker.
             let made = catch_unwind(AssertUnwindSafe(|| self.craft.make(lease, &progress)))
                 .unwrap_or_else(|panic| Made::Failed {

@@ -7,11 +7,12 @@ use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::registry::{Registry, Unit};
 use relief_api::{LaserState, ScannerLink};
 
+use super::fleet::OfFleet;
 use super::labels::{OfPlace, OfScanner, OfState, OfVersion, OfWebhook};
 use crate::service::Service;
 
 /// A gauge of seconds or shares.
-type Real = Gauge<f64, AtomicU64>;
+pub(super) type Real = Gauge<f64, AtomicU64>;
 
 #[derive(Debug, Default)]
 pub(super) struct Gauges {
@@ -27,6 +28,7 @@ pub(super) struct Gauges {
     free: Family<OfPlace, Gauge>,
     webhooks: Family<OfWebhook, Gauge>,
     dropped: Family<OfWebhook, Gauge>,
+    fleet: OfFleet,
 }
 
 impl Gauges {
@@ -91,6 +93,7 @@ impl Gauges {
             "Messages that had to make room for newer ones since the service started",
             all.dropped.clone(),
         );
+        all.fleet.register(registry);
         all
     }
 
@@ -144,6 +147,10 @@ impl Gauges {
                 self.free.get_or_create(&labels).set(whole(free));
             }
         }
+        let fleet = service.fleet_status();
+        if fleet.is_used {
+            self.fleet.measure(&fleet);
+        }
         for backlog in service.receivers.backlogs() {
             let labels = OfWebhook {
                 webhook: backlog.name,
@@ -157,6 +164,6 @@ impl Gauges {
     }
 }
 
-fn whole(count: u64) -> i64 {
+pub(super) fn whole(count: u64) -> i64 {
     i64::try_from(count).unwrap_or(i64::MAX)
 }

@@ -9,6 +9,7 @@ use scanner_driver::ScannerError;
 use super::Found;
 use crate::acquisition::presence::last_seen;
 use crate::acquisition::{Rest, TakeUp, Task, not_taken_up};
+use crate::config::Role;
 use crate::error::ServiceError;
 use crate::ids::{at, now};
 use crate::service::{Service, lock, remove_if_there};
@@ -40,6 +41,9 @@ impl Service {
         let rest = found.rest.clone()?;
         let station = self.station(&scan.scanner).map_err(|e| e.to_string())?;
         let config = self.config();
+        if !config.has(Role::Acquire) {
+            return Err("the service takes no scans any more ([service] roles)".to_owned());
+        }
         let mut scanners = config.each_scanner().into_iter();
         if !scanners.any(|scanner| scanner.name == station.name() && scanner.config.resume) {
             return Err(format!("[{}] resume is false", station.section()));

@@ -26,9 +26,6 @@ impl Normal {
         let is_along_v = v.count <= u.count;
         let (outer, inner) = if is_along_v { (u, v) } else { (v, u) };
         let bandwidth = DEGREE * inner.count + DEGREE;
-        if std::env::var("NODIRECT").is_ok() {
-            return None;
-        }
         let work = (u.count * v.count).checked_mul(bandwidth * bandwidth)?;
         if work > MOST_WORK * u.at.len() * rows {
             return None;

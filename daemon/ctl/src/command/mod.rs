@@ -14,6 +14,7 @@ pub(crate) mod features;
 pub(crate) mod fetch;
 pub(crate) mod fill;
 mod fill_image;
+pub(crate) mod fleet;
 mod grid;
 pub(crate) mod hooks;
 pub(crate) mod jobs;
@@ -43,6 +44,7 @@ mod units;
 pub(crate) mod uploads;
 pub(crate) mod watch;
 pub(crate) mod webhooks;
+pub(crate) mod worker;
 
 use std::future::Future;
 
@@ -82,6 +84,8 @@ pub(crate) fn run(invocation: Invocation) -> Result<(), Failure> {
         Command::Webhooks(args) => block_on(webhooks::run(args, json)),
         Command::Hooks(args) => block_on(hooks::run(args, json)),
         Command::Uploads(args) => block_on(uploads::run(args, json)),
+        Command::Fleet(args) => block_on(fleet::run(args, json)),
+        Command::Worker(args) => worker::run(args, json),
         Command::Config(args) => config::run(args, json),
         Command::Manual(args) => manual::run(&args, json),
     }

@@ -108,11 +108,14 @@ impl Link {
             known.away_since = None;
             known.refused = None;
         }
-        self.up.send_modify(|up| {
-            if !up.there {
+        // It may be told by two at once, and is news once.
+        self.up.send_if_modified(|up| {
+            let is_news = !up.there;
+            if is_news {
                 up.there = true;
                 up.times += 1;
             }
+            is_news
         });
     }
 

@@ -6,8 +6,8 @@ use futures_util::TryStreamExt;
 
 use super::names::Line;
 use super::{CALL, JetStreamQueue, Shared};
-use crate::order::Priority;
 use crate::queue::QueueError;
+use relief_api::Priority;
 
 /// How much there is to do.
 #[derive(Debug, Clone, PartialEq, Default)]

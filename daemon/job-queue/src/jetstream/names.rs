@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::order::{BenchName, JobKey, Need, Order, Priority};
+use crate::Priority;
+use crate::order::{BenchName, JobKey, Need, Order};
 use crate::queue::{QueueError, Worker};
 
 /// Longest name of a tool.

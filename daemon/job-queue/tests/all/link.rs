@@ -169,7 +169,9 @@ fn bytes_go_on_where_a_cable_was_cut() {
     let queue = connect(&options);
     let depot = queue.depot();
     let bench = key(1).bench;
-    let bytes: Vec<u8> = (0..12_u32 << 20).map(|n| ((n * n) >> 7) as u8).collect();
+    let bytes: Vec<u8> = (0..12_u32 << 20)
+        .map(|n| (n.wrapping_mul(n) >> 7) as u8)
+        .collect();
     let cut = |after_ms| {
         thread::sleep(Duration::from_millis(after_ms));
         cable.cut();

@@ -128,6 +128,7 @@ async fn what_the_clients_of_the_service_tell() {
         listed.contains("done, acknowledged by socket at 20"),
         "{listed}"
     );
+    assert_eq!(told(&["fleet"]).await["is_used"], false);
     let hooks = async |arguments: &[&str]| {
         let told = ask(at, &socket, &[&["hooks"], arguments].concat()).await;
         check("commands.schema.json#/$defs/hooks", &told);
