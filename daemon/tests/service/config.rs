@@ -2,7 +2,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use reliefd::Config;
-use reliefd::config::{DiscoveryConfig, HookConfig, HttpConfig, WebhookConfig};
+use reliefd::config::{DiscoveryConfig, HookConfig, HttpConfig, NatsConfig, WebhookConfig};
 
 fn refused(text: &str) -> String {
     Config::parse(text, Path::new("relief.toml"))
@@ -380,6 +380,19 @@ fn the_examples_are_sound_and_show_the_defaults() {
     let storage = Config::default().storage;
     assert_eq!(all.storage.acknowledged, storage.acknowledged);
     assert_eq!(all.storage.unacknowledged, storage.unacknowledged);
+    let nats = NatsConfig {
+        servers: vec!["tls://nats.lab.example:4222".into()],
+        bench: Some("bench-7".to_owned().try_into().unwrap()),
+        token_file: Some("/etc/relief/nats.token".into()),
+        ca_file: Some("/etc/relief/ca.pem".into()),
+        hand_over: Some(8),
+        needs: ["gpu".to_owned()].into(),
+        tools: ["gpu".to_owned()].into(),
+        memory_mib: Some(8192),
+        ..NatsConfig::default()
+    };
+    assert_eq!(all.nats, nats);
+    assert_eq!(all.service.roles, Config::default().service.roles);
     let discovery = DiscoveryConfig {
         name: Some("Relief on bench".into()),
         ..DiscoveryConfig::default()

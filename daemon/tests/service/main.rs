@@ -17,6 +17,7 @@ mod config;
 mod cut_short;
 mod events;
 mod fake;
+mod fleet;
 mod further;
 mod hooks;
 mod hostile;

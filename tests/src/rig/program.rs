@@ -28,11 +28,26 @@ impl Program {
     /// # Errors
     /// When the folder cannot be written, or the program not started.
     pub fn start(program: &Path, folder: &Path, port: &Path, more: &str) -> Result<Self> {
+        Self::start_as(program, folder, port, "", more)
+    }
+
+    /// The same with more in the section of the service, too.
+    ///
+    /// # Errors
+    /// As [`Program::start`].
+    pub fn start_as(
+        program: &Path,
+        folder: &Path,
+        port: &Path,
+        service: &str,
+        more: &str,
+    ) -> Result<Self> {
         let socket = folder.join("reliefd.sock");
         let mut config = String::new();
         writeln!(config, "[service]\nsocket = {socket:?}")?;
         writeln!(config, "state_dir = {:?}", folder.join("state"))?;
         writeln!(config, "spool_dir = {:?}", folder.join("spool"))?;
+        writeln!(config, "{service}")?;
         writeln!(config, "[scanner]\nport = {port:?}\n{more}")?;
         let file = folder.join("reliefd.toml");
         std::fs::write(&file, config)?;

@@ -1,0 +1,260 @@
+//! NATS servers as children: one, or three as a cluster, and the way to them, which can be cut.
+
+use std::io::{Read, Write};
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, ensure};
+use serde_json::Value;
+
+/// How long a server may take to listen.
+const GUARD: Duration = Duration::from_secs(60);
+/// How long a look at a server may take.
+const LOOK: Duration = Duration::from_secs(2);
+
+/// A port that nobody has now.
+fn free_port() -> Result<u16> {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
+    Ok(listener.local_addr()?.port())
+}
+
+struct Server {
+    name: String,
+    config: PathBuf,
+    port: u16,
+    monitor: u16,
+    child: Option<Child>,
+}
+
+/// Servers of one cluster.
+pub(crate) struct Cluster {
+    servers: Vec<Server>,
+    _folder: tempfile::TempDir,
+}
+
+impl Drop for Cluster {
+    fn drop(&mut self) {
+        for server in &mut self.servers {
+            server.kill();
+        }
+    }
+}
+
+impl Server {
+    fn start(&mut self) -> Result<()> {
+        let child = Command::new("nats-server")
+            .arg("-c")
+            .arg(&self.config)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .context("cannot start nats-server: install Debian's package of that name")?;
+        self.child = Some(child);
+        let begun = Instant::now();
+        while TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)).is_err() {
+            ensure!(begun.elapsed() < GUARD, "{} does not listen", self.name);
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        Ok(())
+    }
+
+    fn kill(&mut self) {
+        if let Some(mut child) = self.child.take() {
+            // It may have ended by itself.
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+
+    /// What it tells of itself.
+    fn monitored(&self, path: &str) -> Result<Value> {
+        let mut stream = TcpStream::connect((Ipv4Addr::LOCALHOST, self.monitor))?;
+        stream.set_read_timeout(Some(LOOK))?;
+        write!(stream, "GET {path} HTTP/1.0\r\n\r\n")?;
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer)?;
+        let (_, body) = answer.split_once("\r\n\r\n").context("no answer")?;
+        Ok(serde_json::from_str(body)?)
+    }
+}
+
+impl Cluster {
+    /// Starts so many servers.
+    pub(crate) fn start(count: usize) -> Result<Self> {
+        let folder = tempfile::Builder::new().prefix("nats-").tempdir()?;
+        let routes: Vec<u16> = (0..count).map(|_| free_port()).collect::<Result<_>>()?;
+        let mut servers = Vec::new();
+        for (number, route) in routes.iter().enumerate() {
+            let name = format!("n{}", number + 1);
+            let (port, monitor) = (free_port()?, free_port()?);
+            let store = folder.path().join(&name);
+            let others: Vec<String> = routes
+                .iter()
+                .map(|other| format!("nats://127.0.0.1:{other}"))
+                .collect();
+            let mut text = format!(
+                "server_name: {name}\nlisten: \"127.0.0.1:{port}\"\nhttp: \"127.0.0.1:{monitor}\"\n\
+                 jetstream {{ store_dir: {store:?} }}\n",
+            );
+            if count > 1 {
+                // The others are not told to clients, who would find a way around a link that is cut.
+                text += &format!(
+                    "cluster {{ name: study, listen: \"127.0.0.1:{route}\", no_advertise: true, \
+                     routes: [{}] }}\n",
+                    others.join(", ")
+                );
+            }
+            let config = folder.path().join(format!("{name}.conf"));
+            std::fs::write(&config, text)?;
+            servers.push(Server {
+                name,
+                config,
+                port,
+                monitor,
+                child: None,
+            });
+        }
+        for server in &mut servers {
+            server.start()?;
+        }
+        let cluster = Self {
+            servers,
+            _folder: folder,
+        };
+        if count > 1 {
+            cluster.wait_for_leader()?;
+        }
+        Ok(cluster)
+    }
+
+    fn wait_for_leader(&self) -> Result<()> {
+        let begun = Instant::now();
+        loop {
+            let answers = self.servers.iter().map(|server| server.monitored("/jsz"));
+            let has_leader = |answer: Result<Value>| {
+                answer.is_ok_and(|answer| answer["meta_cluster"]["leader"].is_string())
+            };
+            if answers.into_iter().all(has_leader) {
+                return Ok(());
+            }
+            ensure!(begun.elapsed() < GUARD, "the cluster has found no leader");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    /// Addresses of all servers.
+    pub(crate) fn ports(&self) -> Vec<u16> {
+        self.servers.iter().map(|server| server.port).collect()
+    }
+
+    /// Number of the server that leads the stream of orders; the first if that cannot be told.
+    pub(crate) fn leader(&self) -> usize {
+        let leads = |server: &Server| -> Option<String> {
+            let answer = server.monitored("/jsz?accounts=true&streams=true").ok()?;
+            let accounts = answer["account_details"].as_array()?.clone();
+            let streams = accounts
+                .iter()
+                .filter_map(|one| one["stream_detail"].as_array());
+            let orders = streams.flatten().find(|one| {
+                one["name"]
+                    .as_str()
+                    .is_some_and(|name| name.ends_with("JOBS") || name.ends_with("jobs"))
+            })?;
+            Some(orders["cluster"]["leader"].as_str()?.to_owned())
+        };
+        let told = self.servers.iter().find_map(leads);
+        told.and_then(|name| self.servers.iter().position(|one| one.name == name))
+            .unwrap_or_default()
+    }
+
+    /// SIGKILL.
+    pub(crate) fn kill(&mut self, number: usize) {
+        self.servers[number].kill();
+    }
+
+    /// Starts it again with what it has kept.
+    pub(crate) fn start_again(&mut self, number: usize) -> Result<()> {
+        self.servers[number].start()
+    }
+}
+
+/// A way to the servers, one port for each, which can be cut.
+pub(crate) struct Link {
+    ports: Vec<u16>,
+    is_cut: Arc<AtomicBool>,
+}
+
+impl Link {
+    /// One that is not cut. Lives until the process ends.
+    pub(crate) fn to(ports: &[u16]) -> Result<Self> {
+        let is_cut = Arc::new(AtomicBool::new(false));
+        let mut own = Vec::new();
+        for &port in ports {
+            let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
+            own.push(listener.local_addr()?.port());
+            let is_cut = Arc::clone(&is_cut);
+            std::thread::spawn(move || {
+                for client in listener.incoming().flatten() {
+                    if is_cut.load(Ordering::Relaxed) {
+                        continue;
+                    }
+                    let Ok(server) = TcpStream::connect((Ipv4Addr::LOCALHOST, port)) else {
+                        continue;
+                    };
+                    for (from, to) in [(&client, &server), (&server, &client)] {
+                        if let (Ok(from), Ok(to)) = (from.try_clone(), to.try_clone()) {
+                            let is_cut = Arc::clone(&is_cut);
+                            std::thread::spawn(move || carry(from, to, &is_cut));
+                        }
+                    }
+                }
+            });
+        }
+        Ok(Self { ports: own, is_cut })
+    }
+
+    pub(crate) fn ports(&self) -> &[u16] {
+        &self.ports
+    }
+
+    /// From now on nothing gets through, and what is connected is cut off; or things do again.
+    pub(crate) fn cut(&self, is_cut: bool) {
+        self.is_cut.store(is_cut, Ordering::Relaxed);
+    }
+}
+
+fn carry(mut from: TcpStream, mut to: TcpStream, is_cut: &AtomicBool) {
+    let _ = from.set_read_timeout(Some(Duration::from_millis(20)));
+    let _ = to.set_nodelay(true);
+    let mut bytes = vec![0; 1 << 16];
+    while !is_cut.load(Ordering::Relaxed) {
+        match from.read(&mut bytes) {
+            Ok(0) => break,
+            Ok(count) => {
+                if to.write_all(&bytes[..count]).is_err() {
+                    break;
+                }
+            }
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut
+                ) => {}
+            Err(_) => break,
+        }
+    }
+    let _ = from.shutdown(std::net::Shutdown::Both);
+    let _ = to.shutdown(std::net::Shutdown::Both);
+}
+
+/// Addresses as the configuration has them.
+pub(crate) fn urls(ports: &[u16]) -> Vec<String> {
+    ports
+        .iter()
+        .map(|port| format!("nats://127.0.0.1:{port}"))
+        .collect()
+}
