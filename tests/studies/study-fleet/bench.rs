@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
-use job_queue::BenchName;
 use job_queue::jetstream::{JetStreamQueue, Options};
+use job_queue::{BenchName, QueueError};
 use relief_api::{Event, Job, JobList, Scan, ScanState, StartScan, path};
 use relief_tests::rig::{Client, GUARD, Program, small_house};
 use sim_scanner::endpoint::pty::PtyServer;
@@ -157,26 +157,33 @@ impl Bench {
             let queue = JetStreamQueue::new(options, handle)?;
             queue.wait_connected(GUARD)?;
             let (depot, bench) = (queue.depot(), BenchName::try_from(NAME.to_owned())?);
-            loop {
+            // Of orders, objects, and messages that no object's name leads to.
+            let look = || -> Result<[u64; 4], QueueError> {
                 let depth = queue.depth()?;
-                let waiting: u64 = depth.waiting.values().sum();
+                let orders = depth.waiting.values().sum::<u64>() + depth.running;
                 let objects = depot.list(&bench)?.len() as u64;
                 let standings = queue.standings(&bench)?.len() as u64;
-                // What no object's name leads to.
-                let all_messages = || depot.sweep(&bench, &|_| true, Duration::ZERO);
-                let left = waiting + depth.running + objects + standings;
-                if left == 0 {
-                    return Ok(all_messages()?.orphan_messages);
+                let messages = match orders + objects + standings {
+                    0 => {
+                        depot
+                            .sweep(&bench, &|_| true, Duration::ZERO)?
+                            .orphan_messages
+                    }
+                    _ => 0,
+                };
+                Ok([orders, standings, objects, messages])
+            };
+            loop {
+                match look() {
+                    Ok([0, 0, 0, messages]) => return Ok(messages),
+                    Ok(left) if begun.elapsed() >= longest => {
+                        eprintln!("left: [orders, standings, objects, messages] = {left:?}");
+                        return Ok(left.iter().sum());
+                    }
+                    // The servers may just be finding a leader.
+                    Err(error) if begun.elapsed() >= longest => return Err(error.into()),
+                    Ok(_) | Err(_) => std::thread::sleep(LOOK),
                 }
-                if begun.elapsed() >= longest {
-                    eprintln!(
-                        "left: {waiting} orders wait, {} run, {objects} objects, {standings} \
-                         standings",
-                        depth.running
-                    );
-                    return Ok(left);
-                }
-                std::thread::sleep(LOOK);
             }
         })
         .await?
