@@ -190,13 +190,6 @@ fn standing_of(job: &Job) -> Standing {
     }
 }
 
-fn by(worker: &str, standing: Standing) -> Standing {
-    Standing {
-        worker: Some(worker.to_owned()),
-        ..standing
-    }
-}
-
 fn told(error: ServiceError) -> QueueError {
     QueueError::Records(error.to_string())
 }
@@ -262,8 +255,7 @@ impl JobQueue for Embedded {
         match service.begin_job(order.key.job) {
             Ok(job) => Ok(Some(Box::new(Held {
                 service: Arc::clone(service),
-                begun: by(&worker.name, standing_of(&job)),
-                worker: worker.name.clone(),
+                begun: standing_of(&job),
                 job,
                 order,
                 flag,
@@ -283,8 +275,6 @@ struct Held {
     service: Arc<Service>,
     job: Job,
     begun: Standing,
-    /// Which thread of this service it is, is not kept.
-    worker: String,
     order: Order,
     flag: Arc<StopFlag>,
 }
@@ -324,7 +314,7 @@ impl Lease for Held {
         let let_go = || queue.end(id, &self.flag);
         let ended = self.service.end_job(id, outcome, let_go);
         ended
-            .map(|job| by(&self.worker, standing_of(&job)))
+            .map(|job| standing_of(&job))
             .map_err(|error| QueueError::Records(error.to_string()))
     }
 
