@@ -1,5 +1,7 @@
 //! The fleet at a glance, for the API.
 
+use std::time::Duration;
+
 use job_queue::jetstream::{Depth, Node, Role};
 use relief_api::{Fleet as Shown, FleetBench, FleetJobs, FleetWorker, Priority};
 
@@ -7,8 +9,16 @@ use super::Fleet;
 use crate::service::{Service, lock};
 
 impl Service {
-    /// Workers elsewhere, and the jobs that go to them.
+    /// Workers elsewhere, and the jobs that go to them, as they are.
     pub(crate) fn fleet_status(&self) -> Shown {
+        if let Some(fleet) = self.fleet.get() {
+            fleet.look();
+        }
+        self.fleet_known()
+    }
+
+    /// The same as of the last look, without asking the servers.
+    pub(crate) fn fleet_known(&self) -> Shown {
         self.fleet.get().map_or_else(
             || Shown {
                 bench: self.bench.to_string(),
@@ -21,7 +31,7 @@ impl Service {
 
 impl Fleet {
     fn shown(&self) -> Shown {
-        let seen = self.seen();
+        let seen = lock(&self.seen).clone();
         let of = |role| seen.nodes.iter().filter(move |node| node.role == role);
         let is_connected = self.queue.is_connected();
         Shown {
@@ -30,7 +40,10 @@ impl Fleet {
             servers: self.config.servers.clone(),
             is_connected,
             away_s: (!is_connected).then(|| self.away_for().as_secs()),
-            problem: lock(&self.trouble).clone(),
+            problem: match self.queue.wait_connected(Duration::ZERO) {
+                Ok(()) => lock(&self.trouble).clone(),
+                Err(error) => Some(error.to_string()),
+            },
             handed_over: lock(&self.handed).len(),
             most_handed_over: self.window(),
             jobs: seen.depth.as_ref().map(jobs),

@@ -147,7 +147,7 @@ impl Gauges {
                 self.free.get_or_create(&labels).set(whole(free));
             }
         }
-        let fleet = service.fleet_status();
+        let fleet = service.fleet_known();
         if fleet.is_used {
             self.fleet.measure(&fleet);
         }
