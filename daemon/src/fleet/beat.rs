@@ -7,17 +7,19 @@ use std::time::{Duration, Instant};
 
 use job_queue::depot::{Chunk, Kind};
 use job_queue::jetstream::{BEAT, Depth, Node, Role as NodeRole};
-use job_queue::{FORMAT, OLDEST_FORMAT, Order, QueueError};
-
-use relief_api::JobId;
+use job_queue::{FORMAT, OLDEST_FORMAT, Order, QueueError, Standing};
+use relief_api::{JobId, JobState};
 
 use super::Fleet;
-use super::order::{Answer, Delivered};
+use super::order::{Answer, Delivered, turn};
 use crate::ids::now;
 use crate::service::{Service, lock};
 
 /// How often what nobody needs is looked for in the depot, unless it is to stay there for less.
 const SWEEP: Duration = Duration::from_secs(10 * 60);
+
+/// How long what does not work is left alone.
+const PAUSE: Duration = Duration::from_secs(2);
 
 /// Most jobs of this service elsewhere at a time, however many workers there are.
 const MOST_HANDED_OVER: usize = 64;
@@ -69,16 +71,17 @@ pub(super) fn beat(service: &Arc<Service>, fleet: &Arc<Fleet>) {
             fleet.look_if_older(next_look);
         }
         if fleet.has_left.swap(false, Ordering::Relaxed)
-            && let Err(error) = fleet.remove_journals()
+            && let Err(error) = fleet.clear_up(service)
         {
-            tracing::debug!(%error, "journals that nobody needs are removed later");
+            tracing::debug!(%error, "what nobody needs on the servers is cleared up later");
             fleet.has_left.store(true, Ordering::Relaxed);
+            service.wait_for_stop(PAUSE);
         }
         // A worker may just be about to name it.
         let grace = Duration::from_secs(fleet.config.unneeded_s.into());
         if swept.elapsed() >= SWEEP.min(grace) {
             swept = Instant::now();
-            fleet.sweep(grace);
+            fleet.sweep(service, grace);
         }
     }
     if fleet.queue.is_connected() {
@@ -122,10 +125,9 @@ impl Fleet {
         }
     }
 
-    /// What is seen of the others, or was lately.
-    pub(super) fn seen(&self) -> Seen {
+    /// Looks for whoever asks, unless it has just done so.
+    pub(super) fn look(&self) {
         self.look_if_older(FRESH);
-        lock(&self.seen).clone()
     }
 
     /// Most jobs of this service elsewhere at a time: half as many again as there are workers for
@@ -151,8 +153,8 @@ impl Fleet {
         share.clamp(HANDED_OVER, MOST_HANDED_OVER)
     }
 
-    /// Takes back what is left of an order that is over.
-    pub(super) fn clear(&self, order: &Order, delivered: Option<&Delivered>) {
+    /// Takes back what is left of an order that is over; false if that did not work now.
+    pub(super) fn clear(&self, order: &Order, delivered: Option<&Delivered>) -> bool {
         let id = order.key.job;
         let cleared = self.queue.forget(&order.key).and_then(|()| {
             if let Some(delivered) = delivered {
@@ -166,8 +168,34 @@ impl Fleet {
             chunks.retain(|chunk| !needed.contains(&chunk.object(Kind::Journal)));
             self.depot.remove(&self.bench, Kind::Journal, &chunks)
         });
-        if let Err(error) = cleared {
+        if let Err(error) = &cleared {
             tracing::debug!(job = id, %error, "what is left of a job is cleared up later");
+        }
+        cleared.is_ok()
+    }
+
+    /// Takes back orders that nobody here waits for, and removes journals that nobody needs.
+    fn clear_up(&self, service: &Service) -> Result<(), QueueError> {
+        for (key, standing) in self.queue.standings(&self.bench)? {
+            if self.is_unwanted(service, key.job, &standing) {
+                tracing::info!(job = %key, "taking back a job that is not wanted elsewhere any more");
+                self.queue.forget(&key)?;
+            }
+        }
+        self.remove_journals()
+    }
+
+    /// Whether nobody here waits for an order: its job was done here meanwhile, or is not known.
+    pub(super) fn is_unwanted(&self, service: &Service, job: JobId, standing: &Standing) -> bool {
+        if lock(&self.handed).contains_key(&job) {
+            return false;
+        }
+        match service.store.job(job) {
+            // One that waits here will be handed over, and finds it.
+            Ok(Some(job)) => job.state != JobState::Queued || standing.turn != turn(&job),
+            Ok(None) => true,
+            // Another time.
+            Err(_) => false,
         }
     }
 
@@ -199,8 +227,27 @@ impl Fleet {
         self.depot.remove(&self.bench, Kind::Journal, &chunks)
     }
 
+    /// Forgets which columns were sent of scans that came to nothing: they are aborted, or nobody
+    /// waits for their jobs.
+    fn forget_ended(&self, service: &Service) {
+        let shared: Vec<String> = lock(&self.shared).keys().cloned().collect();
+        for scan in shared {
+            let Ok(Some(record)) = service.store.scan(&scan) else {
+                continue;
+            };
+            let waits = |id: &JobId| {
+                let job = service.store.job(*id);
+                !matches!(job, Ok(Some(job)) if job.state.is_over())
+            };
+            if record.state.is_over() && !record.jobs.iter().any(waits) {
+                lock(&self.shared).remove(&scan);
+            }
+        }
+    }
+
     /// Removes what nobody needs from this bench's depot.
-    pub(super) fn sweep(&self, grace: Duration) {
+    fn sweep(&self, service: &Service, grace: Duration) {
+        self.forget_ended(service);
         let _sending = self.sending.write().unwrap_or_else(PoisonError::into_inner);
         let mut needed = self.journals_needed(None);
         let standings = match self.queue.standings(&self.bench) {

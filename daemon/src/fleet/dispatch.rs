@@ -1,6 +1,7 @@
 //! Takes jobs out of the service's own queue for as long as there is somebody for them elsewhere.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -47,8 +48,12 @@ pub(super) fn dispatch(service: &Arc<Service>, fleet: &Arc<Fleet>) {
             .name(format!("job-{id}"))
             .stack_size(STACK_BYTES)
             .spawn(move || {
-                hand_over.see_through();
+                let may_be_left = hand_over.see_through();
                 lock(&fleet_of_thread.handed).remove(&id);
+                // Not before: as long as it is on its way, nothing of it is cleared up.
+                if may_be_left {
+                    fleet_of_thread.has_left.store(true, Ordering::Relaxed);
+                }
             });
         match started {
             Ok(thread) => threads.push(thread),

@@ -3,7 +3,6 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use job_queue::{Ending, JobQueue, Order, Outcome, QueueError, Standing, Stop};
@@ -11,7 +10,8 @@ use relief_api::{Job, JobId, JobState};
 use serde_json::Value;
 
 use super::Fleet;
-use super::order::{Answer, turn};
+use super::fetch::FetchError;
+use super::order::Answer;
 use crate::error::ServiceError;
 use crate::jobs::StopFlag;
 use crate::service::Service;
@@ -37,7 +37,10 @@ enum Left {
     /// The servers are away, and it is done here.
     DoneHere,
     /// It is over, and what became of it is kept.
-    Over,
+    Over {
+        /// Nothing of it is left elsewhere.
+        is_cleared: bool,
+    },
     /// It has to be offered anew.
     Anew,
 }
@@ -56,8 +59,9 @@ impl HandOver {
         self.taken.key.job
     }
 
-    /// Sees the job to its end, or to where somebody else goes on.
-    pub(super) fn see_through(self) {
+    /// Sees the job to its end, or to where somebody else goes on; tells whether something of it may
+    /// be left elsewhere.
+    pub(super) fn see_through(&self) -> bool {
         let id = self.id();
         let mut damaged = 0;
         let left = loop {
@@ -75,17 +79,19 @@ impl HandOver {
         let queue = &self.service.queue;
         match left {
             Left::DoneHere => {
-                self.fleet.has_left.store(true, Ordering::Relaxed);
                 tracing::info!(job = id, "the NATS servers are away: a job is done here");
-                queue.end(id, &self.flag);
-                queue.add(self.taken.clone());
+                let let_go = || queue.end(id, &self.flag);
+                if let Err(error) = self.service.put_back_job(id, let_go) {
+                    // Its record is as it was, which is as good.
+                    tracing::warn!(job = id, %error, "cannot keep the record of a job");
+                    queue.end(id, &self.flag);
+                    queue.add(self.taken.clone());
+                }
             }
-            Left::Cancelled => {
-                self.fleet.has_left.store(true, Ordering::Relaxed);
-                self.end_here(&Ending::Cancelled);
-            }
-            Left::ServiceStops | Left::Over | Left::Anew => queue.end(id, &self.flag),
+            Left::Cancelled => self.end_here(&Ending::Cancelled),
+            Left::ServiceStops | Left::Over { .. } | Left::Anew => queue.end(id, &self.flag),
         }
+        !matches!(left, Left::ServiceStops | Left::Over { is_cleared: true })
     }
 
     /// Ends a job about which nobody elsewhere is to be asked.
@@ -123,11 +129,11 @@ impl HandOver {
     /// Hands it over, and follows it from there.
     fn once(&self, damaged: &mut u32) -> Result<Left, ServiceError> {
         let job = self.service.job(self.id())?;
-        // As of an earlier start of the service.
+        // Of an earlier start of the service, or its end could not be kept.
         if let Some(directory) = self.service.spool.published(&job.result)? {
             let left_out = job.left_out.clone();
             self.keep_end(&published(&directory, left_out, job.timings))?;
-            return Ok(Left::Over);
+            return Ok(Left::Over { is_cleared: false });
         }
         let order = match self.offer(&job)? {
             Ok(order) => order,
@@ -165,7 +171,7 @@ impl HandOver {
                 // The columns themselves cannot be read.
                 Err(QueueError::Records(error)) => {
                     self.end_here(&Ending::Failed { error, hint: None });
-                    return Ok(Err(Left::Over));
+                    return Ok(Err(Left::Over { is_cleared: false }));
                 }
                 Err(error) => {
                     fleet.trouble(Some(&error));
@@ -249,8 +255,8 @@ impl HandOver {
             Ending::Done { result, left_out } => (result, left_out),
             Ending::Failed { .. } | Ending::Cancelled => {
                 self.keep_end(outcome)?;
-                fleet.clear(order, None);
-                return Ok(Left::Over);
+                let is_cleared = fleet.clear(order, None);
+                return Ok(Left::Over { is_cleared });
             }
         };
         let told = |error: &dyn std::fmt::Display| format!("what a worker has made: {error}");
@@ -265,8 +271,16 @@ impl HandOver {
                     return Ok(left);
                 }
                 match fleet.fetch(&self.service, job, delivered) {
-                    Err(QueueError::Away(_)) => fleet.board.pause(LOOK),
-                    other => break other.map_err(|error| told(&error)),
+                    Err(FetchError::Queue(QueueError::Away(_))) => fleet.board.pause(LOOK),
+                    // As of a result that was made here; making it once more would not help.
+                    Err(FetchError::Spool { error, hint }) => {
+                        let hint = Some(hint);
+                        self.end_here(&Ending::Failed { error, hint });
+                        let is_cleared = fleet.clear(order, Some(delivered));
+                        return Ok(Left::Over { is_cleared });
+                    }
+                    Err(FetchError::Queue(error)) => break Err(told(&error)),
+                    Ok(directory) => break Ok(directory),
                 }
             },
             Err(error) => Err(error.clone()),
@@ -275,8 +289,8 @@ impl HandOver {
             Ok(directory) => {
                 let timings = outcome.timings.clone();
                 self.keep_end(&published(&directory, left_out.clone(), timings))?;
-                fleet.clear(order, delivered.ok().as_ref());
-                Ok(Left::Over)
+                let is_cleared = fleet.clear(order, delivered.ok().as_ref());
+                Ok(Left::Over { is_cleared })
             }
             Err(error) if *damaged < MOST_DAMAGED => {
                 *damaged += 1;
@@ -287,13 +301,14 @@ impl HandOver {
                 Ok(Left::Anew)
             }
             Err(error) => {
-                let hint = "see that the spool and the NATS servers have room, then retry the job";
+                let hint = "see in the logs of the NATS servers and of the workers what damages \
+                            results, then retry the job";
                 self.end_here(&Ending::Failed {
                     error,
                     hint: Some(hint.to_owned()),
                 });
-                fleet.clear(order, delivered.ok().as_ref());
-                Ok(Left::Over)
+                let is_cleared = fleet.clear(order, delivered.ok().as_ref());
+                Ok(Left::Over { is_cleared })
             }
         }
     }
@@ -312,9 +327,4 @@ fn published(
         },
         timings,
     }
-}
-
-/// Whether what is told of an order is of this job as it is now.
-pub(super) fn is_of(job: &Job, standing: &Standing) -> bool {
-    standing.turn == turn(job)
 }

@@ -64,7 +64,7 @@ pub(crate) struct Fleet {
     /// Held for writing by whoever removes chunks: what is just being sent may be among them, and is
     /// not sent where it is there already.
     sending: RwLock<()>,
-    /// Journals may have been left that nobody needs.
+    /// Orders or journals may have been left that nobody needs.
     has_left: AtomicBool,
     /// What does not work, as it was last told.
     trouble: Mutex<Option<String>>,

@@ -5,12 +5,10 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
-use job_queue::Standing;
 use job_queue::jetstream::News;
-use relief_api::{Event, JobId, JobState};
+use relief_api::Event;
 
 use super::Fleet;
-use super::hand_over::is_of;
 use crate::service::{Service, lock};
 
 /// How long it waits for news before it looks whether the service stops.
@@ -32,8 +30,9 @@ pub(super) fn hear(service: &Arc<Service>, fleet: &Arc<Fleet>) {
                 fleet.board.wake();
             }
             Ok(News::Standing(key, standing)) => {
-                if let Some(standing) = &standing {
-                    fleet.forget_unwanted(service, key.job, standing);
+                let unwanted = |standing| fleet.is_unwanted(service, key.job, standing);
+                if standing.as_ref().is_some_and(unwanted) {
+                    fleet.has_left.store(true, Ordering::Relaxed);
                 }
                 fleet.board.put(key.job, standing);
             }
@@ -60,30 +59,4 @@ pub(super) fn hear(service: &Arc<Service>, fleet: &Arc<Fleet>) {
         }
     }
     fleet.board.wake();
-}
-
-impl Fleet {
-    /// Takes back an order that nobody here waits for: of a job that was done here meanwhile, or is
-    /// not known.
-    fn forget_unwanted(&self, service: &Service, job: JobId, standing: &Standing) {
-        if lock(&self.handed).contains_key(&job) {
-            return;
-        }
-        let wanted = match service.store.job(job) {
-            // One that waits here will be handed over, and finds it.
-            Ok(Some(job)) => job.state == JobState::Queued && is_of(&job, standing),
-            Ok(None) => false,
-            // Another time.
-            Err(_) => true,
-        };
-        if wanted {
-            return;
-        }
-        self.has_left.store(true, Ordering::Relaxed);
-        let key = self.key(job);
-        tracing::info!(job = %key, "taking back a job that is not wanted elsewhere any more");
-        if let Err(error) = self.queue.forget(&key) {
-            tracing::debug!(job = %key, %error, "cannot take back a job; it is tried again");
-        }
-    }
 }

@@ -159,7 +159,7 @@ impl Hand<'_> {
                     // made again.
                     tracing::error!(job = %key, %error, "cannot keep what became of a job; trying again");
                     self.pulse.rest();
-                    if (self.is_to_stop)(RETRY) {
+                    if (self.is_to_stop)(RETRY) || lease.stop() == Some(Stop::Lost) {
                         return;
                     }
                     self.pulse.work(LONGEST_SILENCE);
