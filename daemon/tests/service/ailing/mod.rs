@@ -1,7 +1,7 @@
 //! Disks that are full, read-only or broken, and records that are damaged.
 
 mod damage;
-mod disk;
+pub(crate) mod disk;
 mod room;
 
 use std::sync::Arc;

@@ -1,6 +1,7 @@
 //! Jobs that are done elsewhere, by way of a NATS server.
 
 mod server;
+mod trouble;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,6 +16,7 @@ use reliefd::{BareWorker, Config, WorkerOptions};
 use serde_json::json;
 use tempfile::TempDir;
 
+use crate::client::Events;
 use crate::fake::COLUMNS;
 use crate::rig::{GUARD, Rig, ended, job_over};
 use server::Nats;
@@ -35,6 +37,16 @@ fn acquires(nats: &Nats) -> impl Fn(&mut Config) + use<> {
         config.nats.bench = Some(bench("bench-1"));
         config.nats.silence_ms = Some(SILENCE_MS);
         config.nats.compute_when_away = false;
+    }
+}
+
+/// One that does its jobs as soon as the server is away.
+fn may_do_its_own(nats: &Nats) -> impl Fn(&mut Config) + use<> {
+    let own = acquires(nats);
+    move |config: &mut Config| {
+        own(config);
+        config.nats.compute_when_away = true;
+        config.nats.away_s = 0;
     }
 }
 
@@ -155,6 +167,21 @@ fn files(directory: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     files
 }
 
+/// A job that takes long, once a worker is in its midst.
+async fn begun_slow(rig: &Rig, events: &mut Events, scan: &str) -> Job {
+    let slow = Rerun {
+        settings: [("regrid.draws".to_owned(), json!(100_000))].into(),
+        ..Rerun::default()
+    };
+    let slow: Job = rig.client.post(&path::scan_rerun(scan), &slow).await;
+    let at_it = |event: &Event| match event {
+        Event::Progress { job, stage, .. } if *job == slow.id && stage == "regrid" => Some(()),
+        _ => None,
+    };
+    events.until(at_it).await;
+    slow
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_job_is_done_elsewhere_and_its_result_comes_home() {
     let Some(nats) = Nats::started() else { return };
@@ -247,13 +274,7 @@ async fn a_scan_goes_on_without_the_server_and_is_handed_over_when_it_is_back() 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_cannot_go_elsewhere_is_done_here_if_it_may() {
     let Some(mut nats) = Nats::new() else { return };
-    let own = acquires(&nats);
-    let change = move |config: &mut Config| {
-        own(config);
-        config.nats.compute_when_away = true;
-        config.nats.away_s = 0;
-    };
-    let rig = Rig::start(tempfile::tempdir().unwrap(), change).await;
+    let rig = Rig::start(tempfile::tempdir().unwrap(), may_do_its_own(&nats)).await;
     let (_, done) = rig.scan_to_result("part").await;
     assert_eq!((done.state, done.worker), (JobState::Done, None));
     nats.start();
@@ -267,13 +288,7 @@ async fn what_was_handed_over_and_then_done_here_is_taken_back() {
     let Some(mut nats) = Nats::started() else {
         return;
     };
-    let own = acquires(&nats);
-    let change = move |config: &mut Config| {
-        own(config);
-        config.nats.compute_when_away = true;
-        config.nats.away_s = 0;
-    };
-    let rig = Rig::start(tempfile::tempdir().unwrap(), change).await;
+    let rig = Rig::start(tempfile::tempdir().unwrap(), may_do_its_own(&nats)).await;
     let mut events = rig.client.events().await;
     let scan = rig.start_scan("part").await;
     ended(&mut events, &scan.id).await;
@@ -308,16 +323,7 @@ async fn jobs_elsewhere_are_cancelled_and_retried_as_here() {
     all_is_cleared(&nats).await;
 
     let worker = Hired::new(&nats, "hand-1");
-    let slow = Rerun {
-        settings: [("regrid.draws".to_owned(), json!(100_000))].into(),
-        ..Rerun::default()
-    };
-    let slow: Job = rig.client.post(&path::scan_rerun(&scan.id), &slow).await;
-    let at_it = |event: &Event| match event {
-        Event::Progress { job, stage, .. } if *job == slow.id && stage == "regrid" => Some(()),
-        _ => None,
-    };
-    events.until(at_it).await;
+    let slow = begun_slow(&rig, &mut events, &scan.id).await;
     let _: Job = rig.client.ask(&path::job_cancel(slow.id)).await;
     let over = job_over(&mut events, &rig, slow.id).await;
     assert_eq!((over.state, over.attempts), (JobState::Cancelled, 1));
