@@ -4,6 +4,7 @@
 //! ```sh
 //! cargo xtask study fleet                       # 200 jobs, four workers, three servers
 //! cargo xtask study fleet --speed               # one worker against two
+//! cargo xtask study fleet --cost                # what the queue costs by itself
 //! ```
 //!
 //! Needs `nats-server`. A bench takes scans, and does their jobs itself; then each scan is
@@ -13,6 +14,7 @@
 
 mod bench;
 mod cluster;
+mod cost;
 mod speed;
 mod trouble;
 mod workers;
@@ -63,6 +65,9 @@ struct Options {
     /// Measure how much faster two workers are than one, with nothing in their way
     #[arg(long)]
     speed: bool,
+    /// Measure what the queue and its object store cost, with jobs that do nothing
+    #[arg(long, conflicts_with = "speed")]
+    cost: bool,
     /// Folder of reliefd and relief; that of this program if not given
     #[arg(long, value_name = "DIR")]
     programs: Option<PathBuf>,
@@ -77,6 +82,8 @@ fn main() -> ExitCode {
             .build()?;
         if options.speed {
             runtime.block_on(speed::measure(&options))
+        } else if options.cost {
+            runtime.block_on(cost::measure())
         } else {
             runtime.block_on(run(&options))
         }

@@ -10,7 +10,6 @@
 
 mod bench;
 mod cluster;
-mod cost;
 mod depot;
 mod jetstream;
 mod link;
