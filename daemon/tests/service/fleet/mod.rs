@@ -289,6 +289,11 @@ async fn what_was_handed_over_and_then_done_here_is_taken_back() {
         return;
     };
     let rig = Rig::start(tempfile::tempdir().unwrap(), may_do_its_own(&nats)).await;
+    until("the server reached", async || {
+        let fleet: Fleet = rig.client.get(path::FLEET).await;
+        fleet.is_connected.then_some(())
+    })
+    .await;
     let mut events = rig.client.events().await;
     let scan = rig.start_scan("part").await;
     ended(&mut events, &scan.id).await;

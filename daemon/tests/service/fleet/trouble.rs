@@ -16,6 +16,7 @@ async fn a_worker_that_is_stopped_gives_its_job_back() {
     let mut events = rig.client.events().await;
     let first = Hired::new(&nats, "hand-1");
     let scan = rig.start_scan("part").await;
+    ended(&mut events, &scan.id).await;
     assert_eq!(job_over(&mut events, &rig, 1).await.state, JobState::Done);
     let slow = begun_slow(&rig, &mut events, &scan.id).await;
     // It does not wait for the job's end, which is far.
@@ -61,6 +62,7 @@ async fn a_bench_that_lost_its_records_takes_no_other_result_for_its_own() {
     let rig = Rig::start(folder, acquires(&nats)).await;
     let mut events = rig.client.events().await;
     let scan = rig.start_scan("new").await;
+    ended(&mut events, &scan.id).await;
     let worker = Hired::new(&nats, "hand-1");
     let done = job_over(&mut events, &rig, 1).await;
     assert_eq!((done.state, done.scan), (JobState::Done, scan.id));
