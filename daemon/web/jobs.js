@@ -86,7 +86,7 @@ function jobRow(changed) {
     text(title, job.name);
     state.update(job.state);
     const settings = Object.entries(job.settings ?? {}).map(([name, value]) => `${name} = ${JSON.stringify(value)}`);
-    text(about, [t('jobs.number', { id: job.id }), when(job.queued_at, app.words.language), job.scanner,
+    text(about, [t('jobs.number', { id: job.id }), when(job.queued_at, app.words.language), job.scanner, job.worker ? t('jobs.worker', { name: job.worker }) : '',
       job.attempts > 1 ? t('jobs.attempts', { count: job.attempts }) : '',
       job.acknowledged_at ? t('jobs.acknowledged', { by: job.acknowledged_by ?? '?', at: when(job.acknowledged_at, app.words.language) }) : '', ...settings].filter(Boolean).join(' \u00b7 '));
     fill(error, fault(job.error, job.hint), (job.left_out ?? []).map((/** @type {string} */ words) => english(h('p', { class: 'remark' }, words))));

@@ -5,6 +5,7 @@ import { at, get, post, token } from './api.js';
 import { app, english, on, t, word } from './app.js';
 import { during, note, trouble } from './dialogs.js';
 import { fill, h, icon } from './dom.js';
+import { fleetPanel } from './fleet.js';
 import { bytes, when } from './format.js';
 import { chip, facts, fault, progress } from './parts.js';
 
@@ -16,8 +17,9 @@ export function openRoom() {
   const doers = h('div', null, h('p', { class: 'dim' }, t('list.asking')));
   const log = h('div', null, h('p', { class: 'dim' }, t('list.asking')));
   const panel = (/** @type {string} */ key, /** @type {Element} */ content, wide = false) => h('section', { class: wide ? 'panel wide' : 'panel', 'aria-label': t(key) }, h('h2', null, t(key)), content);
+  const fleet = fleetPanel();
   const element = h('div', { class: 'view' }, h('h1', null, t('nav.room')),
-    h('div', { class: 'room' }, panel('room.service', service), panel('room.storage', storage), panel('room.scanners', scanners), panel('room.webhooks', hooks, true), panel('room.doers', doers, true), panel('room.laser', log, true)));
+    h('div', { class: 'room' }, panel('room.service', service), panel('room.storage', storage), panel('room.scanners', scanners), fleet.element, panel('room.webhooks', hooks, true), panel('room.doers', doers, true), panel('room.laser', log, true)));
 
   let shown = '';
   const update = () => {
@@ -73,6 +75,7 @@ export function openRoom() {
     loadHooks();
     loadDoers();
     loadLog();
+    fleet.load();
   };
   const offs = [on('change', update), on('connection', update), on('again', load), on('event', (event) => {
     if (event.kind === 'laser') loadLog();
@@ -83,6 +86,7 @@ export function openRoom() {
   return {
     element,
     close: () => {
+      fleet.close();
       for (const off of offs) off();
     },
   };

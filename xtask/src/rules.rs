@@ -103,6 +103,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("relief-tests", &EVERYTHING),
     ("relief-studies", &STUDIES),
     ("relief-test-libraries", &["job-queue"]),
+    ("nats-child", &[]),
     (
         "relief-benches",
         &[
@@ -230,10 +231,11 @@ const EVERYTHING: [&str; 15] = [
     "storage",
 ];
 
-const STUDIES: [&str; 19] = [
+const STUDIES: [&str; 20] = [
     "cad-exchange",
     "deliverables",
     "job-queue",
+    "nats-child",
     "nurbs",
     "pipeline",
     "range-image",

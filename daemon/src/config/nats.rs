@@ -25,6 +25,12 @@ pub struct NatsConfig {
     pub token_file: Option<PathBuf>,
     /// File with the seed of an nkey.
     pub nkey_file: Option<PathBuf>,
+    /// File with the credentials of a user (`.creds`): a JWT and the seed of its nkey.
+    pub credentials_file: Option<PathBuf>,
+    /// File with the certificate by which the servers know this client, for tls.
+    pub certificate_file: Option<PathBuf>,
+    /// File with the key of that certificate.
+    pub key_file: Option<PathBuf>,
     /// File with the certificates of the authorities that are trusted; without it, those that the
     /// machine trusts.
     pub ca_file: Option<PathBuf>,
@@ -74,6 +80,9 @@ impl Default for NatsConfig {
             bench: None,
             token_file: None,
             nkey_file: None,
+            credentials_file: None,
+            certificate_file: None,
+            key_file: None,
             ca_file: None,
             prefix: "relief".to_owned(),
             replicas: 1,
@@ -120,31 +129,46 @@ impl NatsConfig {
         check_prefix(&self.prefix)?;
         check_tools(&self.needs)?;
         check_tools(&self.tools)?;
-        if self.token_file.is_some() && self.nkey_file.is_some() {
-            return Err(
-                "`token_file` and `nkey_file` are two ways to say the same: one of them is \
-                        enough"
-                    .to_owned(),
-            );
-        }
-        for (key, file) in [
+        self.check_files()
+    }
+
+    /// What is refused of the files that are named, whatever is in them.
+    fn check_files(&self) -> Result<(), String> {
+        let logins = [
             ("token_file", &self.token_file),
             ("nkey_file", &self.nkey_file),
+            ("credentials_file", &self.credentials_file),
+        ];
+        let for_tls = [
+            ("certificate_file", &self.certificate_file),
+            ("key_file", &self.key_file),
             ("ca_file", &self.ca_file),
-        ] {
-            if file.is_some() && !self.is_used() {
-                return Err(format!("`{key}` is for `servers`: name one, or remove it"));
-            }
+        ];
+        let mut named = logins.iter().filter(|(_, file)| file.is_some());
+        if let (Some((one, _)), Some((other, _))) = (named.next(), named.next()) {
+            return Err(format!(
+                "`{one}` and `{other}` are two ways to say who this is: one of them is enough"
+            ));
+        }
+        let unused = |(_, file): &&(&str, &Option<PathBuf>)| file.is_some() && !self.is_used();
+        if let Some((key, _)) = logins.iter().chain(&for_tls).find(unused) {
+            return Err(format!("`{key}` is for `servers`: name one, or remove it"));
         }
         let is_secure = |server: &String| server.starts_with("tls:");
-        if self.ca_file.is_some() && !self.servers.iter().all(is_secure) {
-            return Err(
-                "`ca_file` is for tls, but not all `servers` are: remove it, or change the \
-                        addresses"
-                    .to_owned(),
-            );
+        let is_secure = self.servers.iter().all(is_secure);
+        if let Some((key, _)) = for_tls
+            .iter()
+            .find(|(_, file)| file.is_some() && !is_secure)
+        {
+            return Err(format!(
+                "`{key}` is for tls, but not all `servers` are: remove it, or change the addresses"
+            ));
         }
-        Ok(())
+        match (&self.certificate_file, &self.key_file) {
+            (Some(_), None) => Err("`certificate_file` needs the `key_file` of its key".into()),
+            (None, Some(_)) => Err("`key_file` needs its `certificate_file`".into()),
+            (Some(_), Some(_)) | (None, None) => Ok(()),
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use rustls::pki_types::CertificateDer;
 use rustls::pki_types::pem::PemObject;
 
 /// A file with more is no file with a secret.
-const MOST_SECRET_BYTES: u64 = 4096;
+const MOST_SECRET_BYTES: u64 = 65_536;
 /// A file with more is no file of certificates.
 const MOST_CA_BYTES: u64 = 1 << 20;
 
@@ -48,7 +48,7 @@ pub(crate) fn read_secret(key: &'static str, what: &str, path: &Path) -> Result<
         return Err(failed(format!("{shown} is no file")));
     }
     let mode = metadata.permissions().mode();
-    if mode & 0o077 != 0 {
+    if mode & others(path) != 0 {
         return Err(failed(format!(
             "the {what} in {shown} may be used by others (mode {:04o}): chmod 600 {shown}, and if \
              others could have read it, make another one",
@@ -60,6 +60,17 @@ pub(crate) fn read_secret(key: &'static str, what: &str, path: &Path) -> Result<
         .and_then(|file| file.take(MOST_SECRET_BYTES).read_to_string(&mut text))
         .map_err(refused)?;
     Ok(text)
+}
+
+/// What of a secret's mode lets in others. systemd keeps credentials for one service in a folder that
+/// it alone may enter, where the mask of an ACL shows as what the group may do.
+fn others(path: &Path) -> u32 {
+    let folder = std::env::var_os("CREDENTIALS_DIRECTORY");
+    if folder.is_some_and(|folder| !folder.is_empty() && path.starts_with(folder)) {
+        0o037
+    } else {
+        0o077
+    }
 }
 
 /// Reads the password of a `password_file`; the end of its line is no part of it.
@@ -79,19 +90,24 @@ pub(super) fn read_password(path: &Path) -> Result<String, FileError> {
     Ok(password.to_owned())
 }
 
+/// The certificates of authorities in a file.
+pub(crate) fn authorities_in(path: &Path) -> Result<Vec<CertificateDer<'static>>, FileError> {
+    certificates_in("ca_file", path)
+}
+
 /// The certificates in a file.
-pub(super) fn authorities_in(path: &Path) -> Result<Vec<CertificateDer<'static>>, FileError> {
-    let failed = |message: String| FileError {
-        key: "ca_file",
-        message,
-    };
+pub(crate) fn certificates_in(
+    key: &'static str,
+    path: &Path,
+) -> Result<Vec<CertificateDer<'static>>, FileError> {
+    let failed = |message: String| FileError { key, message };
     let shown = path.display();
     let unread =
         |error: io::Error| failed(format!("cannot read the certificates in {shown}: {error}"));
     // Before it is opened: a pipe might keep whoever does so.
     if !fs::metadata(path).map_err(unread)?.is_file() {
         return Err(failed(format!(
-            "{shown} is no file: name one with the certificate of the authority"
+            "{shown} is no file: name one with certificates (PEM)"
         )));
     }
     let mut text = Vec::new();
@@ -103,8 +119,7 @@ pub(super) fn authorities_in(path: &Path) -> Result<Vec<CertificateDer<'static>>
         .map_err(|error| failed(format!("{shown} holds no PEM certificates: {error}")))?;
     if found.is_empty() {
         return Err(failed(format!(
-            "{shown} holds no PEM certificate (BEGIN CERTIFICATE): name the file with that of the \
-             authority"
+            "{shown} holds no PEM certificate (BEGIN CERTIFICATE): name a file with one"
         )));
     }
     Ok(found)

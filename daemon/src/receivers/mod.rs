@@ -42,7 +42,7 @@ use crate::config::{Config, UploadConfig, UploadTo};
 use crate::service::{Service, lock};
 use crate::store::{Added, Store, StoreError};
 pub(crate) use agent::agent;
-pub(crate) use files::{FileError, read_secret};
+pub(crate) use files::{FileError, authorities_in, certificates_in, read_secret};
 pub(crate) use hook::check_command;
 pub(crate) use mail::check_files as check_mail_files;
 pub(crate) use mqtt::check_files as check_broker_files;

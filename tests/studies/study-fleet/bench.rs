@@ -10,6 +10,7 @@ use job_queue::jetstream::{JetStreamQueue, Options};
 use job_queue::{BenchName, QueueError};
 use relief_api::{Event, Job, JobList, Scan, ScanState, StartScan, path};
 use relief_tests::rig::{Client, GUARD, Program, small_house};
+use sim_scanner::config::SimConfig;
 use sim_scanner::endpoint::pty::PtyServer;
 use tokio::runtime::Handle;
 
@@ -50,9 +51,14 @@ pub(crate) struct Bench {
 }
 
 impl Bench {
-    /// One that does its jobs itself.
+    /// One before a scanner of the small house, which does its jobs itself.
     pub(crate) async fn alone(program: &Path, folder: &Path) -> Result<Self> {
-        let scanner = small_house().serve_pty(None)?;
+        Self::before(program, folder, &small_house()).await
+    }
+
+    /// One before this scanner, which does its jobs itself.
+    pub(crate) async fn before(program: &Path, folder: &Path, scanner: &SimConfig) -> Result<Self> {
+        let scanner = scanner.serve_pty(None)?;
         let mut service = Program::start(program, folder, scanner.port(), LOG)?;
         service.ready().await?;
         Ok(Self {
@@ -62,6 +68,17 @@ impl Bench {
             service: Some(service),
             published: Arc::default(),
         })
+    }
+
+    /// Starts it anew without servers: it does its jobs itself again.
+    pub(crate) async fn part(&mut self) -> Result<()> {
+        if let Some(service) = self.service.take() {
+            service.kill()?;
+        }
+        let mut service = Program::start(&self.program, &self.folder, self.scanner.port(), LOG)?;
+        service.ready().await?;
+        self.service = Some(service);
+        Ok(())
     }
 
     /// Starts it anew with servers by which all its jobs go elsewhere.

@@ -2,74 +2,31 @@
 
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
-use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
+use nats_child::{KEEPS, Server, free_port};
 use serde_json::Value;
 
-/// How long a server may take to listen.
+/// How long a cluster may take to find a leader.
 const GUARD: Duration = Duration::from_secs(60);
 /// How long a look at a server may take.
 const LOOK: Duration = Duration::from_secs(2);
 
-/// A port that nobody has now.
-fn free_port() -> Result<u16> {
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
-    Ok(listener.local_addr()?.port())
-}
-
-struct Server {
+struct Member {
     name: String,
-    config: PathBuf,
-    port: u16,
+    server: Server,
     monitor: u16,
-    child: Option<Child>,
 }
 
 /// Servers of one cluster.
 pub(crate) struct Cluster {
-    servers: Vec<Server>,
-    _folder: tempfile::TempDir,
+    members: Vec<Member>,
 }
 
-impl Drop for Cluster {
-    fn drop(&mut self) {
-        for server in &mut self.servers {
-            server.kill();
-        }
-    }
-}
-
-impl Server {
-    fn start(&mut self) -> Result<()> {
-        let child = Command::new("nats-server")
-            .arg("-c")
-            .arg(&self.config)
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .context("cannot start nats-server: install Debian's package of that name")?;
-        self.child = Some(child);
-        let begun = Instant::now();
-        while TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)).is_err() {
-            ensure!(begun.elapsed() < GUARD, "{} does not listen", self.name);
-            std::thread::sleep(Duration::from_millis(10));
-        }
-        Ok(())
-    }
-
-    fn kill(&mut self) {
-        if let Some(mut child) = self.child.take() {
-            // It may have ended by itself.
-            let _ = child.kill();
-            let _ = child.wait();
-        }
-    }
-
+impl Member {
     /// What it tells of itself.
     fn monitored(&self, path: &str) -> Result<Value> {
         let mut stream = TcpStream::connect((Ipv4Addr::LOCALHOST, self.monitor))?;
@@ -85,46 +42,35 @@ impl Server {
 impl Cluster {
     /// Starts so many servers.
     pub(crate) fn start(count: usize) -> Result<Self> {
-        let folder = tempfile::Builder::new().prefix("nats-").tempdir()?;
-        let routes: Vec<u16> = (0..count).map(|_| free_port()).collect::<Result<_>>()?;
-        let mut servers = Vec::new();
+        let routes: Vec<u16> = (0..count).map(|_| free_port()).collect::<Result<_, _>>()?;
+        let mut members = Vec::new();
         for (number, route) in routes.iter().enumerate() {
             let name = format!("n{}", number + 1);
-            let (port, monitor) = (free_port()?, free_port()?);
-            let store = folder.path().join(&name);
+            let monitor = free_port()?;
             let others: Vec<String> = routes
                 .iter()
                 .map(|other| format!("nats://127.0.0.1:{other}"))
                 .collect();
-            let mut text = format!(
-                "server_name: {name}\nlisten: \"127.0.0.1:{port}\"\nhttp: \"127.0.0.1:{monitor}\"\n\
-                 jetstream {{ store_dir: {store:?} }}\n",
-            );
+            let mut lines =
+                format!("server_name: {name}\nhttp: \"127.0.0.1:{monitor}\"\n{KEEPS}\n");
             if count > 1 {
                 // The others are not told to clients, who would find a way around a link that is cut.
-                text += &format!(
+                lines += &format!(
                     "cluster {{ name: study, listen: \"127.0.0.1:{route}\", no_advertise: true, \
                      routes: [{}] }}\n",
                     others.join(", ")
                 );
             }
-            let config = folder.path().join(format!("{name}.conf"));
-            std::fs::write(&config, text)?;
-            servers.push(Server {
+            members.push(Member {
                 name,
-                config,
-                port,
+                server: Server::new(&lines)?,
                 monitor,
-                child: None,
             });
         }
-        for server in &mut servers {
-            server.start()?;
+        for member in &members {
+            member.server.start()?;
         }
-        let cluster = Self {
-            servers,
-            _folder: folder,
-        };
+        let cluster = Self { members };
         if count > 1 {
             cluster.wait_for_leader()?;
         }
@@ -134,7 +80,7 @@ impl Cluster {
     fn wait_for_leader(&self) -> Result<()> {
         let begun = Instant::now();
         loop {
-            let answers = self.servers.iter().map(|server| server.monitored("/jsz"));
+            let answers = self.members.iter().map(|member| member.monitored("/jsz"));
             let has_leader = |answer: Result<Value>| {
                 answer.is_ok_and(|answer| answer["meta_cluster"]["leader"].is_string())
             };
@@ -148,13 +94,13 @@ impl Cluster {
 
     /// Addresses of all servers.
     pub(crate) fn ports(&self) -> Vec<u16> {
-        self.servers.iter().map(|server| server.port).collect()
+        self.members.iter().map(|one| one.server.port()).collect()
     }
 
     /// Number of the server that leads the stream of orders; the first if that cannot be told.
     pub(crate) fn leader(&self) -> usize {
-        let leads = |server: &Server| -> Option<String> {
-            let answer = server.monitored("/jsz?accounts=true&streams=true").ok()?;
+        let leads = |member: &Member| -> Option<String> {
+            let answer = member.monitored("/jsz?accounts=true&streams=true").ok()?;
             let accounts = answer["account_details"].as_array()?.clone();
             let streams = accounts
                 .iter()
@@ -166,19 +112,19 @@ impl Cluster {
             })?;
             Some(orders["cluster"]["leader"].as_str()?.to_owned())
         };
-        let told = self.servers.iter().find_map(leads);
-        told.and_then(|name| self.servers.iter().position(|one| one.name == name))
+        let told = self.members.iter().find_map(leads);
+        told.and_then(|name| self.members.iter().position(|one| one.name == name))
             .unwrap_or_default()
     }
 
     /// SIGKILL.
-    pub(crate) fn kill(&mut self, number: usize) {
-        self.servers[number].kill();
+    pub(crate) fn kill(&self, number: usize) {
+        self.members[number].server.kill();
     }
 
     /// Starts it again with what it has kept.
-    pub(crate) fn start_again(&mut self, number: usize) -> Result<()> {
-        self.servers[number].start()
+    pub(crate) fn start_again(&self, number: usize) -> Result<()> {
+        Ok(self.members[number].server.start()?)
     }
 }
 

@@ -15,6 +15,7 @@
 mod bench;
 mod cluster;
 mod cost;
+mod outage;
 mod speed;
 mod trouble;
 mod workers;
@@ -68,6 +69,9 @@ struct Options {
     /// Measure what the queue and its object store cost, with jobs that do nothing
     #[arg(long, conflicts_with = "speed")]
     cost: bool,
+    /// Measure a scan during which the servers are gone for so many seconds
+    #[arg(long, value_name = "S", conflicts_with_all = ["speed", "cost"])]
+    outage_s: Option<u32>,
     /// Folder of reliefd and relief; that of this program if not given
     #[arg(long, value_name = "DIR")]
     programs: Option<PathBuf>,
@@ -84,6 +88,9 @@ fn main() -> ExitCode {
             runtime.block_on(speed::measure(&options))
         } else if options.cost {
             runtime.block_on(cost::measure())
+        } else if let Some(seconds) = options.outage_s {
+            let outage = Duration::from_secs(seconds.into());
+            runtime.block_on(outage::measure(&options, outage))
         } else {
             runtime.block_on(run(&options))
         }

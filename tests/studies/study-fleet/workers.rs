@@ -26,6 +26,17 @@ impl Drop for Hired {
     }
 }
 
+impl Hired {
+    /// Most memory that it has had at a time, in MiB.
+    pub(crate) fn most_memory_mib(&self) -> Result<f64> {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.0.id()))?;
+        let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let words = line.context("the system does not tell of its memory")?;
+        let kib = words.trim().trim_end_matches(" kB").parse::<f64>()?;
+        Ok(kib / 1024.0)
+    }
+}
+
 impl Hire {
     /// Starts one.
     pub(crate) fn start(&self, name: &str) -> Result<Hired> {

@@ -9,7 +9,7 @@ use super::packages::release;
 use crate::{apt, shell};
 
 /// What is installed besides Debian's least.
-const INCLUDED: &str = "systemd,systemd-sysv,udev,kmod";
+const INCLUDED: &str = "systemd,systemd-sysv,udev,kmod,nats-server";
 
 /// Sparse: only what is written takes room.
 const SIZE: &str = "700M";

@@ -40,11 +40,20 @@ pub(crate) struct Args {
     #[arg(long = "tool", value_name = "NAME")]
     tools: Vec<String>,
     /// File with a token for the server
-    #[arg(long, value_name = "FILE", conflicts_with = "nkey_file")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["nkey_file", "credentials_file"])]
     token_file: Option<PathBuf>,
     /// File with the seed of an nkey for the server
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "credentials_file")]
     nkey_file: Option<PathBuf>,
+    /// File with the credentials of a user (.creds): a JWT and the seed of its nkey
+    #[arg(long, value_name = "FILE")]
+    credentials_file: Option<PathBuf>,
+    /// File with a certificate (PEM) by which the server knows this worker, for tls://
+    #[arg(long, value_name = "FILE", requires = "key_file")]
+    certificate_file: Option<PathBuf>,
+    /// File with the key (PEM) of that certificate
+    #[arg(long, value_name = "FILE", requires = "certificate_file")]
+    key_file: Option<PathBuf>,
     /// File with the certificates of the authorities that are trusted; without it, those that the
     /// machine trusts
     #[arg(long, value_name = "FILE")]
@@ -76,6 +85,9 @@ pub(crate) fn run(args: Args, json: bool) -> Result<(), Failure> {
         bench: args.name,
         token_file: args.token_file,
         nkey_file: args.nkey_file,
+        credentials_file: args.credentials_file,
+        certificate_file: args.certificate_file,
+        key_file: args.key_file,
         ca_file: args.ca_file,
         prefix: args.prefix,
         silence_s: args.silence_s,

@@ -11,7 +11,8 @@ use job_queue::{
 };
 use relief_api::JobState;
 
-use crate::server::{self, LIMIT, Server, connect, options};
+use crate::server::{self, LIMIT, connect, options};
+use nats_child::Server;
 
 pub(crate) fn key(job: u64) -> JobKey {
     JobKey {
@@ -155,15 +156,15 @@ fn more_than_the_quota_is_refused() {
 /// A server that has lost its disk is told again by benches that offer again.
 #[test]
 fn a_server_that_lost_all_is_told_again() {
-    let Some(server) = Server::start() else {
+    let Some(server) = server::start() else {
         return;
     };
     let options = options(&server.url());
     let queue = connect(&options);
     queue.offer(&order(1)).unwrap();
     server.kill();
-    server.wipe();
-    server.run();
+    server.wipe().unwrap();
+    server.start().unwrap();
     let begun = Instant::now();
     while queue.offer(&order(1)).is_err() {
         assert!(begun.elapsed() < LIMIT);
@@ -272,7 +273,7 @@ fn hear(news: &Receiver<News>, wanted: impl Fn(&News) -> bool) -> Vec<News> {
 
 #[test]
 fn a_bench_hears_what_happens_to_its_orders() {
-    let Some(server) = Server::start() else {
+    let Some(server) = server::start() else {
         return;
     };
     let options = options(&server.url());
@@ -314,7 +315,7 @@ fn a_bench_hears_what_happens_to_its_orders() {
     let away = queue.standing(&key(1)).unwrap_err();
     assert!(matches!(away, QueueError::Away(_)), "{away}");
     assert!(queue.away_since().is_some() && !queue.is_connected());
-    server.run();
+    server.start().unwrap();
     hear(&news, |news| *news == News::Connected);
     hear(&news, is(1, JobState::Done));
     let standings = queue.standings(&key(1).bench).unwrap();

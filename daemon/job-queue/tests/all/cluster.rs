@@ -10,13 +10,14 @@ use relief_api::JobState;
 
 use crate::bench::{key, order};
 use crate::link::{insist, work};
-use crate::server::{LIMIT, RUNTIME, Server, free_port, options};
+use crate::server::{self, LIMIT, RUNTIME, free_port, options};
 use job_queue::JobQueue;
+use nats_child::Server;
 
 const ORDERS: u64 = 60;
 
 fn cluster() -> Option<(Vec<Arc<Server>>, Options)> {
-    if !Server::is_there() {
+    if !nats_child::is_wanted() {
         return None;
     }
     let routes = [(); 3].map(|()| free_port());
@@ -32,7 +33,7 @@ fn cluster() -> Option<(Vec<Arc<Server>>, Options)> {
                 "server_name: s{n}\ncluster {{ name: lab, listen: \"127.0.0.1:{route}\", routes: [{}] }}",
                 all.join(", ")
             );
-            Server::on(free_port(), &lines)
+            server::on(free_port(), &lines)
         })
         .collect();
     let mut options = options("");

@@ -16,7 +16,8 @@ use job_queue::depot::{Bundle, CHUNK_BYTES, Depot, Kind, Parcel};
 use job_queue::jetstream::JetStreamQueue;
 use job_queue::{BenchName, QueueError};
 
-use crate::server::{self, RUNTIME, Server, connect, options};
+use crate::server::{self, RUNTIME, connect, options};
+use nats_child::Server;
 
 /// A bench's bucket, and a way behind the depot's back.
 struct Rig {

@@ -7,7 +7,8 @@ use job_queue::conformance::{CASES, Setting};
 use job_queue::jetstream::{JetStreamQueue, Options};
 use job_queue::{BenchName, JobKey, JobQueue, Lease};
 
-use crate::server::{self, LIMIT, Server, connect, options};
+use crate::server::{self, LIMIT, connect, options};
+use nats_child::Server;
 
 struct OnJetStream {
     server: Arc<Server>,
@@ -50,7 +51,7 @@ impl Setting for OnJetStream {
         while self.queue.is_connected() {
             std::thread::sleep(Duration::from_millis(5));
         }
-        self.server.run();
+        self.server.start().unwrap();
         self.queue.wait_connected(LIMIT).unwrap();
     }
 
@@ -68,7 +69,7 @@ impl Setting for OnJetStream {
 fn conforms(name: &str) {
     let case = CASES.iter().find(|case| case.name == name).unwrap();
     let server = if case.restarts {
-        Server::start()
+        server::start()
     } else {
         server::shared()
     };

@@ -9,16 +9,17 @@ use job_queue::{JobQueue, QueueError};
 use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, DnType, IsCa, KeyPair};
 
 use crate::bench::{done, order, take};
-use crate::server::{LIMIT, RUNTIME, Server, connect, free_port, options};
+use crate::server::{self, LIMIT, RUNTIME, connect, free_port, options};
+use nats_child::Server;
 
-fn works(options: &Options) {
+pub(crate) fn works(options: &Options) {
     let queue = connect(options);
     queue.offer(&order(1)).unwrap();
     take(&queue, "w").settle(&done()).unwrap();
 }
 
 /// Why it does not connect.
-fn refusal(options: &Options) -> QueueError {
+pub(crate) fn refusal(options: &Options) -> QueueError {
     let queue = JetStreamQueue::new(options.clone(), RUNTIME.handle().clone()).unwrap();
     let begun = Instant::now();
     loop {
@@ -35,7 +36,7 @@ fn refusal(options: &Options) -> QueueError {
 
 #[test]
 fn a_token_is_asked_for() {
-    let Some(server) = Server::configured("authorization { token: \"hunter2\" }") else {
+    let Some(server) = server::configured("authorization { token: \"hunter2\" }") else {
         return;
     };
     let mut options = options(&server.url());
@@ -61,7 +62,7 @@ fn an_nkey_is_asked_for() {
         "authorization {{ users [ {{ nkey: {} }} ] }}",
         user.public_key()
     );
-    let Some(server) = Server::configured(&lines) else {
+    let Some(server) = server::configured(&lines) else {
         return;
     };
     let mut options = options(&server.url());
@@ -74,7 +75,7 @@ fn an_nkey_is_asked_for() {
 
 /// A server with a certificate of a laboratory's authority, which asks for one of the client.
 fn with_tls() -> Option<(Arc<Server>, Options)> {
-    Server::is_there().then_some(())?;
+    nats_child::is_wanted().then_some(())?;
     let folder = tempfile::tempdir().unwrap();
     let place = |name: &str| folder.path().join(name);
     let mut params = CertificateParams::new([]).unwrap();
@@ -95,7 +96,7 @@ fn with_tls() -> Option<(Arc<Server>, Options)> {
     options.certificate = Some((place("client.pem"), place("client.key")));
     let lines = "tls { cert_file: \"FOLDER/localhost.pem\", key_file: \"FOLDER/localhost.key\", \
                  ca_file: \"FOLDER/ca.pem\", verify: true }";
-    Some((Server::in_folder(folder, port, lines), options))
+    Some((server::in_folder(folder, port, lines), options))
 }
 
 #[test]
@@ -123,7 +124,7 @@ fn tls_knows_both_sides() {
 
 #[test]
 fn nothing_goes_without_tls_where_it_is_required() {
-    let Some(server) = Server::start() else {
+    let Some(server) = server::start() else {
         return;
     };
     let mut options = options(&server.url());
@@ -144,10 +145,10 @@ fn a_server_may_come_later() {
         begun.elapsed() < Duration::from_secs(2),
         "it is said at once"
     );
-    if !Server::is_there() {
+    if !nats_child::is_wanted() {
         return;
     }
-    let _server = Server::on(port, "");
+    let _server = server::on(port, "");
     queue.wait_connected(LIMIT).unwrap();
     queue.offer(&order(1)).unwrap();
     take(&queue, "w").settle(&done()).unwrap();

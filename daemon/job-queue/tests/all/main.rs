@@ -10,6 +10,7 @@
 
 mod bench;
 mod cluster;
+mod credentials;
 mod depot;
 mod jetstream;
 mod link;

@@ -8,7 +8,8 @@ use job_queue::jetstream::{JetStreamQueue, Login, Node, Options, Role, Secret};
 use job_queue::{BenchName, JobQueue, QueueError, Worker};
 
 use crate::bench::{done, key, order};
-use crate::server::{LIMIT, Server, connect, options};
+use crate::server::{self, LIMIT, connect, options};
+use nats_child::Server;
 
 /// What each role may publish; all listen on their own inbox. `{p}` is the prefix, `{P}` the same
 /// in capitals.
@@ -124,7 +125,7 @@ fn rig() -> Option<(Arc<Server>, Options, [Arc<JetStreamQueue>; 3])> {
         user("desk", VIEWER, &["{p}.progress.>", "{p}.bell"], &prefix),
     ];
     let lines = format!("authorization {{ users [ {} ] }}", users.join(", "));
-    let server = Server::configured(&lines)?;
+    let server = server::configured(&lines)?;
     options.servers = vec![server.url()];
     let as_user = |name: &str, makes_missing| {
         let mut options = options.clone();

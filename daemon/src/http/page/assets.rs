@@ -44,6 +44,7 @@ pub(super) const ASSETS: &[Asset] = &[
     asset!("dom.js"),
     asset!("facts.js"),
     asset!("feed.js"),
+    asset!("fleet.js"),
     asset!("format.js"),
     asset!("glb.js"),
     asset!("i18n.js"),

@@ -1,5 +1,6 @@
 //! What a configuration is refused for, and what holds without one.
 
+mod fleet;
 mod reload;
 mod scanners;
 
@@ -328,70 +329,6 @@ fn in_force(path: &Path) -> Config {
 }
 
 #[test]
-fn faults_of_roles_and_servers_are_told_with_a_way_out() {
-    let server = "[nats]\nservers = [\"nats://10.0.0.5:4222\"]\n";
-    for roles in [
-        "\"acquire\", \"serve\"",
-        "\"work\"",
-        "\"work\", \"serve\"",
-        "\"serve\"",
-    ] {
-        let text = format!("[service]\nroles = [{roles}]\n{server}");
-        assert!(
-            Config::parse(&text, Path::new("relief.toml")).is_ok(),
-            "{text}"
-        );
-    }
-    for (text, told) in [
-        (
-            "[service]\nroles = []\n",
-            "without a role there is nothing to do",
-        ),
-        ("[service]\nroles = [\"wrok\"]\n", "did you mean `work`"),
-        (
-            "[service]\nroles = [\"acquire\", \"work\"]\n",
-            "the role \"acquire\" needs \"serve\"",
-        ),
-        (
-            "[service]\nroles = [\"acquire\", \"serve\"]\n",
-            "without the role \"work\" nobody works on jobs",
-        ),
-        (
-            "[service]\nroles = [\"work\"]\n",
-            "the role \"work\" alone is for jobs of others",
-        ),
-        (
-            "[nats]\nservers = [\"http://a\"]\n",
-            "addresses of servers such as",
-        ),
-        (
-            "[nats]\nservers = [\"nats://a:hunter2@b\"]\n",
-            "holds a name or password",
-        ),
-        ("[nats]\nbench = \"a b\"\n", "`a b` is no name"),
-        ("[nats]\nprefix = \"A\"\n", "\"A\" is no prefix"),
-        ("[nats]\nreplicas = 2\n", "1, 3 or 5 are"),
-        (
-            "[nats]\ntools = [\"a-b\"]\n",
-            "\"a-b\" is no name of a tool",
-        ),
-        ("[nats]\nsilence_s = 1\n", "2 to 3600 are"),
-        (
-            "[nats]\ntoken_file = \"t\"\n",
-            "`token_file` is for `servers`",
-        ),
-    ] {
-        let error = refused(text);
-        assert!(error.contains(told), "{text}: {error}");
-        assert!(!error.contains("hunter2"), "{error}");
-    }
-    let both = format!("{server}token_file = \"t\"\nnkey_file = \"n\"\n");
-    assert!(refused(&both).contains("one of them is enough"));
-    let plain = format!("{server}ca_file = \"c\"\n");
-    assert!(refused(&plain).contains("`ca_file` is for tls"));
-}
-
-#[test]
 fn the_examples_are_sound_and_show_the_defaults() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
     let serial = Config::load(&folder.join("serial.toml")).unwrap();
@@ -453,6 +390,8 @@ fn the_examples_are_sound_and_show_the_defaults() {
         servers: vec!["tls://nats.lab.example:4222".into()],
         bench: Some("bench-7".to_owned().try_into().unwrap()),
         token_file: Some("/etc/relief/nats.token".into()),
+        certificate_file: Some("/etc/relief/nats.pem".into()),
+        key_file: Some("/etc/relief/nats.key".into()),
         ca_file: Some("/etc/relief/ca.pem".into()),
         hand_over: Some(8),
         needs: ["gpu".to_owned()].into(),

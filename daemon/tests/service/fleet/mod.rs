@@ -1,5 +1,6 @@
 //! Jobs that are done elsewhere, by way of a NATS server.
 
+mod login;
 mod server;
 mod trouble;
 
@@ -40,13 +41,13 @@ fn acquires(nats: &Nats) -> impl Fn(&mut Config) + use<> {
     }
 }
 
-/// One that does its jobs as soon as the server is away.
+/// One that does its jobs as soon as the server is away, and not only for a moment.
 fn may_do_its_own(nats: &Nats) -> impl Fn(&mut Config) + use<> {
     let own = acquires(nats);
     move |config: &mut Config| {
         own(config);
         config.nats.compute_when_away = true;
-        config.nats.away_s = 0;
+        config.nats.away_s = 1;
     }
 }
 
@@ -63,14 +64,20 @@ struct Hired {
 
 impl Hired {
     fn new(nats: &Nats, name: &str) -> Self {
+        Self::with(nats, name, |_| {})
+    }
+
+    fn with(nats: &Nats, name: &str, more: impl FnOnce(&mut NatsConfig)) -> Self {
         let folder = tempfile::tempdir().unwrap();
+        let mut config = NatsConfig {
+            servers: vec![nats.url()],
+            bench: Some(bench(name)),
+            silence_ms: Some(SILENCE_MS),
+            ..NatsConfig::default()
+        };
+        more(&mut config);
         let options = WorkerOptions {
-            nats: NatsConfig {
-                servers: vec![nats.url()],
-                bench: Some(bench(name)),
-                silence_ms: Some(SILENCE_MS),
-                ..NatsConfig::default()
-            },
+            nats: config,
             workers: 1,
             threads: 1,
             folder: folder.path().to_owned(),
@@ -242,7 +249,7 @@ async fn a_job_is_done_elsewhere_and_its_result_comes_home() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_scan_goes_on_without_the_server_and_is_handed_over_when_it_is_back() {
-    let Some(mut nats) = Nats::started() else {
+    let Some(nats) = Nats::started() else {
         return;
     };
     let rig = rig(&nats).await;
@@ -273,7 +280,7 @@ async fn a_scan_goes_on_without_the_server_and_is_handed_over_when_it_is_back() 
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_cannot_go_elsewhere_is_done_here_if_it_may() {
-    let Some(mut nats) = Nats::new() else { return };
+    let Some(nats) = Nats::new() else { return };
     let rig = Rig::start(tempfile::tempdir().unwrap(), may_do_its_own(&nats)).await;
     let (_, done) = rig.scan_to_result("part").await;
     assert_eq!((done.state, done.worker), (JobState::Done, None));
@@ -285,7 +292,7 @@ async fn what_cannot_go_elsewhere_is_done_here_if_it_may() {
 /// An order that stands on the server when the server goes, and is done here meanwhile.
 #[tokio::test(flavor = "multi_thread")]
 async fn what_was_handed_over_and_then_done_here_is_taken_back() {
-    let Some(mut nats) = Nats::started() else {
+    let Some(nats) = Nats::started() else {
         return;
     };
     let rig = Rig::start(tempfile::tempdir().unwrap(), may_do_its_own(&nats)).await;
@@ -299,6 +306,8 @@ async fn what_was_handed_over_and_then_done_here_is_taken_back() {
     ended(&mut events, &scan.id).await;
     let watcher = queue(&nats).await;
     until("the order on the server", async || {
+        let still = job(&rig, 1).await;
+        assert_eq!(still.state, JobState::Queued, "{still:?}");
         let watcher = Arc::clone(&watcher);
         let count = blocking(move || watcher.standings(&bench("bench-1")).unwrap().len());
         (count.await == 1).then_some(())

@@ -1,90 +1,78 @@
-//! Debian's `nats-server`, as a child that comes and goes.
+//! NATS servers of the tests.
 
-use std::net::{Ipv4Addr, TcpListener, TcpStream};
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::path::{Path, PathBuf};
 
-use crate::rig::GUARD;
+use nats_child::{KEEPS, Server, free_port, is_wanted};
 
 /// A NATS server on a port and in a folder of its own.
 pub(super) struct Nats {
-    folder: tempfile::TempDir,
-    port: u16,
-    child: Option<Child>,
-}
-
-impl Drop for Nats {
-    fn drop(&mut self) {
-        self.stop();
-    }
+    server: Server,
+    scheme: &'static str,
 }
 
 impl Nats {
+    fn with(server: Server, scheme: &'static str) -> Self {
+        Self { server, scheme }
+    }
+
     /// One that is not started yet. None where there is no nats-server, unless there has to be one.
     pub(super) fn new() -> Option<Self> {
-        let found = Command::new("nats-server")
-            .arg("--version")
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .status()
-            .is_ok();
-        assert!(
-            found || std::env::var_os("RELIEF_NEEDS_NATS").is_none(),
-            "nats-server is missing"
-        );
-        if !found {
-            println!("skipped: no nats-server");
-            return None;
-        }
-        // Whoever else is given the port meanwhile has the test fail, and nothing else.
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
-        Some(Self {
-            folder: tempfile::tempdir().unwrap(),
-            port: listener.local_addr().unwrap().port(),
-            child: None,
-        })
+        is_wanted().then(|| Self::with(Server::new(KEEPS).unwrap(), "nats"))
     }
 
     /// One that runs.
     pub(super) fn started() -> Option<Self> {
-        let mut server = Self::new()?;
+        let server = Self::new()?;
         server.start();
         Some(server)
     }
 
-    /// Starts it with what it has kept, and waits until it listens.
-    pub(super) fn start(&mut self) {
-        let child = Command::new("nats-server")
-            .args([
-                "-a",
-                "127.0.0.1",
-                "-p",
-                &self.port.to_string(),
-                "-js",
-                "-sd",
-            ])
-            .arg(self.folder.path())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        self.child = Some(child);
-        let begun = Instant::now();
-        while TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)).is_err() {
-            assert!(begun.elapsed() < GUARD, "nats-server does not listen");
-            std::thread::sleep(Duration::from_millis(5));
+    /// One that asks those who come for more than the address; its certificate and theirs are in its
+    /// folder, where `make` puts them.
+    pub(super) fn secured(lines: &str, make: impl FnOnce(&Path)) -> Option<Self> {
+        if !is_wanted() {
+            return None;
         }
+        let folder = tempfile::tempdir().unwrap();
+        make(folder.path());
+        let lines = format!("{KEEPS}\n{lines}");
+        let server = Server::in_folder(folder, free_port().unwrap(), &lines).unwrap();
+        server.start().unwrap();
+        Some(Self::with(server, "tls"))
+    }
+
+    /// One that leads to another, which keeps everything, and the other.
+    pub(super) fn leaf() -> Option<(Self, Self)> {
+        if !is_wanted() {
+            return None;
+        }
+        let port = free_port().unwrap();
+        let hub = format!("{KEEPS}\nleafnodes {{ listen: \"127.0.0.1:{port}\" }}");
+        let leaf = format!("leafnodes {{ remotes: [{{ url: \"nats://127.0.0.1:{port}\" }}] }}");
+        let [hub, leaf] = [hub, leaf].map(|lines| {
+            let server = Server::new(&lines).unwrap();
+            server.start().unwrap();
+            Self::with(server, "nats")
+        });
+        Some((leaf, hub))
+    }
+
+    /// A file in its folder.
+    pub(super) fn file(&self, name: &str) -> PathBuf {
+        self.server.file(name)
+    }
+
+    /// Starts it with what it has kept, and waits until it listens.
+    pub(super) fn start(&self) {
+        self.server.start().unwrap();
     }
 
     /// Kills it, without a chance to put anything in order.
-    pub(super) fn stop(&mut self) {
-        if let Some(mut child) = self.child.take() {
-            let _ = child.kill();
-            child.wait().unwrap();
-        }
+    pub(super) fn stop(&self) {
+        self.server.kill();
     }
 
     pub(super) fn url(&self) -> String {
-        format!("nats://127.0.0.1:{}", self.port)
+        self.server.url().replacen("nats", self.scheme, 1)
     }
 }

@@ -117,3 +117,26 @@ async fn why_no_server_is_reached_is_told() {
     assert!(told.contains(&nats.url()), "{told}");
     rig.daemon.shutdown().await;
 }
+
+/// The bench's own server keeps nothing: what has to wait waits in the bench's records.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_leaf_at_the_bench_may_come_and_go() {
+    let Some((leaf, hub)) = Nats::leaf() else {
+        return;
+    };
+    let worker = Hired::new(&hub, "hand-1");
+    let rig = rig(&leaf).await;
+    let mut events = rig.client.events().await;
+    rig.start_scan("first").await;
+    assert_eq!(job_over(&mut events, &rig, 1).await.state, JobState::Done);
+    leaf.stop();
+    let scan = rig.start_scan("second").await;
+    ended(&mut events, &scan.id).await;
+    assert_eq!(job(&rig, 2).await.state, JobState::Queued);
+    leaf.start();
+    let done = job_over(&mut events, &rig, 2).await;
+    assert_eq!((done.state, done.attempts), (JobState::Done, 1));
+    assert_eq!(worker.dismiss(), 2);
+    all_is_cleared(&hub).await;
+    rig.daemon.shutdown().await;
+}

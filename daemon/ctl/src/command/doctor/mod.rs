@@ -6,6 +6,7 @@ mod machine;
 mod port;
 mod reach;
 mod rules;
+mod servers;
 mod usb;
 
 use std::path::{Path, PathBuf};
@@ -24,7 +25,8 @@ use finding::{Finding, Grade};
 ///
 /// Checks the configuration, each scanner's port or USB device (there, permitted, not held by
 /// somebody else), the udev rules, programs that disturb serial ports, the folders and their
-/// disk, the clock, and whether the service answers; lists the serial ports and USB scanners
+/// disk, the clock, whether the service answers, and whether it reaches the NATS servers that it is
+/// to use; lists the serial ports and USB scanners
 /// that are there. Changes nothing.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
@@ -109,7 +111,9 @@ pub(crate) async fn run(args: Args, json: bool) -> Result<(), Failure> {
         reserve_bytes,
     ));
     findings.push(machine::clock());
-    findings.push(reach::check(args.endpoint.endpoint()?).await);
+    let endpoint = args.endpoint.endpoint()?;
+    findings.push(reach::check(endpoint.clone()).await);
+    findings.extend(servers::check(endpoint, &config.nats).await);
 
     let bad = findings
         .iter()

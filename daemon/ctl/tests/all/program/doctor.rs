@@ -24,7 +24,8 @@ fn the_doctor_names_every_trouble_and_its_remedy() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
     let config = format!(
-        "[service]\nstate_dir = {:?}\nspool_dir = {:?}\n[scanner]\nport = {:?}\n",
+        "[service]\nstate_dir = {:?}\nspool_dir = {:?}\n[scanner]\nport = {:?}\n\
+         [nats]\nservers = [\"nats://127.0.0.1:1\"]\n",
         at,
         at.join("no-spool"),
         at.join("no-port")
@@ -61,7 +62,7 @@ fn the_doctor_names_every_trouble_and_its_remedy() {
     };
     assert_eq!(graded("configuration"), "good");
     assert_ne!(graded("kept scans"), "bad");
-    for check in ["scanner port", "spool", "service"] {
+    for check in ["scanner port", "spool", "service", "NATS servers"] {
         assert_eq!(graded(check), "bad", "{check}");
     }
 }

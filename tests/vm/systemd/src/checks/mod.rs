@@ -5,6 +5,7 @@ mod life;
 mod package;
 mod service;
 mod webhooks;
+mod worker;
 
 use anyhow::Result;
 
@@ -32,7 +33,7 @@ const fn long(name: &'static str, run: fn(&mut Bench) -> Result<()>) -> Check {
     }
 }
 
-pub(crate) fn all() -> [Check; 20] {
+pub(crate) fn all() -> [Check; 21] {
     [
         check("package: installed, enabled, started", package::install),
         check("service: in its sandbox", service::sandbox),
@@ -71,6 +72,10 @@ pub(crate) fn all() -> [Check; 20] {
         long(
             "hooks and uploads: confined within the sandbox",
             hooks::confined,
+        ),
+        long(
+            "worker: a job goes to it by way of a NATS server",
+            worker::elsewhere,
         ),
         long(
             "configuration: read again; unsound, not tried again",

@@ -1,0 +1,168 @@
+//! Debian's `nats-server` as a child that comes and goes, on the same port and folder.
+
+use std::fs;
+use std::io::{self, Error, ErrorKind};
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+/// What has a server keep streams, buckets and objects in its folder.
+pub const KEEPS: &str = "jetstream { store_dir: \"FOLDER/kept\" }";
+
+/// Set where tests are to fail, not to be skipped, when there is no server.
+const NEEDED: &str = "RELIEF_NEEDS_NATS";
+
+const PROGRAM: &str = "nats-server";
+
+/// How long one may take to listen.
+const LIMIT: Duration = Duration::from_secs(60);
+
+/// Whether tests are to go on that need a server: it is installed, or has to be, and then they fail
+/// with what is missing.
+#[must_use]
+pub fn is_wanted() -> bool {
+    let version = Command::new(PROGRAM)
+        .arg("--version")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status();
+    let is_wanted = version.is_ok() || std::env::var_os(NEEDED).is_some();
+    if !is_wanted {
+        println!("skipped: no {PROGRAM}");
+    }
+    is_wanted
+}
+
+/// A port of this machine that nobody has now. Whoever else is given it meanwhile has the server not
+/// start, and does no other harm.
+///
+/// # Errors
+/// When the system has none left.
+pub fn free_port() -> io::Result<u16> {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
+    Ok(listener.local_addr()?.port())
+}
+
+/// A server, which is killed when dropped.
+#[derive(Debug)]
+pub struct Server {
+    folder: TempDir,
+    port: u16,
+    child: Mutex<Option<Child>>,
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+impl Server {
+    /// One that is not started yet, and listens on a port that nobody has. `FOLDER` in the lines of its
+    /// configuration stands for a folder of its own.
+    ///
+    /// # Errors
+    /// When the folder cannot be made.
+    pub fn new(lines: &str) -> io::Result<Self> {
+        Self::in_folder(tempfile::tempdir()?, free_port()?, lines)
+    }
+
+    /// The same on this port, and in this folder, which may have files that the lines name.
+    ///
+    /// # Errors
+    /// When the folder cannot be written.
+    pub fn in_folder(folder: TempDir, port: u16, lines: &str) -> io::Result<Self> {
+        let place = folder.path().display().to_string();
+        let lines = lines.replace("FOLDER", &place);
+        let text = format!("listen: \"127.0.0.1:{port}\"\nlog_file: \"{place}/log\"\n{lines}\n");
+        let server = Self {
+            folder,
+            port,
+            child: Mutex::new(None),
+        };
+        fs::write(server.file("server.conf"), text)?;
+        Ok(server)
+    }
+
+    /// Starts it with what it has kept, and waits until it listens.
+    ///
+    /// # Errors
+    /// When it is not installed, ends, or does not come to listen; with what it has told.
+    pub fn start(&self) -> io::Result<()> {
+        let child = Command::new(PROGRAM)
+            .arg("-c")
+            .arg(self.file("server.conf"))
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .map_err(|error| {
+                let told = format!("cannot start {PROGRAM}: {error}; install Debian's package");
+                Error::new(error.kind(), told)
+            })?;
+        *self.child() = Some(child);
+        let begun = Instant::now();
+        while TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)).is_err() {
+            let ended = match self.child().as_mut() {
+                Some(child) => child.try_wait()?.is_some(),
+                None => true,
+            };
+            if ended || begun.elapsed() > LIMIT {
+                let log = fs::read_to_string(self.file("log")).unwrap_or_default();
+                let told = format!("{PROGRAM} does not listen: {log}");
+                return Err(Error::new(ErrorKind::TimedOut, told));
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        Ok(())
+    }
+
+    /// Kills it, without a chance to put anything in order.
+    pub fn kill(&self) {
+        if let Some(mut child) = self.child().take() {
+            // It may have ended by itself.
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+
+    /// Loses all that it has kept.
+    ///
+    /// # Errors
+    /// When it has kept nothing.
+    pub fn wipe(&self) -> io::Result<()> {
+        fs::remove_dir_all(self.file("kept"))
+    }
+
+    /// Its folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// A file in its folder.
+    #[must_use]
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.folder().join(name)
+    }
+
+    /// The port on which it listens.
+    #[must_use]
+    pub fn port(&self) -> u16 {
+        self.port
+    }
+
+    /// Its address without TLS.
+    #[must_use]
+    pub fn url(&self) -> String {
+        format!("nats://127.0.0.1:{}", self.port)
+    }
+
+    fn child(&self) -> MutexGuard<'_, Option<Child>> {
+        self.child.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
