@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use relief_api::{Event, Job, JobId, JobState, Scan, ScanState, StartScan, path};
+use relief_api::{Event, Job, JobId, JobList, JobState, Scan, ScanState, StartScan, path};
 use reliefd::config::NamedScanner;
 use reliefd::{Config, Daemon};
 use scanner_driver::Scanner;
@@ -150,12 +150,14 @@ pub(crate) async fn settled(client: &Client, id: &str) -> Scan {
     settled.expect("the scan stays as it is")
 }
 
-/// Waits for a job's end, which may be over already. The stream may still hold the end of
-/// an earlier attempt, so that it only tells when to ask again.
+/// Waits for the end of a job, which may be over already, or not be there before its scan is over. The
+/// stream may still hold the end of an earlier attempt, so that it only tells when to ask again.
 pub(crate) async fn job_over(events: &mut Events, rig: &Rig, id: JobId) -> Job {
+    let itself = format!("{}?limit=1&before={}", path::JOBS, id + 1);
     loop {
-        let job: Job = rig.client.get(&path::job(id)).await;
-        if job.state.is_over() {
+        let mut list: JobList = rig.client.get(&itself).await;
+        let found = list.jobs.pop();
+        if let Some(job) = found.filter(|job| job.id == id && job.state.is_over()) {
             return job;
         }
         let over = |event: &Event| match event {

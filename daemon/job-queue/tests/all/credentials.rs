@@ -36,22 +36,23 @@ fn credentials(account: &KeyPair, user: &KeyPair) -> Login {
 
 #[test]
 fn credentials_are_asked_for() {
-    let (operator, account, user) = (
-        KeyPair::new_operator(),
-        KeyPair::new_account(),
-        KeyPair::new_user(),
-    );
+    let operator = KeyPair::new_operator();
+    let (system, account) = (KeyPair::new_account(), KeyPair::new_account());
+    let user = KeyPair::new_user();
     let itself = json!({ "type": "operator", "version": 2 });
     let limits = json!({ "subs": -1, "data": -1, "payload": -1, "imports": -1, "exports": -1,
         "wildcards": true, "conn": -1, "leaf": -1, "mem_storage": -1, "disk_storage": -1,
         "streams": -1, "consumer": -1 });
-    let hall = json!({ "type": "account", "version": 2, "limits": limits,
+    let any = json!({ "type": "account", "version": 2, "limits": limits,
         "default_permissions": { "pub": {}, "sub": {} } });
     let lines = format!(
-        "operator: \"{}\"\nresolver: MEMORY\nresolver_preload: {{ {}: \"{}\" }}",
+        "operator: \"{}\"\nresolver: MEMORY\nsystem_account: {system}\n\
+         resolver_preload: {{ {system}: \"{}\", {hall}: \"{}\" }}",
         signed(&operator, &operator, "lab", &itself),
-        account.public_key(),
-        signed(&operator, &account, "hall", &hall)
+        signed(&operator, &system, "system", &any),
+        signed(&operator, &account, "hall", &any),
+        system = system.public_key(),
+        hall = account.public_key(),
     );
     let Some(server) = configured(&lines) else {
         return;
