@@ -37,6 +37,8 @@ pub struct NatsConfig {
     /// What every subject, stream and bucket of this fleet begins with.
     #[serde(deserialize_with = "prefix")]
     pub prefix: String,
+    /// JetStream domain of the servers that keep everything, where they are reached by a leaf node.
+    pub domain: Option<String>,
     /// How many servers of a cluster keep what is kept.
     #[serde(deserialize_with = "replicas")]
     pub replicas: usize,
@@ -85,6 +87,7 @@ impl Default for NatsConfig {
             key_file: None,
             ca_file: None,
             prefix: "relief".to_owned(),
+            domain: None,
             replicas: 1,
             silence_s: 30,
             hand_over: None,
@@ -127,6 +130,7 @@ impl NatsConfig {
     pub fn check(&self) -> Result<(), String> {
         check_servers(&self.servers)?;
         check_prefix(&self.prefix)?;
+        check_domain(self.domain.as_deref())?;
         check_tools(&self.needs)?;
         check_tools(&self.tools)?;
         self.check_files()
@@ -232,6 +236,16 @@ fn check_prefix(text: &str) -> Result<(), String> {
     Err(format!(
         "{text:?} is no prefix: 1 to {MOST_PREFIX_CHARS} small letters, digits and `-` are"
     ))
+}
+
+fn check_domain(text: Option<&str>) -> Result<(), String> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    match text {
+        Some(text) if !((1..=32).contains(&text.len()) && text.chars().all(plain)) => Err(format!(
+            "{text:?} is no domain: 1 to 32 letters, digits, `-` and `_` are"
+        )),
+        Some(_) | None => Ok(()),
+    }
 }
 
 fn prefix<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {

@@ -83,6 +83,7 @@ pub(super) fn options(config: &NatsConfig, name: &BenchName) -> Result<Options, 
     options.certificate = certificate(config)?;
     options.tls_required = config.servers.iter().any(|one| one.starts_with("tls:"));
     options.prefix.clone_from(&config.prefix);
+    options.domain.clone_from(&config.domain);
     options.replicas = config.replicas;
     options.ack_wait = config.silence();
     options.quota_bytes = Some(u64::from(config.quota_mb) << 20);

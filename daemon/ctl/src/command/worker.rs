@@ -61,6 +61,9 @@ pub(crate) struct Args {
     /// What the names of streams and buckets begin with, if not as usual
     #[arg(long, value_name = "PREFIX", default_value = "relief")]
     prefix: String,
+    /// JetStream domain of the servers that keep everything, if they are reached by a leaf node
+    #[arg(long, value_name = "NAME")]
+    domain: Option<String>,
     /// How long a worker may be silent before another one gets its job, as the benches have it
     #[arg(long, value_name = "S", default_value_t = 30)]
     silence_s: u32,
@@ -90,6 +93,7 @@ pub(crate) fn run(args: Args, json: bool) -> Result<(), Failure> {
         key_file: args.key_file,
         ca_file: args.ca_file,
         prefix: args.prefix,
+        domain: args.domain,
         silence_s: args.silence_s,
         tools: BTreeSet::from_iter(args.tools),
         memory_mib: args.memory_mib,

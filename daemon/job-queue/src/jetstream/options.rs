@@ -10,6 +10,8 @@ use crate::QueueError;
 
 /// Longest prefix of names on the server.
 const MOST_PREFIX_CHARS: usize = 24;
+/// Longest domain.
+const MOST_DOMAIN_CHARS: usize = 32;
 /// Longest pause between two attempts to connect.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 /// How long a server may take to answer.
@@ -73,6 +75,9 @@ pub struct Options {
     /// Begins the names of streams, buckets and subjects, so that several installations may share
     /// a server.
     pub prefix: String,
+    /// Domain of the servers that keep everything, where they have one: what leads to them by way of
+    /// leaf nodes.
+    pub domain: Option<String>,
     /// Begins the subjects on which this client is answered, so that the server's permissions can
     /// keep others from listening there.
     pub inbox: String,
@@ -117,6 +122,7 @@ impl Options {
             certificate: None,
             tls_required: false,
             prefix: "relief".to_owned(),
+            domain: None,
             inbox: "_INBOX".to_owned(),
             makes_missing: true,
             replicas: 1,
@@ -148,8 +154,24 @@ impl Options {
         if self.inbox.is_empty() || self.inbox.contains(['*', '>', ' ']) {
             return refused(format!("inbox `{}`: give a plain subject", self.inbox));
         }
+        let word = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        if let Some(domain) = &self.domain
+            && !((1..=MOST_DOMAIN_CHARS).contains(&domain.len()) && domain.chars().all(word))
+        {
+            return refused(format!(
+                "domain `{domain}`: give 1 to {MOST_DOMAIN_CHARS} letters, digits, `-` and `_`"
+            ));
+        }
         self.addresses()?;
         self.connect_options().map(drop)
+    }
+
+    /// What requests to `JetStream` begin with.
+    pub(crate) fn api(&self) -> String {
+        match &self.domain {
+            Some(domain) => format!("$JS.{domain}.API"),
+            None => "$JS.API".to_owned(),
+        }
     }
 
     /// The servers' addresses.
@@ -268,7 +290,8 @@ mod tests {
     fn what_cannot_work_is_refused_with_what_to_give() {
         let good = Options::new(vec!["nats://host".to_owned()]);
         good.check().unwrap();
-        let bad: [(&str, Spoil); 6] = [
+        let bad: [(&str, Spoil); 7] = [
+            ("domain", |o| o.domain = Some("a.b".to_owned())),
             ("prefix", |o| o.prefix = "a.b".to_owned()),
             ("replicas", |o| o.replicas = 2),
             ("ack_wait", |o| o.ack_wait = Duration::ZERO),

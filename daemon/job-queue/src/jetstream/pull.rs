@@ -29,7 +29,7 @@ pub(super) enum Pulled {
 pub(super) async fn pull(stores: &Stores, consumer: &str) -> Result<Pulled, QueueError> {
     let away = |why: &dyn std::fmt::Display| QueueError::Away(format!("the next order: {why}"));
     let stream = &stores.orders.cached_info().config.name;
-    let subject = format!("$JS.API.CONSUMER.MSG.NEXT.{stream}.{consumer}");
+    let subject = format!("{}.CONSUMER.MSG.NEXT.{stream}.{consumer}", stores.api);
     let client = &stores.client;
     let inbox = client.new_inbox();
     let mut answers = client

@@ -23,6 +23,8 @@ const NODE_AGE: Duration = Duration::from_secs(60);
 pub(crate) struct Stores {
     pub(crate) context: Context,
     pub(crate) client: Client,
+    /// What requests begin with.
+    pub(crate) api: String,
     pub(crate) orders: Stream,
     pub(crate) standings: Store,
     pub(crate) nodes: Store,
@@ -35,7 +37,7 @@ impl Stores {
         options: &Options,
         names: &Names,
     ) -> Result<Self, QueueError> {
-        let mut context = jetstream::new(client.clone());
+        let mut context = jetstream::with_prefix(client.clone(), &options.api());
         context.set_timeout(ANSWER);
         let orders = Config {
             name: names.orders(),
@@ -82,6 +84,7 @@ impl Stores {
         Ok(Self {
             context,
             client,
+            api: options.api(),
             orders,
             standings,
             nodes,
@@ -115,7 +118,8 @@ async fn bucket(
         stream_name: format!("KV_{name}"),
         prefix: format!("$KV.{name}."),
         put_prefix: None,
-        use_jetstream_prefix: false,
+        // Between domains a bucket is written by way of the API alone.
+        use_jetstream_prefix: options.domain.is_some(),
         name,
         stream,
     })

@@ -52,6 +52,7 @@ fn faults_of_roles_and_servers_are_told_with_a_way_out() {
         ),
         ("[nats]\nbench = \"a b\"\n", "`a b` is no name"),
         ("[nats]\nprefix = \"A\"\n", "\"A\" is no prefix"),
+        ("[nats]\ndomain = \"a.b\"\n", "\"a.b\" is no domain"),
         ("[nats]\nreplicas = 2\n", "1, 3 or 5 are"),
         (
             "[nats]\ntools = [\"a-b\"]\n",

@@ -393,6 +393,7 @@ fn the_examples_are_sound_and_show_the_defaults() {
         certificate_file: Some("/etc/relief/nats.pem".into()),
         key_file: Some("/etc/relief/nats.key".into()),
         ca_file: Some("/etc/relief/ca.pem".into()),
+        domain: Some("hub".into()),
         hand_over: Some(8),
         needs: ["gpu".to_owned()].into(),
         tools: ["gpu".to_owned()].into(),

@@ -41,13 +41,14 @@ impl Nats {
         Some(Self::with(server, "tls"))
     }
 
-    /// One that leads to another, which keeps everything, and the other.
+    /// One that leads to another, which keeps everything in the domain `hub`, and the other.
     pub(super) fn leaf() -> Option<(Self, Self)> {
         if !is_wanted() {
             return None;
         }
         let port = free_port().unwrap();
-        let hub = format!("{KEEPS}\nleafnodes {{ listen: \"127.0.0.1:{port}\" }}");
+        let keeps = KEEPS.replace('}', ", domain: hub }");
+        let hub = format!("{keeps}\nleafnodes {{ listen: \"127.0.0.1:{port}\" }}");
         let leaf = format!("leafnodes {{ remotes: [{{ url: \"nats://127.0.0.1:{port}\" }}] }}");
         let [hub, leaf] = [hub, leaf].map(|lines| {
             let server = Server::new(&lines).unwrap();

@@ -125,7 +125,12 @@ async fn a_leaf_at_the_bench_may_come_and_go() {
         return;
     };
     let worker = Hired::new(&hub, "hand-1");
-    let rig = rig(&leaf).await;
+    let own = acquires(&leaf);
+    let rig = Rig::start(tempfile::tempdir().unwrap(), |config| {
+        own(config);
+        config.nats.domain = Some("hub".to_owned());
+    })
+    .await;
     let mut events = rig.client.events().await;
     rig.start_scan("first").await;
     assert_eq!(job_over(&mut events, &rig, 1).await.state, JobState::Done);
