@@ -19,6 +19,9 @@ impl WorkFolder {
     /// Makes one below `all`, and removes those whose workers are gone.
     pub(super) fn make(all: &Path) -> io::Result<Self> {
         fs::create_dir_all(all)?;
+        // One at a time: a folder without its lock is then one that was left.
+        let gate = File::open(all)?;
+        gate.lock()?;
         for entry in fs::read_dir(all)? {
             remove_if_left(&entry?.path());
         }
@@ -30,10 +33,8 @@ impl WorkFolder {
                 Err(error) => return Err(error),
             }
             let lock = File::create(path.join(LOCK))?;
-            // One that has just looked has found no lock, and has removed it.
-            if lock.try_lock().is_ok() && path.join(LOCK).exists() {
-                return Ok(Self { path, _lock: lock });
-            }
+            lock.lock()?;
+            return Ok(Self { path, _lock: lock });
         }
         Err(io::ErrorKind::AlreadyExists.into())
     }
@@ -45,26 +46,35 @@ impl WorkFolder {
 
 impl Drop for WorkFolder {
     fn drop(&mut self) {
-        if let Err(error) = fs::remove_dir_all(&self.path) {
-            tracing::warn!(folder = %self.path.display(), %error, "cannot remove a folder");
-        }
+        remove(&self.path);
     }
 }
 
 fn remove_if_left(folder: &Path) {
     let is_left = match File::open(folder.join(LOCK)) {
         Ok(lock) => lock.try_lock().is_ok(),
-        // Its worker was killed before it had one, or is just about to make it, and then makes
-        // another folder.
+        // Its worker was killed before it had one.
         Err(error) => error.kind() == io::ErrorKind::NotFound,
     };
-    if is_left && let Err(error) = fs::remove_dir_all(folder) {
-        tracing::warn!(folder = %folder.display(), %error, "cannot remove what a worker has left");
+    if is_left {
+        remove(folder);
+    }
+}
+
+/// Its own worker and another one may be at it at once.
+fn remove(folder: &Path) {
+    match fs::remove_dir_all(folder) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            tracing::warn!(folder = %folder.display(), %error, "cannot remove a worker's folder");
+        }
+        Ok(()) | Err(_) => {}
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Barrier;
+
     use super::*;
 
     #[test]
@@ -84,5 +94,24 @@ mod tests {
         drop(second);
         drop(first);
         assert_eq!(fs::read_dir(all).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn workers_that_start_at_once_take_no_folder_from_each_other() {
+        let all = tempfile::tempdir().unwrap();
+        let start = Barrier::new(4);
+        for _ in 0..100 {
+            let made: Vec<_> = std::thread::scope(|scope| {
+                let make = || {
+                    start.wait();
+                    WorkFolder::make(all.path()).unwrap()
+                };
+                let threads = [(); 4].map(|()| scope.spawn(make));
+                threads.map(|thread| thread.join().unwrap()).into()
+            });
+            for folder in &made {
+                assert!(folder.path().join(LOCK).exists());
+            }
+        }
     }
 }
