@@ -134,6 +134,8 @@ async fn a_leaf_at_the_bench_may_come_and_go() {
     let mut events = rig.client.events().await;
     rig.start_scan("first").await;
     assert_eq!(job_over(&mut events, &rig, 1).await.state, JobState::Done);
+    // Else what is left of it would stay for as long as it might be needed.
+    all_is_cleared(&hub).await;
     leaf.stop();
     let scan = rig.start_scan("second").await;
     ended(&mut events, &scan.id).await;
