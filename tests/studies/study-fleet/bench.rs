@@ -206,23 +206,6 @@ impl Bench {
         .await?
     }
 
-    /// Shows what the programs have told.
-    pub(crate) fn keep_logs(&self) {
-        for entry in std::fs::read_dir(&self.folder)
-            .into_iter()
-            .flatten()
-            .flatten()
-        {
-            let path = entry.path();
-            if path.extension().is_some_and(|e| e == "log") {
-                let text = std::fs::read_to_string(&path).unwrap_or_default();
-                let lines: Vec<&str> = text.lines().collect();
-                let last = &lines[lines.len().saturating_sub(30)..];
-                eprintln!("--- {}\n{}", path.display(), last.join("\n"));
-            }
-        }
-    }
-
     /// When a job was first told to run, and when it was over.
     pub(crate) async fn follow(&self, jobs: usize) -> Result<(Instant, Instant)> {
         let mut events = self.client().events().await?;
@@ -243,4 +226,4 @@ impl Bench {
 }
 
 /// What it logs.
-const LOG: &str = "[log]\nlevel = \"info\"\nformat = \"text\"";
+const LOG: &str = "[log]\nlevel = \"info,reliefd=debug\"\nformat = \"text\"";

@@ -117,6 +117,27 @@ impl Cluster {
             .unwrap_or_default()
     }
 
+    /// What each server has of each stream.
+    pub(crate) fn told(&self) -> String {
+        let mut told = String::new();
+        for member in &self.members {
+            let answer = member.monitored("/jsz?accounts=true&streams=true");
+            let streams = answer
+                .iter()
+                .flat_map(|answer| answer["account_details"].as_array())
+                .flatten()
+                .filter_map(|account| account["stream_detail"].as_array())
+                .flatten();
+            for stream in streams {
+                told += &format!(
+                    "\n{} {}: leader {}, {}",
+                    member.name, stream["name"], stream["cluster"]["leader"], stream["state"]
+                );
+            }
+        }
+        told
+    }
+
     /// SIGKILL.
     pub(crate) fn kill(&self, number: usize) {
         self.members[number].server.kill();

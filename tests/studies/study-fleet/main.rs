@@ -29,7 +29,7 @@ use anyhow::{Context, Result, ensure};
 use clap::Parser;
 use relief_api::{Job, JobState, Rerun, path};
 
-use bench::{Bench, files_of};
+use bench::{Bench, Files, files_of};
 use cluster::{Cluster, Link, urls};
 use trouble::Trouble;
 use workers::Hire;
@@ -192,17 +192,54 @@ async fn run(options: &Options) -> Result<()> {
             trouble.told()
         );
         if begun.elapsed() >= GUARD {
-            bench.keep_logs();
-            anyhow::bail!("not all jobs came to an end");
+            let kept = folder.keep();
+            anyhow::bail!(
+                "not all jobs came to an end; what the programs have told is in {}",
+                kept.display()
+            );
         }
     }
     let seconds = begun.elapsed().as_secs();
     trouble.end()?;
 
-    // Each once, and each what the bench has made itself.
+    let held = hold(&bench, &orders, &scans, &expected, &trouble.ports()).await;
+    let (attempts, published) = match held {
+        Ok(held) => held,
+        Err(error) => {
+            let kept = folder.keep();
+            let told = trouble.servers();
+            return Err(error.context(format!(
+                "what the programs have told is in {}; the servers have{told}",
+                kept.display()
+            )));
+        }
+    };
+    println!(
+        "seed {}: {} jobs of {} scans, {} workers, {} servers, {seconds} s: {}; begun {attempts} \
+         times, {set_aside} set aside after three deaths in a row and retried, published once each ({} told), the same bytes as here, nothing left on the servers",
+        options.seed,
+        orders.len(),
+        scans.len(),
+        options.workers,
+        options.servers,
+        trouble.told(),
+        published
+    );
+    Ok(())
+}
+
+/// Holds that each job was done once, and each result is what the bench has made itself; tells how
+/// often jobs were begun, and of how many it was told that they are published.
+async fn hold(
+    bench: &Bench,
+    orders: &BTreeMap<u64, String>,
+    scans: &[String],
+    expected: &BTreeMap<String, Files>,
+    servers: &[u16],
+) -> Result<(u32, usize)> {
     let jobs = bench.jobs_over().await?;
     let mut attempts = 0;
-    for (id, scan) in &orders {
+    for (id, scan) in orders {
         let job = &jobs[id];
         ensure!(
             job.state == JobState::Done,
@@ -230,18 +267,7 @@ async fn run(options: &Options) -> Result<()> {
         "{results} results of {} jobs",
         orders.len() + scans.len()
     );
-    let left = bench.left_on(&urls(&trouble.ports()), CLEARED).await?;
+    let left = bench.left_on(&urls(servers), CLEARED).await?;
     ensure!(left == 0, "{left} things were left on the servers");
-    println!(
-        "seed {}: {} jobs of {} scans, {} workers, {} servers, {seconds} s: {}; begun {attempts} \
-         times, {set_aside} set aside after three deaths in a row and retried, published once each ({} told), the same bytes as here, nothing left on the servers",
-        options.seed,
-        orders.len(),
-        scans.len(),
-        options.workers,
-        options.servers,
-        trouble.told(),
-        published.len()
-    );
-    Ok(())
+    Ok((attempts, published.len()))
 }

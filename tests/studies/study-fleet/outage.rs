@@ -6,7 +6,7 @@
 
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use relief_api::{Event, Fleet, Job, JobState, Rerun, Scan, ScanState, StartScan, path};
 use relief_tests::rig::small_house;
 use sim_scanner::config::SimConfig;
@@ -188,10 +188,10 @@ async fn job_over(bench: &Bench, scan: &str) -> Result<Job> {
             ensure!(job.state == JobState::Done, "{:?}", job.error);
             return Ok(job);
         }
-        if begun.elapsed() > GUARD {
-            bench.keep_logs();
-            bail!("the job of scan {scan} came to no end");
-        }
+        ensure!(
+            begun.elapsed() < GUARD,
+            "the job of scan {scan} came to no end"
+        );
         tokio::time::sleep(Duration::from_millis(100)).await;
     }
 }

@@ -111,6 +111,11 @@ impl Trouble {
         self.cluster.ports()
     }
 
+    /// What each server has of each stream.
+    pub(crate) fn servers(&self) -> String {
+        self.cluster.told()
+    }
+
     /// What has happened so far.
     pub(crate) fn told(&self) -> String {
         let mut told = String::new();
