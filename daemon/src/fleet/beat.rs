@@ -221,7 +221,8 @@ impl Fleet {
             .filter(is_left);
         let chunk = |name: String| {
             let sha256 = name.strip_prefix(Kind::Journal.prefix())?.to_owned();
-            Some(Chunk { sha256, bytes: 0 })
+            let (bytes, put) = (0, String::new());
+            Some(Chunk { sha256, bytes, put })
         };
         let chunks: Vec<Chunk> = names.filter_map(chunk).collect();
         self.depot.remove(&self.bench, Kind::Journal, &chunks)

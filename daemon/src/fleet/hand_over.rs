@@ -135,7 +135,7 @@ impl HandOver {
             self.keep_end(&published(&directory, left_out, job.timings))?;
             return Ok(Left::Over { is_cleared: false });
         }
-        let order = match self.offer(&job)? {
+        let order = match self.offer(&job, *damaged > 0)? {
             Ok(order) => order,
             Err(left) => return Ok(left),
         };
@@ -143,7 +143,7 @@ impl HandOver {
     }
 
     /// Offers the job, for as long as it takes.
-    fn offer(&self, job: &Job) -> Result<Result<Order, Left>, ServiceError> {
+    fn offer(&self, job: &Job, is_missed: bool) -> Result<Result<Order, Left>, ServiceError> {
         let fleet = &self.fleet;
         loop {
             if let Some(left) = self.is_left(false) {
@@ -155,7 +155,7 @@ impl HandOver {
             }
             let scan = self.service.scan(&job.scan)?;
             let offered = fleet
-                .share_whole(&self.service, job.id, &job.scan)
+                .share_whole(&self.service, job.id, &job.scan, is_missed)
                 .and_then(|journal| fleet.order_of(job, scan, journal))
                 .and_then(|order| {
                     self.withdraw_later(&order)?;

@@ -82,18 +82,24 @@ impl Fleet {
         }
     }
 
-    /// Sends what is missing of a journal that has its end.
+    /// Sends what is missing of a journal that has its end; all of it where a worker has missed
+    /// something.
     pub(super) fn share_whole(
         &self,
         service: &Service,
         job: JobId,
         scan: &str,
+        is_missed: bool,
     ) -> Result<Parcel, QueueError> {
         let path = service.journal_path(scan);
         let mut file = File::open(&path).map_err(records(&path))?;
         let _sending = reading(&self.sending);
         // Chunks are known by what is in them: those that were sent are not sent again.
-        let parcel = self.depot.put(&self.bench, Kind::Journal, &mut file)?;
+        let parcel = if is_missed {
+            self.depot.put_anew(&self.bench, Kind::Journal, &mut file)?
+        } else {
+            self.depot.put(&self.bench, Kind::Journal, &mut file)?
+        };
         if let Some(handed) = lock(&self.handed).get_mut(&job) {
             handed.chunks.clone_from(&parcel.chunks);
         }

@@ -99,10 +99,10 @@ impl Depot {
         kind: Kind,
         raw: &[u8],
     ) -> Result<Chunk, QueueError> {
-        let chunk = Chunk::of(raw)?;
+        let chunk = Measured::of(kind).add(raw)?;
         self.run(async {
             let bucket = self.bucket(bench).await?;
-            bucket.put(kind, &chunk, raw).await
+            bucket.put(kind, &chunk, raw, false).await
         })?;
         Ok(chunk)
     }
@@ -117,7 +117,30 @@ impl Depot {
         kind: Kind,
         from: &mut dyn Read,
     ) -> Result<Parcel, QueueError> {
-        let mut measured = Measured::default();
+        self.put_all(bench, kind, from, false)
+    }
+
+    /// The same, whatever the servers say they have already: somebody has not found it, or not whole.
+    ///
+    /// # Errors
+    /// As [`Depot::put`].
+    pub fn put_anew(
+        &self,
+        bench: &BenchName,
+        kind: Kind,
+        from: &mut dyn Read,
+    ) -> Result<Parcel, QueueError> {
+        self.put_all(bench, kind, from, true)
+    }
+
+    fn put_all(
+        &self,
+        bench: &BenchName,
+        kind: Kind,
+        from: &mut dyn Read,
+        anew: bool,
+    ) -> Result<Parcel, QueueError> {
+        let mut measured = Measured::of(kind);
         let mut ended = false;
         while !ended {
             let mut raws = Vec::new();
@@ -129,7 +152,7 @@ impl Depot {
             }
             let puts = raws.iter().map(|(chunk, raw)| async move {
                 let bucket = self.bucket(bench).await?;
-                bucket.put(kind, chunk, raw).await
+                bucket.put(kind, chunk, raw, anew).await
             });
             let all = async {
                 stream::iter(puts)

@@ -31,15 +31,16 @@ impl Bucket {
         QueueError::Away(format!("{}: {error}", self.name))
     }
 
-    /// Puts a chunk, unless it is one of a journal that is there.
+    /// Puts a chunk, unless it is one of a journal that is there, or in any case.
     pub(super) async fn put(
         &self,
         kind: Kind,
         chunk: &Chunk,
         raw: &[u8],
+        anew: bool,
     ) -> Result<(), QueueError> {
         let object = chunk.object(kind);
-        if kind == Kind::Journal && self.info(&object).await?.is_some() {
+        if kind == Kind::Journal && !anew && self.info(&object).await?.is_some() {
             return Ok(());
         }
         let packed = zstd::bulk::compress(raw, LEVEL).map_err(|error| QueueError::Damaged {

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::Kind;
+use crate::jetstream::random_name;
 use crate::queue::QueueError;
 
 /// Bytes of a chunk, but for the last one.
@@ -19,6 +20,10 @@ pub struct Chunk {
     pub sha256: String,
     /// How many bytes it has.
     pub bytes: u64,
+    /// Of which put it is, where each puts its own; empty where what is the same is there once, and
+    /// shared.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub put: String,
 }
 
 /// A stream of bytes that is in the depot.
@@ -33,7 +38,7 @@ pub struct Parcel {
 }
 
 impl Chunk {
-    pub(super) fn of(raw: &[u8]) -> Result<Self, QueueError> {
+    pub(super) fn of(raw: &[u8], put: &str) -> Result<Self, QueueError> {
         if raw.len() > CHUNK_BYTES {
             return Err(QueueError::Refused(format!(
                 "a chunk of {} bytes: cut it into pieces of {CHUNK_BYTES}",
@@ -43,13 +48,15 @@ impl Chunk {
         Ok(Self {
             sha256: hex(&Sha256::digest(raw)),
             bytes: raw.len() as u64,
+            put: put.to_owned(),
         })
     }
 
     /// Name of its object.
     #[must_use]
     pub fn object(&self, kind: Kind) -> String {
-        format!("{}{}", kind.prefix(), self.sha256)
+        let (prefix, dash) = (kind.prefix(), if self.put.is_empty() { "" } else { "-" });
+        format!("{prefix}{}{dash}{}", self.put, self.sha256)
     }
 }
 
@@ -76,7 +83,8 @@ impl Parcel {
         };
         let mut bytes = 0_u64;
         for (n, chunk) in self.chunks.iter().enumerate() {
-            if chunk.bytes > CHUNK_BYTES as u64 || !is_hash(&chunk.sha256) {
+            let is_word = chunk.put.len() <= 32 && chunk.put.chars().all(|c| c.is_ascii_hexdigit());
+            if chunk.bytes > CHUNK_BYTES as u64 || !is_hash(&chunk.sha256) || !is_word {
                 return damaged(format!("its chunk {} cannot be one", n + 1));
             }
             bytes += chunk.bytes;
@@ -97,11 +105,25 @@ pub(super) struct Measured {
     all: Sha256,
     bytes: u64,
     chunks: Vec<Chunk>,
+    put: String,
 }
 
 impl Measured {
+    /// What is about to be put: results have names of their own, so that what becomes of one is none
+    /// of the others' worries, though they be the same.
+    pub(super) fn of(kind: Kind) -> Self {
+        let put = match kind {
+            Kind::Journal => String::new(),
+            Kind::Result => random_name(),
+        };
+        Self {
+            put,
+            ..Self::default()
+        }
+    }
+
     pub(super) fn add(&mut self, raw: &[u8]) -> Result<Chunk, QueueError> {
-        let chunk = Chunk::of(raw)?;
+        let chunk = Chunk::of(raw, &self.put)?;
         self.all.update(raw);
         self.bytes += chunk.bytes;
         self.chunks.push(chunk.clone());
@@ -169,7 +191,8 @@ mod tests {
     #[test]
     fn what_cannot_be_a_parcel_is_refused() {
         let good = Parcel::of_reader(&mut [1_u8; 100].as_slice()).unwrap();
-        let spoils: [fn(&mut Parcel); 4] = [
+        let spoils: [fn(&mut Parcel); 5] = [
+            |p| p.chunks[0].put = "a.>".to_owned(),
             |p| p.bytes += 1,
             |p| p.chunks[0].sha256 = "../../etc/passwd".to_owned(),
             |p| p.sha256.clear(),

@@ -37,7 +37,7 @@ pub use registry::{BEAT, Node, Role};
 
 pub(crate) use connect::Link;
 pub(crate) use names::Names;
-pub(crate) use stores::{Stores, find_or_make};
+pub(crate) use stores::{Stores, find_or_make, random_name};
 
 use crate::order::{JobKey, Order};
 use crate::queue::{JobQueue, Lease, QueueError, Standing, Worker};
@@ -88,7 +88,7 @@ impl JetStreamQueue {
             lines: Mutex::new(Lines::default()),
             bell: watch::Sender::new(0),
             given: AtomicU64::new(0),
-            instance: stores::random_name(),
+            instance: random_name(),
             options: options.clone(),
         });
         let connecting = handle.spawn(Arc::clone(&shared.link).establish(options));

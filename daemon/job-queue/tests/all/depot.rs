@@ -133,14 +133,51 @@ fn what_is_there_is_not_put_again() {
     let before = rig.messages("C");
     assert_eq!(rig.put(&bytes), parcel);
     assert_eq!(rig.messages("C"), before);
-    // A result takes the place of what another worker left.
-    let put = |kind| rig.depot.put_chunk(&rig.bench, kind, &bytes[..10]).unwrap();
-    put(Kind::Result);
-    let first = rig.messages("C");
-    put(Kind::Result);
-    let second = rig.messages("C");
-    assert_eq!(first.len(), second.len(), "nothing of the first is left");
-    assert_ne!(first, second);
+}
+
+/// Two jobs may well have the same result, and are fetched and cleared up each in its time.
+#[test]
+fn what_becomes_of_a_result_is_none_of_the_others_worries() {
+    let Some(rig) = Rig::new() else { return };
+    let bytes = noise(1000, 11);
+    let put = || {
+        rig.depot
+            .put(&rig.bench, Kind::Result, &mut bytes.as_slice())
+            .unwrap()
+    };
+    let (first, second) = (put(), put());
+    assert_eq!(first.sha256, second.sha256);
+    rig.depot
+        .remove(&rig.bench, Kind::Result, &first.chunks)
+        .unwrap();
+    let fetch = |parcel: &Parcel| {
+        let mut to = Vec::new();
+        rig.depot
+            .fetch(&rig.bench, Kind::Result, parcel, &mut to)
+            .map(|()| to)
+    };
+    assert!(matches!(fetch(&first), Err(QueueError::Damaged { .. })));
+    assert_eq!(fetch(&second).unwrap(), bytes);
+}
+
+/// What a server believes to have is put all the same once somebody has missed it.
+#[test]
+fn what_is_missed_is_put_anew() {
+    let Some(rig) = Rig::new() else { return };
+    let bytes = noise(1000, 12);
+    let parcel = rig.put(&bytes);
+    let lost = format!("$O.{}.C.>", rig.name);
+    rig.behind(|_, _, stream| async move { stream.purge().filter(lost).await.unwrap() });
+    rig.damage(&parcel);
+    rig.put(&bytes);
+    assert!(
+        rig.damage(&parcel).contains("missing"),
+        "it is believed to be there"
+    );
+    rig.depot
+        .put_anew(&rig.bench, Kind::Journal, &mut bytes.as_slice())
+        .unwrap();
+    assert_eq!(rig.fetch(&parcel).unwrap(), bytes);
 }
 
 #[test]
