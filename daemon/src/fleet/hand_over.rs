@@ -227,7 +227,7 @@ impl HandOver {
                 _ if told.attempts > begun && told.state != JobState::Queued => {
                     begun = told.attempts;
                     let worker = told.worker.as_deref().unwrap_or("?");
-                    tracing::info!(job = job.id, worker, "a job is worked on elsewhere");
+                    tracing::info!(job = job.id, scan = %job.scan, worker, "a job is worked on elsewhere");
                     self.service.note_elsewhere(job.id, Some(worker))?;
                 }
                 JobState::Queued if runs => {
@@ -294,7 +294,7 @@ impl HandOver {
             }
             Err(error) if *damaged < MOST_DAMAGED => {
                 *damaged += 1;
-                tracing::warn!(job = job.id, %error, "a job is handed over anew");
+                tracing::warn!(job = job.id, scan = %job.scan, %error, "a job is handed over anew");
                 self.service.note_elsewhere(job.id, None)?;
                 self.service.turn_job(job.id)?;
                 fleet.clear(order, delivered.ok().as_ref());

@@ -8,13 +8,13 @@ use std::time::Duration;
 
 use deliverables::Pictures;
 use job_queue::depot::{Depot, Kind};
-use job_queue::{Lease, QueueError};
+use job_queue::{Lease, Order, QueueError};
 use range_image::Monitor;
 use storage::LocalDisk;
 
 use super::attendance::Attendance;
 use super::order::{Answer, Delivered, Work};
-use crate::jobs::{Craft, Halt, Made, Progress, Workpiece};
+use crate::jobs::{Craft, Halt, Made, Names, Progress, Workpiece};
 
 /// How long it waits before it tries again what the servers did not do.
 const PAUSE: Duration = Duration::from_secs(1);
@@ -41,6 +41,17 @@ impl Craft for Remote<'_> {
             Ok((result, left_out)) => Made::Done { result, left_out },
             Err(Halt::Asked) => Made::Stopped,
             Err(Halt::Failed { error, hint }) => Made::Failed { error, hint },
+        }
+    }
+
+    fn names(&self, order: &Order) -> Names {
+        let scan = order.body.pointer("/scan/id");
+        Names {
+            job: order.key.to_string(),
+            scan: scan
+                .and_then(serde_json::Value::as_str)
+                .unwrap_or_default()
+                .to_owned(),
         }
     }
 

@@ -4,14 +4,14 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use deliverables::Pictures;
-use job_queue::{Lease, Worker};
+use job_queue::{Lease, Order, Worker};
 use range_image::Monitor;
 use serde_json::Value;
 
 use super::embedded::Embedded;
 use super::make::{Halt, Workpiece};
 use super::progress::Progress;
-use super::worker::{Craft, Hand, Made};
+use super::worker::{Craft, Hand, Made, Names};
 use crate::service::{KeptGrid, Service};
 
 /// By how much jobs are nicer than the taking of scans.
@@ -52,6 +52,15 @@ impl Craft for Local<'_> {
             },
             Err(Halt::Asked) => Made::Stopped,
             Err(Halt::Failed { error, hint }) => Made::Failed { error, hint },
+        }
+    }
+
+    fn names(&self, order: &Order) -> Names {
+        let id = order.key.job;
+        let job = self.0.job(id);
+        Names {
+            job: id.to_string(),
+            scan: job.map(|job| job.scan).unwrap_or_default(),
         }
     }
 

@@ -26,7 +26,7 @@ pub(crate) use local::{Local, be_nice, work};
 pub(crate) use make::{Halt, Workpiece};
 pub(crate) use progress::Progress;
 pub(crate) use queue::{Queue, StopFlag};
-pub(crate) use worker::{Craft, Hand, Made};
+pub(crate) use worker::{Craft, Hand, Made, Names};
 
 impl Service {
     /// Queues the job of a scan that has just been completed, and keeps the scan with it, and

@@ -3,7 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
-use job_queue::{Ending, JobQueue, Lease, Outcome, QueueError, Stop, Worker};
+use job_queue::{Ending, JobQueue, Lease, Order, Outcome, QueueError, Stop, Worker};
 use serde_json::Value;
 
 use super::progress::Progress;
@@ -31,10 +31,22 @@ pub(crate) enum Made {
     },
 }
 
+/// What the log calls a job.
+#[derive(Debug)]
+pub(crate) struct Names {
+    /// Its number; with the bench's name before it where others have theirs, too.
+    pub(crate) job: String,
+    /// The scan that it processes.
+    pub(crate) scan: String,
+}
+
 /// How what is ordered is made.
 pub(crate) trait Craft {
     /// Makes what is ordered, and puts it where the bench finds it.
     fn make(&self, lease: &dyn Lease, progress: &Progress<'_>) -> Made;
+
+    /// What the log calls a job.
+    fn names(&self, order: &Order) -> Names;
 
     /// What was begun is given up.
     fn discard(&self, lease: &dyn Lease);
@@ -90,8 +102,8 @@ impl Hand<'_> {
     }
 
     fn see_to(&self, lease: &mut dyn Lease) {
-        let key = lease.order().key.clone();
-        tracing::info!(job = %key, attempt = lease.begun().attempts, "job begins");
+        let Names { job, scan } = self.craft.names(lease.order());
+        tracing::info!(%job, %scan, attempt = lease.begun().attempts, "job begins");
         let (made, timings) = {
             let progress = Progress::new(lease, self.pulse, self.is_to_stop);
             // A defect in the processing of one scan must not end the worker.
@@ -115,13 +127,13 @@ impl Hand<'_> {
             Made::Stopped => match lease.stop() {
                 Some(Stop::Cancelled) => Ending::Cancelled,
                 Some(Stop::Lost) => {
-                    tracing::warn!(job = %key, "a job is another worker's by now");
+                    tracing::warn!(%job, %scan, "a job is another worker's by now");
                     return;
                 }
                 Some(Stop::WorkerEnds) | None => {
-                    tracing::info!(job = %key, "job put back");
+                    tracing::info!(%job, %scan, "job put back");
                     if let Err(error) = lease.give_back() {
-                        tracing::warn!(job = %key, %error, "cannot put a job back; its turn comes again");
+                        tracing::warn!(%job, %scan, %error, "cannot put a job back; its turn comes again");
                     }
                     return;
                 }
@@ -131,7 +143,7 @@ impl Hand<'_> {
     }
 
     fn settle(&self, lease: &mut dyn Lease, mut outcome: Outcome) {
-        let key = lease.order().key.clone();
+        let Names { job, scan } = self.craft.names(lease.order());
         loop {
             // Who cancelled it was told that it ends so.
             if matches!(outcome.ending, Ending::Failed { .. })
@@ -144,20 +156,20 @@ impl Hand<'_> {
                     let state = standing.state.as_str();
                     match &outcome.ending {
                         Ending::Failed { error, .. } => {
-                            tracing::warn!(job = %key, %error, "job failed");
+                            tracing::warn!(%job, %scan, %error, "job failed");
                         }
-                        _ => tracing::info!(job = %key, state, "job ends"),
+                        _ => tracing::info!(%job, %scan, state, "job ends"),
                     }
                     return;
                 }
                 Err(QueueError::Lost(_)) => {
-                    tracing::warn!(job = %key, "a job was settled by another worker");
+                    tracing::warn!(%job, %scan, "a job was settled by another worker");
                     return;
                 }
                 Err(error) => {
                     // The records still say that it runs. A result that is in its place is not
                     // made again.
-                    tracing::error!(job = %key, %error, "cannot keep what became of a job; trying again");
+                    tracing::error!(%job, %scan, %error, "cannot keep what became of a job; trying again");
                     self.pulse.rest();
                     if (self.is_to_stop)(RETRY) || lease.stop() == Some(Stop::Lost) {
                         return;
