@@ -41,6 +41,9 @@ pub(crate) struct Options {
     /// Leave out what takes longest.
     #[arg(long)]
     short: bool,
+    /// Only the checks whose names contain this, and those that they build on.
+    #[arg(long, value_name = "WORD", conflicts_with = "short")]
+    only: Option<String>,
     /// Let the processor run the machine: quicker, where nested virtualisation works.
     #[arg(long)]
     kvm: bool,
@@ -53,6 +56,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             short: false,
+            only: None,
             kvm: false,
             patience_s: PATIENCE_S,
         }
@@ -118,10 +122,14 @@ fn later_version() -> String {
 
 /// Runs the checks, at the console.
 fn unit(options: &Options) -> String {
-    let short = if options.short { " --short" } else { "" };
+    let which = match &options.only {
+        Some(word) => format!(" --only {word}"),
+        None if options.short => " --short".to_owned(),
+        None => String::new(),
+    };
     format!(
         "[Unit]\nDescription=The checks\nAfter=basic.target\n\
-         [Service]\nType=exec\nExecStart=/usr/local/bin/relief-vm-systemd{short}\n\
+         [Service]\nType=exec\nExecStart=/usr/local/bin/relief-vm-systemd{which}\n\
          StandardInput=tty-force\nTTYPath=/dev/ttyS0\nStandardOutput=tty\nStandardError=tty\n"
     )
 }

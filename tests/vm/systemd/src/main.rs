@@ -21,9 +21,14 @@ fn main() -> ExitCode {
         eprintln!("this runs in a virtual machine: `cargo xtask vm systemd`");
         return ExitCode::from(2);
     }
-    let short = std::env::args().any(|argument| argument == "--short");
+    let arguments: Vec<String> = std::env::args().collect();
+    let short = arguments.iter().any(|argument| argument == "--short");
+    let only = arguments
+        .iter()
+        .position(|argument| argument == "--only")
+        .and_then(|at| arguments.get(at + 1));
     let failed = match Bench::new() {
-        Ok(mut bench) => run_all(&mut bench, short),
+        Ok(mut bench) => run_all(&mut bench, short, only.map(String::as_str)),
         Err(error) => {
             println!("FAILED  bench: {error:#}");
             1
@@ -38,11 +43,19 @@ fn main() -> ExitCode {
     ExitCode::FAILURE
 }
 
-/// Runs every check, whatever became of the one before; gives the number of failures.
-fn run_all(bench: &mut Bench, short: bool) -> usize {
+/// How many checks come first that all others build on: installed, in its sandbox, plugged in.
+const BASIS: usize = 3;
+
+/// Runs every check, whatever became of the one before; gives the number of failures. With `only`,
+/// those by whose name it is a word, and those that all build on.
+fn run_all(bench: &mut Bench, short: bool, only: Option<&str>) -> usize {
     let mut failed = 0;
-    for check in checks::all() {
-        if short && check.takes_long {
+    for (number, check) in checks::all().into_iter().enumerate() {
+        let is_left_out = match only {
+            Some(only) => number >= BASIS && !check.name.contains(only),
+            None => short && check.takes_long,
+        };
+        if is_left_out {
             continue;
         }
         let start = Instant::now();

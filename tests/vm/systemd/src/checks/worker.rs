@@ -5,11 +5,11 @@ use std::fs;
 use std::os::unix::fs::{PermissionsExt, chown};
 use std::process::{Child, Command, Stdio};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
 use super::service::anew;
 use crate::bench::{Bench, ready, relief, text};
-use crate::system::{id_of, is_active, process_status, systemctl, try_run, wait};
+use crate::system::{id_of, is_active, process_status, run, systemctl, try_run, wait};
 
 const CONFIGURATION: &str = "/etc/relief/reliefd.toml";
 const WORKER: &str = "relief-worker.service";
@@ -86,7 +86,13 @@ pub(super) fn elsewhere(bench: &mut Bench) -> Result<()> {
     ready()?;
     systemctl(&["start", WORKER])?;
     wait("the worker is there", || {
-        ensure!(is_active(WORKER)?, "the worker has ended");
+        if !is_active(WORKER)? {
+            let log = run(
+                "journalctl",
+                &["--unit", WORKER, "--lines", "9", "--no-pager"],
+            )?;
+            bail!("the worker has ended: {log}");
+        }
         let fleet = relief(&["fleet"])?;
         Ok(fleet["workers"]
             .as_array()
