@@ -6,13 +6,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
+use job_queue::BenchName;
 use job_queue::jetstream::{JetStreamQueue, Options};
-use job_queue::{BenchName, QueueError};
 use relief_api::{Event, Job, JobList, Scan, ScanState, StartScan, path};
 use relief_tests::rig::{Client, GUARD, Program, small_house};
 use sim_scanner::config::SimConfig;
 use sim_scanner::endpoint::pty::PtyServer;
 use tokio::runtime::Handle;
+
+use crate::cluster::{Cluster, urls};
 
 const NAME: &str = "bench-1";
 const LOOK: Duration = Duration::from_millis(100);
@@ -164,46 +166,43 @@ impl Bench {
             .clone()
     }
 
-    /// Waits until nothing of this bench's is left on the servers; gives what is left all the same.
-    pub(crate) async fn left_on(&self, servers: &[String], longest: Duration) -> Result<u64> {
-        let mut options = Options::new(servers.to_vec());
+    /// Waits until the bench itself has cleared up all that is its on the servers: orders, standings,
+    /// objects, and messages that no object's name leads to. Fails if that takes longer.
+    pub(crate) async fn is_cleared_up(&self, cluster: &Cluster, longest: Duration) -> Result<()> {
+        let mut options = Options::new(urls(&cluster.ports()));
         options.makes_missing = false;
         let handle = Handle::current();
-        let begun = Instant::now();
-        tokio::task::spawn_blocking(move || {
+        let queue = tokio::task::spawn_blocking(move || -> Result<_> {
             let queue = JetStreamQueue::new(options, handle)?;
             queue.wait_connected(GUARD)?;
-            let (depot, bench) = (queue.depot(), BenchName::try_from(NAME.to_owned())?);
-            // Of orders, objects, and messages that no object's name leads to.
-            let look = || -> Result<[u64; 4], QueueError> {
-                let depth = queue.depth()?;
-                let orders = depth.waiting.values().sum::<u64>() + depth.running;
-                let objects = depot.list(&bench)?.len() as u64;
-                let standings = queue.standings(&bench)?.len() as u64;
-                let messages = match orders + objects + standings {
-                    0 => {
-                        depot
-                            .sweep(&bench, &|_| true, Duration::ZERO)?
-                            .orphan_messages
-                    }
-                    _ => 0,
-                };
-                Ok([orders, standings, objects, messages])
-            };
-            loop {
-                match look() {
-                    Ok([0, 0, 0, messages]) => return Ok(messages),
-                    Ok(left) if begun.elapsed() >= longest => {
-                        eprintln!("left: [orders, standings, objects, messages] = {left:?}");
-                        return Ok(left.iter().sum());
-                    }
-                    // The servers may just be finding a leader.
-                    Err(error) if begun.elapsed() >= longest => return Err(error.into()),
-                    Ok(_) | Err(_) => std::thread::sleep(LOOK),
-                }
-            }
+            Ok(Arc::new(queue))
         })
-        .await?
+        .await??;
+        let begun = Instant::now();
+        loop {
+            let queue = Arc::clone(&queue);
+            let look = move || -> Result<[u64; 3]> {
+                let bench = BenchName::try_from(NAME.to_owned())?;
+                let depth = queue.depth()?;
+                Ok([
+                    depth.waiting.values().sum::<u64>() + depth.running,
+                    queue.standings(&bench)?.len() as u64,
+                    queue.depot().list(&bench)?.len() as u64,
+                ])
+            };
+            // The servers may just be finding a leader.
+            let left = tokio::task::spawn_blocking(look).await?;
+            let messages = cluster.messages(&format!("OBJ_relief-{NAME}"));
+            if matches!(left, Ok([0, 0, 0])) && messages == Some(0) {
+                return Ok(());
+            }
+            ensure!(
+                begun.elapsed() < longest,
+                "left on the servers: [orders, standings, objects] = {left:?}, messages of objects = \
+                 {messages:?}"
+            );
+            tokio::time::sleep(LOOK).await;
+        }
     }
 
     /// When a job was first told to run, and when it was over.

@@ -117,6 +117,22 @@ impl Cluster {
             .unwrap_or_default()
     }
 
+    /// How many messages the leader of a stream has; none can be told while there is none.
+    pub(crate) fn messages(&self, stream: &str) -> Option<u64> {
+        self.members.iter().find_map(|member| {
+            let answer = member.monitored("/jsz?accounts=true&streams=true").ok()?;
+            let accounts = answer["account_details"].as_array()?;
+            let streams = accounts
+                .iter()
+                .filter_map(|one| one["stream_detail"].as_array());
+            let found = streams.flatten().find(|one| one["name"] == stream)?;
+            // A single server has no cluster to tell of.
+            let leader = &found["cluster"]["leader"];
+            let leads = leader.is_null() || *leader == member.name.as_str();
+            leads.then(|| found["state"]["messages"].as_u64())?
+        })
+    }
+
     /// What each server has of each stream.
     pub(crate) fn told(&self) -> String {
         let mut told = String::new();

@@ -202,12 +202,12 @@ async fn run(options: &Options) -> Result<()> {
     let seconds = begun.elapsed().as_secs();
     trouble.end()?;
 
-    let held = hold(&bench, &orders, &scans, &expected, &trouble.ports()).await;
+    let held = hold(&bench, &orders, &scans, &expected, trouble.cluster()).await;
     let (attempts, published) = match held {
         Ok(held) => held,
         Err(error) => {
             let kept = folder.keep();
-            let told = trouble.servers();
+            let told = trouble.cluster().told();
             return Err(error.context(format!(
                 "what the programs have told is in {}; the servers have{told}",
                 kept.display()
@@ -235,7 +235,7 @@ async fn hold(
     orders: &BTreeMap<u64, String>,
     scans: &[String],
     expected: &BTreeMap<String, Files>,
-    servers: &[u16],
+    cluster: &Cluster,
 ) -> Result<(u32, usize)> {
     let jobs = bench.jobs_over().await?;
     let mut attempts = 0;
@@ -267,7 +267,6 @@ async fn hold(
         "{results} results of {} jobs",
         orders.len() + scans.len()
     );
-    let left = bench.left_on(&urls(servers), CLEARED).await?;
-    ensure!(left == 0, "{left} things were left on the servers");
+    bench.is_cleared_up(cluster, CLEARED).await?;
     Ok((attempts, published.len()))
 }

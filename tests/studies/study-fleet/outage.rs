@@ -66,8 +66,7 @@ pub(crate) async fn measure(options: &Options, outage: Duration) -> Result<()> {
     let elsewhere = files_of(&bench.spool().join(&over.result))?;
     ensure!(over.worker.as_deref() == Some("hand-1"), "{over:?}");
     job_over(&bench, &there.id).await?;
-    let left = bench.left_on(&urls(&cluster.ports()), CLEARED).await?;
-    ensure!(left == 0, "{left} things were left on the servers");
+    bench.is_cleared_up(&cluster, CLEARED).await?;
 
     bench.part().await?;
     let again: Job = bench

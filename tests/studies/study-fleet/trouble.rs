@@ -106,14 +106,9 @@ impl Trouble {
         Ok(())
     }
 
-    /// Ports of the servers themselves.
-    pub(crate) fn ports(&self) -> Vec<u16> {
-        self.cluster.ports()
-    }
-
-    /// What each server has of each stream.
-    pub(crate) fn servers(&self) -> String {
-        self.cluster.told()
+    /// The servers themselves.
+    pub(crate) fn cluster(&self) -> &Cluster {
+        &self.cluster
     }
 
     /// What has happened so far.

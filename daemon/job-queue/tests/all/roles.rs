@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use job_queue::depot::{Kind, Parcel};
+use job_queue::depot::Kind;
 use job_queue::jetstream::{JetStreamQueue, Login, Node, Options, Role, Secret};
 use job_queue::{BenchName, JobQueue, QueueError, Worker};
 
@@ -176,10 +176,12 @@ fn each_role_can_do_its_work() {
         .unwrap();
     assert!(fetched == journal);
     lease.tell("segment", 0.5, None);
-    for _ in 0..2 {
+    let put = || {
         let mut result: &[u8] = b"STEP";
-        depot.put(&lab, Kind::Result, &mut result).unwrap();
-    }
+        depot.put(&lab, Kind::Result, &mut result).unwrap()
+    };
+    put();
+    let parcel = put();
     lease.settle(&done()).unwrap();
     worker
         .take(&me, LIMIT)
@@ -194,7 +196,6 @@ fn each_role_can_do_its_work() {
     while lease.stop().is_none() {
         std::thread::sleep(Duration::from_millis(5));
     }
-    let parcel = Parcel::of_reader(&mut b"STEP".as_slice()).unwrap();
     let mut result = Vec::new();
     let depot = bench.depot();
     depot
