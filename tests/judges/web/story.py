@@ -8,10 +8,12 @@ Screenshots of every view go into the folder PICTURES.
 import hashlib
 import json
 import pathlib
+import shutil
 import sys
 import tempfile
 import time
 
+import fleet
 from bench import Bench
 from browser import Page, browser
 from playwright.sync_api import expect
@@ -354,6 +356,8 @@ folder = "{archive}"
             story.keyboard()
             story.looks(scan)
             story.many_jobs(scan)
+        if shutil.which("nats-server"):
+            fleet.judge(programs.resolve(), opened, pictures)
     print(f"the story is told; its pictures are in {pictures}")
 
 
