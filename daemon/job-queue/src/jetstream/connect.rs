@@ -167,7 +167,13 @@ impl Link {
             }
             Event::ClientError(ClientError::Other(text)) => {
                 let refused = text.contains("authorization violation") || text.contains("nonce");
-                self.failed(&text, refused);
+                // All that the client says where no connection can be made.
+                let text = if text == "IO error" {
+                    "nobody answers there"
+                } else {
+                    &text
+                };
+                self.failed(text, refused);
             }
             _ => {}
         }
