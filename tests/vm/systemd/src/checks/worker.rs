@@ -4,12 +4,13 @@
 use std::fs;
 use std::os::unix::fs::{PermissionsExt, chown};
 use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
 
 use super::service::anew;
 use crate::bench::{Bench, ready, relief, text};
-use crate::system::{id_of, is_active, process_status, run, systemctl, try_run, wait};
+use crate::system::{id_of, is_active, process_status, systemctl, try_run, wait};
 
 const CONFIGURATION: &str = "/etc/relief/reliefd.toml";
 const WORKER: &str = "relief-worker.service";
@@ -87,10 +88,10 @@ pub(super) fn elsewhere(bench: &mut Bench) -> Result<()> {
     systemctl(&["start", WORKER])?;
     wait("the worker is there", || {
         if !is_active(WORKER)? {
-            let log = run(
-                "journalctl",
-                &["--unit", WORKER, "--lines", "9", "--no-pager"],
-            )?;
+            // Its last words may be on their way to the journal.
+            std::thread::sleep(Duration::from_secs(2));
+            let words = ["status", WORKER, "--lines", "9", "--no-pager", "--full"];
+            let (_, log, _) = try_run("systemctl", &words)?;
             bail!("the worker has ended: {log}");
         }
         let fleet = relief(&["fleet"])?;
