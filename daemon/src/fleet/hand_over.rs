@@ -22,8 +22,9 @@ const LOOK: Duration = Duration::from_secs(1);
 const SOON: Duration = Duration::from_millis(200);
 /// How long what does not work is left alone.
 const PAUSE: Duration = Duration::from_secs(2);
-/// A result that is damaged on its way is asked for again so often.
-const MOST_DAMAGED: u32 = 3;
+/// What is damaged or missing on its way is asked for again so often: after a second, and each time
+/// after twice as long, since servers that have just lost one of theirs may know better soon.
+const MOST_DAMAGED: u32 = 5;
 /// What runs elsewhere is left to run for so many times as long as what waits, when the servers are
 /// away.
 const LONGER: u32 = 20;
@@ -298,6 +299,8 @@ impl HandOver {
                 self.service.note_elsewhere(job.id, None)?;
                 self.service.turn_job(job.id)?;
                 fleet.clear(order, delivered.ok().as_ref());
+                let pause = Duration::from_secs(1 << (*damaged - 1));
+                self.service.wait_for_stop(pause);
                 Ok(Left::Anew)
             }
             Err(error) => {
