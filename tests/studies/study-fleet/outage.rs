@@ -4,6 +4,7 @@
 //! fast its columns come is compared, over the time for which the link was cut. Then its job is to be
 //! handed over by itself, and its result held against the bench's own.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
@@ -27,6 +28,17 @@ const GUARD: Duration = Duration::from_secs(300);
 
 pub(crate) async fn measure(options: &Options, outage: Duration) -> Result<()> {
     let folder = tempfile::Builder::new().prefix("fleet-").tempdir()?;
+    let measured = measure_in(folder.path(), options, outage).await;
+    measured.map_err(|error| {
+        let kept = folder.keep();
+        error.context(format!(
+            "what the programs have told is in {}",
+            kept.display()
+        ))
+    })
+}
+
+async fn measure_in(folder: &Path, options: &Options, outage: Duration) -> Result<()> {
     let long = outage + 2 * BEFORE;
     let house = small_house();
     let scanner = SimConfig {
@@ -41,7 +53,7 @@ pub(crate) async fn measure(options: &Options, outage: Duration) -> Result<()> {
         },
         ..house
     };
-    let mut bench = Bench::before(&options.program("reliefd")?, folder.path(), &scanner).await?;
+    let mut bench = Bench::before(&options.program("reliefd")?, folder, &scanner).await?;
     let cluster = Cluster::start(options.servers)?;
     let link = Link::to(&cluster.ports())?;
     bench
@@ -50,7 +62,7 @@ pub(crate) async fn measure(options: &Options, outage: Duration) -> Result<()> {
     let hire = Hire {
         program: options.program("relief")?,
         servers: urls(&cluster.ports()),
-        folder: folder.path().to_owned(),
+        folder: folder.to_owned(),
         silence_s: SILENCE_S,
     };
     let worker = hire.start("hand-1")?;
