@@ -269,10 +269,7 @@ impl Fleet {
             };
             needed.extend(chunks.iter().map(|chunk| chunk.object(Kind::Result)));
         }
-        match self
-            .depot
-            .sweep(&self.bench, &|name| needed.contains(name), grace)
-        {
+        match self.depot.sweep(&self.bench, &needed, grace) {
             Ok(swept) if swept.objects + swept.orphan_messages > 0 => {
                 tracing::info!(
                     objects = swept.objects,

@@ -22,6 +22,9 @@ const LOOK: Duration = Duration::from_secs(1);
 const SOON: Duration = Duration::from_millis(200);
 /// How long what does not work is left alone.
 const PAUSE: Duration = Duration::from_secs(2);
+/// How often it looks for a result before it takes it for damaged: a server that has just begun to
+/// lead may not know yet what it has.
+const LOOKS: u32 = 4;
 /// What is damaged or missing on its way is asked for again so often: after a second, and each time
 /// after twice as long, since servers that have just lost one of theirs may know better soon.
 const MOST_DAMAGED: u32 = 5;
@@ -266,6 +269,7 @@ impl HandOver {
             Ok(Answer::Missing(what)) => Err(format!("a worker has not found the columns: {what}")),
             Err(error) => Err(told(&error)),
         };
+        let mut looks = 1;
         let fetched = match &delivered {
             Ok(delivered) => loop {
                 if let Some(left) = self.is_left(true) {
@@ -273,6 +277,10 @@ impl HandOver {
                 }
                 match fleet.fetch(&self.service, job, delivered) {
                     Err(FetchError::Queue(QueueError::Away(_))) => fleet.board.pause(LOOK),
+                    Err(FetchError::Queue(QueueError::Damaged { .. })) if looks < LOOKS => {
+                        looks += 1;
+                        self.service.wait_for_stop(LOOK);
+                    }
                     // As of a result that was made here; making it once more would not help.
                     Err(FetchError::Spool { error, hint }) => {
                         let hint = Some(hint);

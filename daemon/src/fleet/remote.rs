@@ -18,6 +18,9 @@ use crate::jobs::{Craft, Halt, Made, Names, Progress, Workpiece};
 
 /// How long it waits before it tries again what the servers did not do.
 const PAUSE: Duration = Duration::from_secs(1);
+/// How often it looks for columns before it says that they are not there: a server that has just
+/// begun to lead may not know yet what it has.
+const LOOKS: u32 = 4;
 
 /// Makes results for benches elsewhere.
 pub(super) struct Remote<'a> {
@@ -105,6 +108,7 @@ impl Remote<'_> {
         std::fs::create_dir_all(&incoming).map_err(here(&incoming))?;
 
         progress.begin("fetch");
+        let mut looks = 1;
         let fetched = self.patiently(progress, || {
             let file = File::create(&journal).map_err(here(&journal))?;
             let mut file = BufWriter::new(file);
@@ -113,6 +117,10 @@ impl Remote<'_> {
                 .fetch(bench, Kind::Journal, &work.journal, &mut file);
             file.flush().map_err(here(&journal))?;
             Ok(match fetched {
+                Err(QueueError::Damaged { what, why }) if looks < LOOKS => {
+                    looks += 1;
+                    Err(QueueError::Away(format!("{what}: {why}")))
+                }
                 Err(QueueError::Damaged { what, why }) => Ok(Err(format!("{what}: {why}"))),
                 other => other.map(Ok),
             })

@@ -68,14 +68,16 @@ impl Depot {
     }
 
     /// Removes what is older than `grace`, by the server's clock, and is not `needed`: objects by
-    /// their names, and the bytes of objects that were never finished.
+    /// their names, and the bytes of objects that were never finished. These stay while something
+    /// needed is not found: a server that has just begun to lead may not know yet what it has, and
+    /// whose bytes they are.
     ///
     /// # Errors
     /// Any but [`QueueError::Lost`]. Some of it may have been removed.
     pub fn sweep(
         &self,
         bench: &BenchName,
-        needed: &dyn Fn(&str) -> bool,
+        needed: &HashSet<String>,
         grace: Duration,
     ) -> Result<Swept, QueueError> {
         let (bucket, subjects, found, now) = self.run(async {
@@ -90,8 +92,12 @@ impl Depot {
         let old = |at: DateTime| now - at >= grace;
         let mut swept = Swept::default();
         let mut named = HashSet::new();
+        let mut unseen: HashSet<&String> = needed.iter().collect();
         for Found { name, info, at } in found {
-            let wanted = info.is_some() && needed(&name);
+            let wanted = info.is_some() && needed.contains(&name);
+            if wanted {
+                unseen.remove(&name);
+            }
             if wanted || !old(at) {
                 named.extend(info.map(|info| bucket.bytes(&info.nuid)));
                 continue;
@@ -101,6 +107,9 @@ impl Depot {
                 swept.objects += 1;
                 swept.bytes += info.size as u64;
             }
+        }
+        if !unseen.is_empty() {
+            return Ok(swept);
         }
         for subject in subjects.difference(&named.into_iter().collect()) {
             swept.orphan_messages += self.run(async {
