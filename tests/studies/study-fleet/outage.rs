@@ -19,8 +19,8 @@ use crate::cluster::{Cluster, Link, urls};
 use crate::workers::Hire;
 use crate::{CLEARED, Options, SILENCE_S};
 
-/// Columns and rays: ten columns a second, when the servers are away for two minutes.
-const SIZE: (u32, u32) = (1400, 64);
+/// Columns and rays: three columns a second, when the servers are away for two minutes.
+const SIZE: (u32, u32) = (480, 128);
 /// Of the scan's time, what it goes on before the link is cut and after.
 const BEFORE: Duration = Duration::from_secs(10);
 /// A scan or job may take so much longer than it should.
