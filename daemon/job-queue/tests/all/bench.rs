@@ -11,7 +11,7 @@ use job_queue::{
 };
 use relief_api::JobState;
 
-use crate::server::{self, LIMIT, connect, options};
+use crate::server::{self, LIMIT, behind, connect, lose_orders, options};
 use nats_child::Server;
 
 pub(crate) fn key(job: u64) -> JobKey {
@@ -179,25 +179,13 @@ fn an_order_without_a_message_is_put_again() {
         return;
     };
     queue.offer(&order(1)).unwrap();
-    server::RUNTIME.block_on(async {
-        let client = async_nats::connect(server.url()).await.unwrap();
-        let context = async_nats::jetstream::new(client);
-        let name = format!("{}_JOBS", options.prefix.to_uppercase());
-        let stream = context.get_stream(name).await.unwrap();
-        assert_eq!(stream.purge().await.unwrap().purged, 1);
-    });
+    assert_eq!(lose_orders(&server, &options), 1);
     let nothing = queue.take(&Worker::named("w"), Duration::ZERO).unwrap();
     assert!(nothing.is_none());
     queue.offer(&order(1)).unwrap();
     let mut lease = take(&queue, "w");
     // So it is when the message is lost under a worker's hands.
-    server::RUNTIME.block_on(async {
-        let client = async_nats::connect(server.url()).await.unwrap();
-        let context = async_nats::jetstream::new(client);
-        let name = format!("{}_JOBS", options.prefix.to_uppercase());
-        let stream = context.get_stream(name).await.unwrap();
-        assert_eq!(stream.purge().await.unwrap().purged, 1);
-    });
+    assert_eq!(lose_orders(&server, &options), 1);
     queue.offer(&order(1)).unwrap();
     let mut next = take(&queue, "v");
     assert_eq!(next.begun().attempts, 2);
@@ -231,19 +219,10 @@ fn an_order_that_cannot_be_read_fails() {
         return;
     };
     queue.offer(&order(1)).unwrap();
-    server::RUNTIME.block_on(async {
-        let client = async_nats::connect(server.url()).await.unwrap();
-        let context = async_nats::jetstream::new(client);
-        let name = format!("{}_JOBS", options.prefix.to_uppercase());
-        let stream = context.get_stream(name).await.unwrap();
-        stream.purge().await.unwrap();
-        for job in ["lab-1.1-1", "nobody"] {
+    lose_orders(&server, &options);
+    behind(&server, |context| async move {
+        for job in ["lab-1.1-1", "nobody.x"] {
             let subject = format!("{}.jobs.v1.normal.m0.{job}", options.prefix);
-            let subject = if job == "nobody" {
-                format!("{subject}.x")
-            } else {
-                subject
-            };
             let sent = context.publish(subject, "{".into()).await.unwrap();
             sent.await.unwrap();
         }
@@ -407,9 +386,7 @@ fn a_message_that_nothing_speaks_for_is_dropped() {
             options.prefix, order.key, order.turn
         );
         let payload = serde_json::to_vec(order).unwrap();
-        server::RUNTIME.block_on(async {
-            let client = async_nats::connect(server.url()).await.unwrap();
-            let context = async_nats::jetstream::new(client);
+        behind(&server, |context| async move {
             let sent = context.publish(subject, payload.into()).await.unwrap();
             sent.await.unwrap();
         });

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use job_queue::depot::Kind;
 use job_queue::jetstream::JetStreamQueue;
 use job_queue::{JobQueue, QueueError, Worker};
+use nats_child::Server;
 use relief_api::JobState;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
@@ -158,15 +159,21 @@ fn what_a_cut_cable_interrupts_goes_on() {
     assert_eq!(u64::from(settled), ORDERS, "each is settled by one");
 }
 
-#[test]
-fn bytes_go_on_where_a_cable_was_cut() {
-    let Some(server) = server::shared() else {
-        return;
-    };
+/// A queue that is connected by a cable.
+fn by_cable() -> Option<(Arc<Server>, Cable, Arc<JetStreamQueue>)> {
+    let server = server::shared()?;
     let mut options = options(&server.url());
     let cable = Cable::to(server.port());
     options.servers = vec![cable.url()];
     let queue = connect(&options);
+    Some((server, cable, queue))
+}
+
+#[test]
+fn bytes_go_on_where_a_cable_was_cut() {
+    let Some((_server, cable, queue)) = by_cable() else {
+        return;
+    };
     let depot = queue.depot();
     let bench = key(1).bench;
     let bytes: Vec<u8> = (0..12_u32 << 20)
@@ -194,13 +201,9 @@ fn bytes_go_on_where_a_cable_was_cut() {
 /// Calls do not wait for a network that is not there.
 #[test]
 fn what_is_away_is_told_at_once() {
-    let Some(server) = server::shared() else {
+    let Some((_server, cable, queue)) = by_cable() else {
         return;
     };
-    let mut options = options(&server.url());
-    let cable = Cable::to(server.port());
-    options.servers = vec![cable.url()];
-    let queue = connect(&options);
     thread::scope(|scope| {
         let waits = scope.spawn(|| {
             queue

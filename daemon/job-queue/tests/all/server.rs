@@ -1,9 +1,11 @@
 //! Debian's `nats-server`, as a child.
 
+use std::future::Future;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, Weak};
 use std::time::Duration;
 
+use async_nats::jetstream::Context;
 use job_queue::jetstream::{JetStreamQueue, Options};
 use nats_child::{KEEPS, Server, is_wanted};
 use tempfile::TempDir;
@@ -46,6 +48,26 @@ pub(crate) fn in_folder(folder: TempDir, port: u16, more: &str) -> Arc<Server> {
     let server = Server::in_folder(folder, port, &format!("{KEEPS}\n{more}")).unwrap();
     server.start().unwrap();
     Arc::new(server)
+}
+
+/// Does something on the server behind the queue's back.
+pub(crate) fn behind<T, F: Future<Output = T>>(
+    server: &Server,
+    work: impl FnOnce(Context) -> F,
+) -> T {
+    RUNTIME.block_on(async {
+        let client = async_nats::connect(server.url()).await.unwrap();
+        work(async_nats::jetstream::new(client)).await
+    })
+}
+
+/// Removes the messages of all orders; gives how many there were.
+pub(crate) fn lose_orders(server: &Server, options: &Options) -> u64 {
+    let name = format!("{}_JOBS", options.prefix.to_uppercase());
+    behind(server, |context| async move {
+        let stream = context.get_stream(name).await.unwrap();
+        stream.purge().await.unwrap().purged
+    })
 }
 
 /// The server that tests share which do it no harm. It ends with the last of them.
