@@ -1,5 +1,6 @@
 //! Files that receivers name: secrets, and certificates.
 
+use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::os::unix::fs::PermissionsExt;
@@ -48,7 +49,8 @@ pub(crate) fn read_secret(key: &'static str, what: &str, path: &Path) -> Result<
         return Err(failed(format!("{shown} is no file")));
     }
     let mode = metadata.permissions().mode();
-    if mode & others(path) != 0 {
+    let credentials = std::env::var_os("CREDENTIALS_DIRECTORY");
+    if mode & others(path, credentials.as_deref()) != 0 {
         return Err(failed(format!(
             "the {what} in {shown} may be used by others (mode {:04o}): chmod 600 {shown}, and if \
              others could have read it, make another one",
@@ -64,9 +66,9 @@ pub(crate) fn read_secret(key: &'static str, what: &str, path: &Path) -> Result<
 
 /// What of a secret's mode lets in others. systemd keeps credentials for one service in a folder that
 /// it alone may enter, where the mask of an ACL shows as what the group may do.
-fn others(path: &Path) -> u32 {
-    let folder = std::env::var_os("CREDENTIALS_DIRECTORY");
-    if folder.is_some_and(|folder| !folder.is_empty() && path.starts_with(folder)) {
+fn others(path: &Path, credentials: Option<&OsStr>) -> u32 {
+    let is_credential = |folder: &OsStr| !folder.is_empty() && path.starts_with(folder);
+    if credentials.is_some_and(is_credential) {
         0o037
     } else {
         0o077
@@ -137,6 +139,25 @@ pub(super) fn authorities_of_the_machine() -> Vec<CertificateDer<'static>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_systemd_hands_over_may_show_the_mask_of_an_acl() {
+        let of = |path: &str, folder: Option<&str>| others(Path::new(path), folder.map(OsStr::new));
+        let folder = "/run/credentials/relief-worker.service";
+        let token = "/run/credentials/relief-worker.service/token";
+        assert_eq!(of(token, Some(folder)), 0o037);
+        for (path, folder) in [
+            (token, None),
+            (token, Some("")),
+            (
+                "/run/credentials/relief-worker.service2/token",
+                Some(folder),
+            ),
+            ("/etc/relief/token", Some(folder)),
+        ] {
+            assert_eq!(of(path, folder), 0o077, "{path} {folder:?}");
+        }
+    }
 
     #[test]
     fn files_of_certificates_hold_some() {
