@@ -7,6 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
+use serde_json::Value;
 
 use super::service::anew;
 use crate::bench::{Bench, ready, relief, text};
@@ -17,6 +18,8 @@ const WORKER: &str = "relief-worker.service";
 const ADDRESS: &str = "127.0.0.1";
 /// Not the one on which Debian's own unit listens.
 const PORT: &str = "4333";
+/// Room for this on the machine's small disk is promised to the bench.
+const QUOTA_MB: u32 = 64;
 const TOKEN: &str = "a token of the checks";
 /// For the service to read, and for systemd to hand to the worker.
 const TOKEN_FILES: [&str; 2] = ["/etc/relief/nats.token", "/etc/relief/worker.token"];
@@ -59,8 +62,9 @@ pub(super) fn elsewhere(bench: &mut Bench) -> Result<()> {
     }
     let [of_service, of_worker] = TOKEN_FILES;
     chown(of_service, Some(id_of("/etc/passwd", "relief")?), None)?;
-    let servers =
-        format!("[nats]\nservers = [\"nats://{ADDRESS}:{PORT}\"]\ntoken_file = {of_service:?}\n");
+    let servers = format!(
+        "[nats]\nservers = [\"nats://{ADDRESS}:{PORT}\"]\ntoken_file = {of_service:?}\nquota_mb = {QUOTA_MB}\n"
+    );
     let now = before
         .replace(
             "# roles = [\"acquire\", \"work\", \"serve\"]",
