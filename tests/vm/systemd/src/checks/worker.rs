@@ -114,13 +114,21 @@ pub(super) fn elsewhere(bench: &mut Bench) -> Result<()> {
         "it may do more than it should"
     );
 
-    let told = relief(&["scan", "--name", "house", "--wait"])?;
-    ensure!(told["job"]["state"] == "done", "{told}");
+    let id = text(&relief(&["scan", "--name", "house"])?["scan"]["id"])?;
+    let job = || -> Result<Value> {
+        let jobs = relief(&["jobs"])?;
+        let all = jobs["jobs"].as_array();
+        let found = all.and_then(|all| all.iter().find(|job| job["scan"] == *id));
+        Ok(found.cloned().unwrap_or_default())
+    };
+    let done = wait("a worker does the job", || Ok(job()?["state"] == "done"));
+    done.with_context(|| format!("{:?}, {:?}", job(), relief(&["fleet"])))?;
     ensure!(
-        told["job"]["worker"].is_string(),
-        "no worker had it: {told}"
+        job()?["worker"].is_string(),
+        "no worker had it: {:?}",
+        job()
     );
-    bench.picture_of(&text(&told["scan"]["id"])?)?;
+    bench.picture_of(&id)?;
     let (well, said, error) = try_run("systemctl", &["stop", WORKER])?;
     ensure!(well, "{said}{error}");
     let result = systemctl(&["show", WORKER, "--value", "--property", "Result"])?;
