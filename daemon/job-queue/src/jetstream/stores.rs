@@ -132,7 +132,7 @@ pub(crate) async fn find_or_make(
     makes_missing: bool,
 ) -> Result<Stream, QueueError> {
     use async_nats::jetstream::context::GetStreamErrorKind::JetStream;
-    let name = config.name.clone();
+    let (name, most) = (config.name.clone(), config.max_bytes);
     let error = match context.get_stream(&name).await {
         Ok(stream) => return Ok(stream),
         Err(error) => error,
@@ -149,6 +149,12 @@ pub(crate) async fn find_or_make(
         Ok(stream) => return Ok(stream),
         Err(error) => error,
     };
+    if error.to_string().contains("insufficient storage") {
+        return Err(QueueError::Full(format!(
+            "NATS cannot promise the {most} bytes of {name}: lower the bench's quota, or give the \
+             servers more room (max_file_store)"
+        )));
+    }
     // Somebody else may have been faster, with other limits.
     let found = context.get_stream(&name).await;
     found.map_err(|_| QueueError::Away(format!("stream {name} cannot be made: {error}")))

@@ -316,6 +316,29 @@ fn a_full_bucket_says_so() {
     assert!(rig.queue.is_connected());
 }
 
+#[test]
+fn a_quota_that_no_server_can_promise_is_told() {
+    if !nats_child::is_wanted() {
+        return;
+    }
+    let lines = "jetstream { store_dir: \"FOLDER/kept\", max_file_store: 10MB }";
+    let server = Server::new(lines).unwrap();
+    server.start().unwrap();
+    let mut options = options(&server.url());
+    options.quota_bytes = Some(1 << 30);
+    let depot = connect(&options).depot();
+    let bench = BenchName::try_from("lab-1".to_owned()).unwrap();
+    let refused = depot
+        .put(&bench, Kind::Journal, &mut [1_u8].as_slice())
+        .unwrap_err();
+    assert!(matches!(refused, QueueError::Full(_)), "{refused}");
+    let told = refused.to_string();
+    assert!(
+        told.contains("quota") && told.contains("1073741824 bytes"),
+        "{told}"
+    );
+}
+
 /// What a file is written to, and can be looked at.
 #[derive(Clone, Default)]
 struct Shelf(Rc<RefCell<Vec<u8>>>);
