@@ -25,9 +25,12 @@ const PAUSE: Duration = Duration::from_secs(2);
 /// How often it looks for a result before it takes it for damaged: a server that has just begun to
 /// lead may not know yet what it has.
 const LOOKS: u32 = 4;
-/// What is damaged or missing on its way is asked for again so often: after a second, and each time
+/// What is damaged or missing on its way is asked for again so often: after a moment, and each time
 /// after twice as long, since servers that have just lost one of theirs may know better soon.
 const MOST_DAMAGED: u32 = 5;
+/// The longest of these moments, which are so many in the silence that a worker is allowed.
+const MOMENT: Duration = Duration::from_secs(1);
+const MOMENTS: u32 = 30;
 /// What runs elsewhere is left to run for so many times as long as what waits, when the servers are
 /// away.
 const LONGER: u32 = 20;
@@ -61,6 +64,10 @@ pub(super) struct HandOver {
 impl HandOver {
     fn id(&self) -> JobId {
         self.taken.key.job
+    }
+
+    fn moment(&self) -> Duration {
+        MOMENT.min(self.fleet.config.silence() / MOMENTS)
     }
 
     /// Sees the job to its end, or to where somebody else goes on; tells whether something of it may
@@ -279,7 +286,7 @@ impl HandOver {
                     Err(FetchError::Queue(QueueError::Away(_))) => fleet.board.pause(LOOK),
                     Err(FetchError::Queue(QueueError::Damaged { .. })) if looks < LOOKS => {
                         looks += 1;
-                        self.service.wait_for_stop(LOOK);
+                        self.service.wait_for_stop(self.moment());
                     }
                     // As of a result that was made here; making it once more would not help.
                     Err(FetchError::Spool { error, hint }) => {
@@ -307,7 +314,7 @@ impl HandOver {
                 self.service.note_elsewhere(job.id, None)?;
                 self.service.turn_job(job.id)?;
                 fleet.clear(order, delivered.ok().as_ref());
-                let pause = Duration::from_secs(1 << (*damaged - 1));
+                let pause = self.moment() * 2_u32.pow(*damaged - 1);
                 self.service.wait_for_stop(pause);
                 Ok(Left::Anew)
             }

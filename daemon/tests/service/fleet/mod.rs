@@ -397,7 +397,7 @@ async fn what_a_worker_says_to_have_made_is_looked_at() {
     let stop = BareWorker::default();
     let lying = std::thread::spawn(move || {
         let mut lies = 0;
-        while lies < 4 {
+        while lies < 6 {
             let taken = liar.take(&Worker::named("liar"), GUARD).unwrap();
             let mut lease = taken.unwrap();
             let chunk = json!({ "sha256": "0".repeat(64), "bytes": 1 });
@@ -420,7 +420,7 @@ async fn what_a_worker_says_to_have_made_is_looked_at() {
     let over = job_over(&mut events, &rig, 1).await;
     lying.join().unwrap();
     stop.stop();
-    assert_eq!((over.state, over.attempts), (JobState::Failed, 4));
+    assert_eq!((over.state, over.attempts), (JobState::Failed, 6));
     let error = over.error.unwrap();
     assert!(
         error.contains("what a worker has made: chunk 1 of 1"),
