@@ -285,16 +285,24 @@ impl Rig {
         self.job_done(events, id).await
     }
 
-    /// Waits for a job's success, which may have come before; the events must have begun
-    /// by then.
+    /// Waits for a job's end, which may have come before; the events must have begun by then.
+    ///
+    /// # Errors
+    /// As [`Events::until`], and when the service does not answer.
+    pub async fn job_over(&self, events: &mut Events, id: JobId) -> Result<Job> {
+        let job: Job = self.client.get(&path::job(id)).await?;
+        if job.state.is_over() {
+            return Ok(job);
+        }
+        events.job_becomes(id, JobState::is_over).await
+    }
+
+    /// Waits for a job's success, as [`Self::job_over`].
     ///
     /// # Errors
     /// When it ends otherwise, and how.
     pub async fn job_done(&self, events: &mut Events, id: JobId) -> Result<Job> {
-        let mut job: Job = self.client.get(&path::job(id)).await?;
-        if !job.state.is_over() {
-            job = events.job_becomes(id, JobState::is_over).await?;
-        }
+        let job = self.job_over(events, id).await?;
         ensure!(
             job.state == JobState::Done,
             "job {id} is {}: {}; {}",

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use range_image::{Calibration, calibration::Head};
-use relief_api::{Job, JobState, path};
+use relief_api::{Job, JobState};
 use relief_tests::rig::{Refused, Rig, small_house};
 use scan_record::{EndCause, Header, JournalReader, JournalWriter, RawColumn, RawSample};
 
@@ -46,11 +46,7 @@ impl Bench {
         std::fs::write(self.journal(), journal)?;
         let mut events = self.rig.client().events().await?;
         let job = self.rig.rerun(&self.scan, &[]).await?;
-        let mut over: Job = self.rig.client().get(&path::job(job.id)).await?;
-        if !over.state.is_over() {
-            over = events.job_becomes(job.id, JobState::is_over).await?;
-        }
-        Ok(over)
+        self.rig.job_over(&mut events, job.id).await
     }
 
     /// The service refuses the job at once, and says this.
