@@ -3,7 +3,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use job_queue::{Ending, JobQueue, Order, Outcome, QueueError, Standing, Stop};
 use relief_api::{Job, JobId, JobState};
@@ -31,6 +31,9 @@ const MOST_DAMAGED: u32 = 5;
 /// The longest of these moments, which are so many in the silence that a worker is allowed.
 const MOMENT: Duration = Duration::from_secs(1);
 const MOMENTS: u32 = 30;
+/// What was not heard of for so many times the silence that a worker is allowed is offered once
+/// more: its message may be lost, as of a server that was killed.
+const DOUBT: u32 = 2;
 /// What runs elsewhere is left to run for so many times as long as what waits, when the servers are
 /// away.
 const LONGER: u32 = 20;
@@ -207,7 +210,18 @@ impl HandOver {
         let mut known: Option<Standing> = None;
         let mut begun = 0;
         let mut is_asked_to_stop = false;
+        let mut offered = Instant::now();
         loop {
+            let heard = fleet
+                .board
+                .heard(job.id)
+                .map_or(offered, |at| at.max(offered));
+            if heard.elapsed() >= fleet.config.silence() * DOUBT && fleet.queue.is_connected() {
+                offered = Instant::now();
+                if let Err(error) = fleet.queue.offer(order) {
+                    tracing::debug!(job = job.id, %error, "an order is looked for later");
+                }
+            }
             let is_its = |s: &Standing| s.turn == order.turn && s.state == JobState::Running;
             let runs = known.as_ref().is_some_and(is_its);
             match self.is_left(runs) {

@@ -44,6 +44,7 @@ pub(super) fn hear(service: &Arc<Service>, fleet: &Arc<Fleet>) {
             }) => {
                 let handed = lock(&fleet.handed).get(&key.job).cloned();
                 if let Some(handed) = handed {
+                    fleet.board.hear(key.job);
                     service.hub.tell(Event::Progress {
                         job: key.job,
                         scan: handed.scan,

@@ -1,7 +1,7 @@
 //! Debian's `nats-server` as a child that comes and goes, on the same port and folder.
 
 use std::fs;
-use std::io::{self, Error, ErrorKind};
+use std::io::{self, BufRead, BufReader, Error, ErrorKind, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -127,6 +127,31 @@ impl Server {
             // It may have ended by itself.
             let _ = child.kill();
             let _ = child.wait();
+        }
+    }
+
+    /// Loses the messages of a stream, as a server does that was killed at a bad moment.
+    ///
+    /// # Errors
+    /// When it does not answer, or has no such stream; with its answer.
+    pub fn lose(&self, stream: &str) -> io::Result<()> {
+        let connection = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port))?;
+        connection.set_read_timeout(Some(LIMIT))?;
+        write!(
+            &connection,
+            "CONNECT {{\"verbose\":false}}\r\nSUB answer 1\r\n\
+             PUB $JS.API.STREAM.PURGE.{stream} answer 0\r\n\r\n"
+        )?;
+        let mut lines = BufReader::new(&connection).lines();
+        let mut answers = lines.by_ref().skip_while(|line| {
+            let is_told = |line: &String| line.starts_with("MSG answer ");
+            !line.as_ref().is_ok_and(is_told)
+        });
+        let answer = answers.nth(1).transpose()?.unwrap_or_default();
+        if answer.contains("\"success\":true") {
+            Ok(())
+        } else {
+            Err(Error::other(answer))
         }
     }
 

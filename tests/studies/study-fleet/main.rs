@@ -36,8 +36,8 @@ use workers::Hire;
 
 /// How long a worker may be silent before another gets its job.
 const SILENCE_S: u32 = 3;
-/// Nothing that goes on takes so long.
-const GUARD: Duration = Duration::from_secs(1800);
+/// Where no job has come to its end for so long, none will.
+const GUARD: Duration = Duration::from_secs(300);
 /// How long what is left on the servers may take to be cleared up.
 const CLEARED: Duration = Duration::from_secs(120);
 
@@ -173,6 +173,7 @@ async fn run(options: &Options) -> Result<()> {
         [to_bench, to_workers],
     )?;
     let (mut done, mut set_aside) = (0, 0);
+    let mut last_end = Instant::now();
     while done < orders.len() {
         trouble.next().await?;
         let jobs = bench.jobs_over().await.unwrap_or_default();
@@ -185,16 +186,21 @@ async fn run(options: &Options) -> Result<()> {
             }
         }
         let is_done = |id: &&u64| jobs.get(*id).is_some_and(|job| !is_set_aside(job));
+        let were_done = done;
         done = orders.keys().filter(is_done).count();
+        if done > were_done {
+            last_end = Instant::now();
+        }
         eprintln!(
             "{done} of {} jobs are over: {}",
             orders.len(),
             trouble.told()
         );
-        if begun.elapsed() >= GUARD {
+        if last_end.elapsed() >= GUARD {
             let kept = folder.keep();
             anyhow::bail!(
-                "not all jobs came to an end; what the programs have told is in {}",
+                "no job came to its end for {} s; what the programs have told is in {}",
+                GUARD.as_secs(),
                 kept.display()
             );
         }

@@ -11,6 +11,17 @@ use super::{Shared, locked};
 use crate::order::{JobKey, Order};
 use crate::queue::{Ending, QueueError};
 
+/// How an order that is offered stood before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stood {
+    /// Not at all.
+    New,
+    /// It waits or runs.
+    Before,
+    /// There is nothing to wait for: it is over, or there is one of a later turn.
+    Over,
+}
+
 impl Shared {
     pub(super) async fn offer(&self, order: &Order) -> Result<(), QueueError> {
         let subject = self.names.order(order)?;
@@ -21,13 +32,18 @@ impl Shared {
         })?;
         let stores = self.stores().await?;
         // Before its message, which speaks for nothing without it.
-        if !self.stand(&stores, order).await? {
+        let stood = self.stand(&stores, order).await?;
+        if stood == Stood::Over {
             return Ok(());
         }
         for last in [false, true] {
             let stores = self.stores().await?;
             self.serve(&stores, &line).await?;
             match publish(&stores, &subject, &payload).await {
+                Ok(()) if stood == Stood::Before => {
+                    tracing::warn!(job = %order.key, "the servers had lost an order: it is put again");
+                    break;
+                }
                 Ok(()) => break,
                 Err(error) if error.kind() == PublishErrorKind::StreamNotFound && !last => {
                     self.doubt_stores().await;
@@ -46,14 +62,15 @@ impl Shared {
         Ok(())
     }
 
-    /// Keeps that the order waits. `false` if there is nothing to wait for.
-    async fn stand(&self, stores: &Stores, order: &Order) -> Result<bool, QueueError> {
+    /// Keeps that the order waits, unless it does already.
+    async fn stand(&self, stores: &Stores, order: &Order) -> Result<Stood, QueueError> {
         for _ in 0..TRIES {
             let found = stores.read(&order.key).await?;
             if let Some((kept, _)) = &found
                 && kept.standing.turn >= order.turn
             {
-                return Ok(kept.standing.turn == order.turn && !kept.is_over());
+                let waits = kept.standing.turn == order.turn && !kept.is_over();
+                return Ok(if waits { Stood::Before } else { Stood::Over });
             }
             let revision = found.as_ref().map(|(_, revision)| *revision);
             let waits = Kept::waiting(order.turn);
@@ -64,7 +81,7 @@ impl Shared {
                 self.withdraw(stores, &order.key, earlier.standing.turn)
                     .await?;
             }
-            return Ok(true);
+            return Ok(Stood::New);
         }
         Err(crowded(&order.key))
     }

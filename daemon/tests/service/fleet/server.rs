@@ -73,6 +73,11 @@ impl Nats {
         self.server.kill();
     }
 
+    /// Loses the orders that wait or run.
+    pub(super) fn lose_orders(&self) {
+        self.server.lose("RELIEF_JOBS").unwrap();
+    }
+
     pub(super) fn url(&self) -> String {
         self.server.url().replacen("nats", self.scheme, 1)
     }

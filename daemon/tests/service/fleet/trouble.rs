@@ -39,6 +39,43 @@ async fn a_worker_that_is_stopped_gives_its_job_back() {
     rig.daemon.shutdown().await;
 }
 
+/// As servers do that were killed: first one that waits, then one whose worker is gone, too.
+#[tokio::test(flavor = "multi_thread")]
+async fn an_order_that_the_server_loses_is_put_again() {
+    let Some(nats) = Nats::started() else { return };
+    let rig = rig(&nats).await;
+    let mut events = rig.client.events().await;
+    let scan = rig.start_scan("part").await;
+    ended(&mut events, &scan.id).await;
+    let watcher = queue(&nats).await;
+    until("the order on the server", async || {
+        let watcher = Arc::clone(&watcher);
+        let depth = blocking(move || watcher.depth().unwrap());
+        (depth.await.waiting.values().sum::<u64>() == 1).then_some(())
+    })
+    .await;
+    nats.lose_orders();
+    let first = Hired::new(&nats, "hand-1");
+    assert_eq!(job_over(&mut events, &rig, 1).await.state, JobState::Done);
+
+    let slow = begun_slow(&rig, &mut events, &scan.id).await;
+    nats.lose_orders();
+    // It gives back what is not there any more, so that nobody is told of it.
+    blocking(move || first.dismiss()).await;
+    let second = Hired::new(&nats, "hand-2");
+    until("the other worker at the job", async || {
+        let job = job(&rig, slow.id).await;
+        (job.state == JobState::Running && job.worker.as_deref() == Some("hand-2")).then_some(())
+    })
+    .await;
+    let _: Job = rig.client.ask(&path::job_cancel(slow.id)).await;
+    let over = job_over(&mut events, &rig, slow.id).await;
+    assert_eq!(over.state, JobState::Cancelled);
+    all_is_cleared(&nats).await;
+    drop(second);
+    rig.daemon.shutdown().await;
+}
+
 /// Its jobs begin at 1 again, where another one waits.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_bench_that_lost_its_records_takes_no_other_result_for_its_own() {
