@@ -252,7 +252,9 @@ fn local_spacing(window: &Window<'_>, nearest: &[Neighbour], lengths: &mut Vec<f
     lengths.truncate(number);
     let limit_mm = window.greatest_sample_spacing_mm;
     let along = typical(lengths).map_or(limit_mm, |spacing| spacing.min(limit_mm));
-    let area = nearest.last().map_or(0.0, |n| PI * n.distance2);
+    let area = nearest
+        .last()
+        .map_or(0.0, |n| PI * n.distance2 / window.stretch);
     let by_area = (area / nearest.len().max(1) as f64).sqrt();
     window.widened(window.spacing(along), AREA_SHARE * by_area)
 }
@@ -283,7 +285,7 @@ fn quality(
         squares += if is_inlier { residual * residual } else { 0.0 };
     }
     let nearest = window.iter().find(|n| agrees(n));
-    let nearest2 = nearest.map_or(f64::INFINITY, |n| n.distance2);
+    let nearest2 = nearest.map_or(f64::INFINITY, |n| n.dx * n.dx + n.dy * n.dy);
     let freedom = f64::from(inliers) - 3.0;
     NodeQuality {
         inliers: u16::try_from(inliers).unwrap_or(u16::MAX),

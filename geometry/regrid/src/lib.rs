@@ -2,7 +2,8 @@
 //! median of squares (MLMS), after Shim & Lee 1995, section II.1.
 //!
 //! At each node the M nearest samples are taken, nearest in x and y and within a hard reach
-//! in columns. The paper's estimator ([`Estimator::LeastMedian`]) draws N_s times three of
+//! in columns; where samples are more than four times as dense one way as the other, distances
+//! that way count the more. The paper's estimator ([`Estimator::LeastMedian`]) draws N_s times three of
 //! them, which give a plane `z = a x + b y + c`; the plane whose median of squared residuals
 //! over the M samples is least gives z at the node (equation 2). Up to half of the samples
 //! may be wrong (outliers, the other side of a step edge) without harm.

@@ -11,7 +11,7 @@ use order::Sorter;
 /// A sample as seen from a node.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Neighbour {
-    /// Squared distance in x and y.
+    /// Squared distance in x, as the window stretches it, and y.
     pub(crate) distance2: f64,
     /// Offset from the node in x.
     pub(crate) dx: f64,
@@ -63,7 +63,7 @@ const SURE: f64 = 1.0 - 1e-9;
 struct Seen {
     /// Offset from the nodes in x.
     dx: f64,
-    /// Its square.
+    /// Its square, stretched as the window is.
     dx2: f64,
     /// How far in y its samples count.
     reach_mm: f64,
@@ -118,15 +118,18 @@ impl Search {
             .strips
             .iter()
             .map(|s| (s.x_mm - x_mm).abs())
-            .fold(0.0, f64::max);
+            .fold(0.0, f64::max)
+            * window.stretch;
         let reach_mm = (reach_x_mm * reach_x_mm + window.reach_y_mm * window.reach_y_mm).sqrt();
         self.seen.clear();
         self.seen.extend(window.strips.iter().map(|strip| {
             let dx = strip.x_mm - x_mm;
+            let stretched = dx * window.stretch;
+            let dx2 = stretched * stretched;
             Seen {
                 dx,
-                dx2: dx * dx,
-                reach_mm: height(reach_mm * reach_mm, dx * dx).min(window.reach_y_mm),
+                dx2,
+                reach_mm: height(reach_mm * reach_mm, dx2).min(window.reach_y_mm),
                 above: 0,
             }
         }));

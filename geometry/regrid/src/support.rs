@@ -31,7 +31,7 @@ impl Surroundings {
     /// Looks at the samples near the node.
     fn look(&mut self, window: &[Neighbour], spacing: Spacing, settings: &SupportSettings) {
         let radius2 = settings.radius * settings.radius;
-        let greatest_mm = spacing.x_mm.max(spacing.y_mm);
+        let greatest_mm = (spacing.stretch * spacing.x_mm).max(spacing.y_mm);
         let within2 = UP * radius2 * greatest_mm * greatest_mm;
         // Without branches, for which samples are within is hard to foresee.
         self.near.resize(window.len(), (0, (0.0, 0.0)));

@@ -13,6 +13,10 @@ const PITCH_LIMIT: f64 = 4.0;
 /// up to this factor.
 const WIDENING_LIMIT: f64 = 2.0;
 
+/// Samples count as at most so many times as far apart one way as the other: where they are much
+/// denser one way, all that are nearest to a node would lie in one line, on which no plane stands.
+const LONGEST_CELL: f64 = 4.0;
+
 /// Columns within reach of a grid column, and what follows from them for all its nodes.
 #[derive(Debug)]
 pub(crate) struct Window<'a> {
@@ -21,6 +25,8 @@ pub(crate) struct Window<'a> {
     pub(crate) strips: &'a [Strip],
     /// Typical distance of neighbouring columns, millimetres.
     pub(crate) column_spacing_mm: f64,
+    /// How many times as far as in y samples count in x when the nearest are looked for.
+    pub(crate) stretch: f64,
     /// Greatest local sample spacing believed, millimetres.
     pub(crate) greatest_sample_spacing_mm: f64,
     /// How far in y a node's window reaches, millimetres.
@@ -49,6 +55,7 @@ impl<'a> Window<'a> {
         Some(Self {
             strips,
             column_spacing_mm,
+            stretch: stretch(column_spacing_mm, sample_spacing_mm),
             greatest_sample_spacing_mm: (SPACING_LIMIT * sample_spacing_mm).min(limit_mm),
             reach_y_mm: settings.reach_columns as f64 * column_spacing_mm.max(sample_spacing_mm),
         })
@@ -61,6 +68,7 @@ impl<'a> Window<'a> {
             mean_mm,
             x_mm: mean_mm.max(self.column_spacing_mm),
             y_mm: mean_mm.max(0.5 * sample_spacing_mm),
+            stretch: self.stretch,
         }
     }
 
@@ -79,8 +87,16 @@ impl<'a> Window<'a> {
             mean_mm,
             x_mm: spacing.x_mm.max(mean_mm),
             y_mm: spacing.y_mm.max(mean_mm),
+            stretch: spacing.stretch,
         }
     }
+}
+
+/// How many times as far as in y samples count in x that are so far apart.
+fn stretch(column_spacing_mm: f64, sample_spacing_mm: f64) -> f64 {
+    let long = sample_spacing_mm / (LONGEST_CELL * column_spacing_mm);
+    let wide = LONGEST_CELL * sample_spacing_mm / column_spacing_mm;
+    if long > 1.0 { long } else { wide.min(1.0) }
 }
 
 /// Finds distances of neighbours; what is found for one window makes the next one faster.
@@ -160,6 +176,8 @@ pub(crate) struct Spacing {
     pub(crate) x_mm: f64,
     /// Unit of support lengths in y.
     pub(crate) y_mm: f64,
+    /// That of the window.
+    pub(crate) stretch: f64,
 }
 
 #[cfg(test)]

@@ -107,7 +107,8 @@ impl Places {
         // Of places farther away it is not known whether they are empty.
         let within = samples.last()?.distance2.sqrt() - gap;
         let empty = |place: &Place| {
-            place.dx * place.dx + place.dy * place.dy <= within * within
+            let stretched = place.dx * window.stretch;
+            stretched * stretched + place.dy * place.dy <= within * within
                 && window.strips.get(place.strip).is_some_and(|strip| {
                     let counts = |(y, z): (f64, f64)| !around.hides(place.dx, y - y_mm, z);
                     is_clear(strip, y_mm + place.dy, EMPTY * gap, counts)

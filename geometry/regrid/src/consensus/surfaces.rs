@@ -171,7 +171,8 @@ impl Surfaces {
         effort: &Effort,
         draws: &mut Draws,
     ) -> &[Surface] {
-        let radius2 = window.last().map_or(0.0, |n| n.distance2);
+        let distances2 = window.iter().map(|n| n.dx * n.dx + n.dy * n.dy);
+        let radius2 = distances2.fold(0.0, f64::max);
         let width_mm = WIDTH * noise_mm;
         while let Some(first) = self.found.first().copied()
             && self.found.len() < MOST_SURFACES

@@ -27,15 +27,18 @@ enum Pattern {
     Clumped,
     /// Many more in a column than columns.
     Dense,
+    /// Many more columns than samples in one.
+    Sparse,
 }
 
 impl Pattern {
-    const ALL: [Self; 5] = [
+    const ALL: [Self; 6] = [
         Self::Lattice,
         Self::Double,
         Self::Scattered,
         Self::Clumped,
         Self::Dense,
+        Self::Sparse,
     ];
 
     fn strips(self, random: &mut Uniform) -> Vec<Strip> {
@@ -51,6 +54,7 @@ impl Pattern {
                     let z = f64::from(j % 3);
                     match self {
                         Self::Lattice => vec![(row, z)],
+                        Self::Sparse => vec![(9.0 * row, z)],
                         Self::Double if j % 5 == 0 => vec![(row, z), (row, z), (row, z + 1.0)],
                         Self::Double => vec![(row, z)],
                         Self::Scattered => vec![(40.0 * random.draw(), z)],
@@ -88,13 +92,14 @@ fn by_definition(
     number: usize,
 ) -> Vec<(usize, usize)> {
     let farthest = |far: f64, own: &Strip| far.max((own.x_mm - x_mm).abs());
-    let reach_x_mm = window.strips.iter().fold(0.0, farthest);
+    let reach_x_mm = window.strips.iter().fold(0.0, farthest) * window.stretch;
     // Samples at the very corners of the reach are within it or not as rounding has it.
     let reach_mm = (reach_x_mm * reach_x_mm + window.reach_y_mm * window.reach_y_mm).sqrt();
     let mut all = Vec::new();
     for (strip, own) in window.strips.iter().enumerate() {
         let dx = own.x_mm - x_mm;
-        let height_mm = height(reach_mm * reach_mm, dx * dx).min(window.reach_y_mm);
+        let dx2 = (dx * window.stretch) * (dx * window.stretch);
+        let height_mm = height(reach_mm * reach_mm, dx2).min(window.reach_y_mm);
         let mut samples: Vec<Neighbour> = own
             .samples
             .iter()
@@ -102,6 +107,7 @@ fn by_definition(
             .map(|(index, (y, z))| Neighbour {
                 strip,
                 index,
+                distance2: dx2 + (y - y_mm) * (y - y_mm),
                 ..Neighbour::at(dx, y - y_mm, *z)
             })
             .filter(|n| n.dy.abs() <= height_mm)

@@ -5,3 +5,4 @@ mod estimator;
 mod masks;
 mod order;
 mod settings;
+mod stretched;
