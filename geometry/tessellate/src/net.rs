@@ -14,8 +14,9 @@ const LEAST_HEIGHT_MM: f64 = 1e-4;
 /// A flip must widen the least angle by this, radians, so that flips come to an end.
 const LEAST_GAIN_RAD: f64 = 1e-6;
 
-/// Most triangles gone through on the way to a place.
-const FARTHEST: usize = 2000;
+/// Most triangles gone through on the way to a place. Where no other point lies in a triangle's
+/// circle there are few on the way to its centre; where many do, a point there helps nobody.
+const FARTHEST: usize = 200;
 
 /// Triangles of points in space, none of them turned over in the x-y plane.
 ///
