@@ -1,7 +1,7 @@
 //! The columns that the nodes of one grid column may draw on.
 
 use crate::settings::RegridSettings;
-use crate::strip::{Strip, at_rank, typical};
+use crate::strip::{Strip, at_rank, lower_median, typical};
 
 /// Within a window the local sample spacing is believed up to this many times the median
 /// one, which bounds the area a node has to look at.
@@ -52,10 +52,16 @@ impl<'a> Window<'a> {
             .max(column_spacing_mm);
         let limit_mm = PITCH_LIMIT * suited_mm;
         let sample_spacing_mm = sample_spacing_mm.min(limit_mm);
+        let mut stretch = stretch(column_spacing_mm, sample_spacing_mm);
+        if stretch != 1.0 {
+            // A crowded column must not speak for all.
+            let of_columns_mm = gaps.spacing_of_columns(strips)?.min(limit_mm);
+            stretch = self::stretch(column_spacing_mm, of_columns_mm);
+        }
         Some(Self {
             strips,
             column_spacing_mm,
-            stretch: stretch(column_spacing_mm, sample_spacing_mm),
+            stretch,
             greatest_sample_spacing_mm: (SPACING_LIMIT * sample_spacing_mm).min(limit_mm),
             reach_y_mm: settings.reach_columns as f64 * column_spacing_mm.max(sample_spacing_mm),
         })
@@ -103,6 +109,8 @@ fn stretch(column_spacing_mm: f64, sample_spacing_mm: f64) -> f64 {
 #[derive(Debug, Default)]
 pub(crate) struct Gaps {
     lengths: Vec<f64>,
+    /// Spacings of columns.
+    columns: Vec<f64>,
     /// The median sample spacing of the window before.
     before_mm: f64,
 }
@@ -130,6 +138,23 @@ impl Gaps {
         };
         self.before_mm = median;
         Some(median)
+    }
+
+    /// The median of the columns' own median distances.
+    fn spacing_of_columns(&mut self, strips: &[Strip]) -> Option<f64> {
+        self.columns.clear();
+        for strip in strips {
+            let above = strip.samples.get(1..).unwrap_or_default();
+            let gaps = strip
+                .samples
+                .iter()
+                .zip(above)
+                .map(|(low, high)| high.0 - low.0);
+            self.lengths.clear();
+            self.lengths.extend(gaps.filter(|gap| *gap > 0.0));
+            self.columns.extend(lower_median(&mut self.lengths));
+        }
+        lower_median(&mut self.columns)
     }
 
     /// The same if it is within these limits.
@@ -212,6 +237,29 @@ mod tests {
             assert!((found - 1.01).abs() < 1e-12, "{before_mm} {found}");
             assert_eq!(gaps.sample_spacing(&strips[1..2]), None);
         }
+    }
+
+    #[test]
+    fn a_crowded_column_stretches_no_window() {
+        let strip = |k: i32, number: i32| Strip {
+            x_mm: f64::from(k),
+            samples: (0..number)
+                .map(|j| (20.0 * f64::from(j) / f64::from(number), 0.0))
+                .collect(),
+        };
+        let settings = RegridSettings::with_pitch(2.0);
+        let stretch = |numbers: [i32; 7]| {
+            let strips: Vec<Strip> = (0..).zip(numbers).map(|(k, n)| strip(k, n)).collect();
+            Window::new(&strips, 3.0, &settings, &mut Gaps::default())
+                .unwrap()
+                .stretch
+        };
+        assert_eq!(stretch([20; 7]), 1.0);
+        assert_eq!(stretch([20, 20, 20, 100_000, 20, 20, 20]), 1.0);
+        assert!((stretch([200; 7]) - 0.4).abs() < 1e-9);
+        // Four columns from one sample to the next are the most that does not stretch.
+        assert_eq!(stretch([5; 7]), 1.0);
+        assert!(stretch([4; 7]) > 1.2);
     }
 
     #[test]
