@@ -285,16 +285,19 @@ impl Rig {
         self.job_done(events, id).await
     }
 
-    /// Waits for a job's end, which may have come before; the events must have begun by then.
+    /// Waits for a job's end, which may have come before; the events must have begun by then. As
+    /// they may still hold the end of an earlier attempt, they only tell when to ask again.
     ///
     /// # Errors
     /// As [`Events::until`], and when the service does not answer.
     pub async fn job_over(&self, events: &mut Events, id: JobId) -> Result<Job> {
-        let job: Job = self.client.get(&path::job(id)).await?;
-        if job.state.is_over() {
-            return Ok(job);
+        loop {
+            let job: Job = self.client.get(&path::job(id)).await?;
+            if job.state.is_over() {
+                return Ok(job);
+            }
+            events.job_becomes(id, JobState::is_over).await?;
         }
-        events.job_becomes(id, JobState::is_over).await
     }
 
     /// Waits for a job's success, as [`Self::job_over`].
