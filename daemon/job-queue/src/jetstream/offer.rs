@@ -2,6 +2,7 @@
 
 use async_nats::jetstream::consumer::{AckPolicy, pull};
 use async_nats::jetstream::context::{PublishError, PublishErrorKind};
+use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use relief_api::JobState;
 
 use super::kept::{Kept, TRIES, crowded};
@@ -52,7 +53,12 @@ impl Shared {
                     let text = error.to_string();
                     // It waits already, or is a worker's.
                     if text.contains("maximum messages per subject") {
-                        break;
+                        if last || !self.is_dead(&stores, &subject, &line).await? {
+                            break;
+                        }
+                        tracing::warn!(job = %order.key, "the servers give an order to nobody any more: it is put anew");
+                        self.withdraw(&stores, &order.key, order.turn).await?;
+                        continue;
                     }
                     return Err(refusal(&text, self.options.quota_jobs));
                 }
@@ -84,6 +90,32 @@ impl Shared {
             return Ok(Stood::New);
         }
         Err(crowded(&order.key))
+    }
+
+    /// Whether the server has a message and gives it to nobody any more, since it believes, as after
+    /// it was killed, that a worker has answered it.
+    async fn is_dead(
+        &self,
+        stores: &Stores,
+        subject: &str,
+        line: &Line,
+    ) -> Result<bool, QueueError> {
+        let away = |error: &dyn std::fmt::Display| QueueError::Away(format!("{subject}: {error}"));
+        let found = stores.orders.get_last_raw_message_by_subject(subject).await;
+        let message = match found {
+            Ok(message) => message,
+            // Answered meanwhile.
+            Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => {
+                return Ok(false);
+            }
+            Err(error) => return Err(away(&error)),
+        };
+        let info = stores.orders.consumer_info(line.consumer()).await;
+        let info = info.map_err(|error| away(&error))?;
+        let was_given_out = message.sequence <= info.delivered.stream_sequence;
+        let is_answered =
+            message.sequence <= info.ack_floor.stream_sequence || info.num_ack_pending == 0;
+        Ok(was_given_out && is_answered)
     }
 
     /// Takes the message of a turn away. Should it stay, workers drop it.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
+use async_nats::jetstream::consumer::{FromConsumer, PullConsumer, pull};
 use job_queue::jetstream::{JetStreamQueue, News, Node, Options, Role};
 use job_queue::{
     BenchName, Ending, FORMAT, JobKey, JobQueue, Lease, Need, Order, Outcome, Priority, QueueError,
@@ -190,6 +191,44 @@ fn an_order_without_a_message_is_put_again() {
     let mut next = take(&queue, "v");
     assert_eq!(next.begun().attempts, 2);
     assert!(matches!(lease.settle(&done()), Err(QueueError::Lost(_))));
+    next.settle(&done()).unwrap();
+}
+
+/// As a server does that believes after it was killed that a worker has answered: here it is told to
+/// give out nothing twice.
+#[test]
+fn an_order_that_the_server_gives_to_nobody_any_more_is_put_anew() {
+    let Some((server, options, queue)) = rig() else {
+        return;
+    };
+    queue.offer(&order(1)).unwrap();
+    let name = format!("{}_JOBS", options.prefix.to_uppercase());
+    behind(&server, |context| async move {
+        let stream = context.get_stream(name).await.unwrap();
+        let consumer: PullConsumer = stream.get_consumer("v1-normal-m0").await.unwrap();
+        let mut config = consumer.cached_info().config.clone();
+        config.max_deliver = 1;
+        let config = pull::Config::try_from_consumer_config(config).unwrap();
+        stream.create_consumer(config).await.unwrap();
+    });
+    drop(take(&queue, "dies"));
+    let soon = Duration::from_millis(200);
+    let nothing = queue
+        .take(&Worker::named("w"), 3 * options.ack_wait)
+        .unwrap();
+    assert!(nothing.is_none());
+    let begun = Instant::now();
+    let mut next = loop {
+        queue.offer(&order(1)).unwrap();
+        if let Some(lease) = queue.take(&Worker::named("w"), soon).unwrap() {
+            break lease;
+        }
+        assert!(begun.elapsed() < LIMIT);
+    };
+    assert_eq!(next.begun().attempts, 2);
+    // What a worker has is not taken from it.
+    queue.offer(&order(1)).unwrap();
+    assert!(queue.take(&Worker::named("v"), soon).unwrap().is_none());
     next.settle(&done()).unwrap();
 }
 
