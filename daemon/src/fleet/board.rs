@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Condvar, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use job_queue::Standing;
 use relief_api::JobId;
@@ -14,14 +14,11 @@ use crate::service::lock;
 pub(super) struct Board {
     standings: Mutex<BTreeMap<JobId, Standing>>,
     told: Condvar,
-    /// When each was last heard of.
-    heard: Mutex<BTreeMap<JobId, Instant>>,
 }
 
 impl Board {
     /// Where an order stands now; nowhere any more if `None`.
     pub(super) fn put(&self, job: JobId, standing: Option<Standing>) {
-        self.hear(job);
         let mut standings = lock(&self.standings);
         match standing {
             Some(standing) => standings.insert(job, standing),
@@ -33,21 +30,6 @@ impl Board {
     /// Where an order stands, as far as it is known.
     pub(super) fn standing(&self, job: JobId) -> Option<Standing> {
         lock(&self.standings).get(&job).cloned()
-    }
-
-    /// Somebody is at a job.
-    pub(super) fn hear(&self, job: JobId) {
-        lock(&self.heard).insert(job, Instant::now());
-    }
-
-    /// When a job was last heard of.
-    pub(super) fn heard(&self, job: JobId) -> Option<Instant> {
-        lock(&self.heard).get(&job).copied()
-    }
-
-    /// Nobody follows a job any more.
-    pub(super) fn forget(&self, job: JobId) {
-        lock(&self.heard).remove(&job);
     }
 
     /// Nothing is known any more.

@@ -34,6 +34,7 @@ pub(super) fn dispatch(service: &Arc<Service>, fleet: &Arc<Fleet>) {
                 scan: job.scan,
                 scanner: job.scanner,
                 chunks: Vec::new(),
+                heard: None,
             },
         );
         lock(&fleet.handed).insert(id, handed);
@@ -49,7 +50,6 @@ pub(super) fn dispatch(service: &Arc<Service>, fleet: &Arc<Fleet>) {
             .stack_size(STACK_BYTES)
             .spawn(move || {
                 let may_be_left = hand_over.see_through();
-                fleet_of_thread.board.forget(id);
                 lock(&fleet_of_thread.handed).remove(&id);
                 // Not before: as long as it is on its way, nothing of it is cleared up.
                 if may_be_left {

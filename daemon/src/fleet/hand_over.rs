@@ -14,7 +14,7 @@ use super::fetch::FetchError;
 use super::order::Answer;
 use crate::error::ServiceError;
 use crate::jobs::StopFlag;
-use crate::service::Service;
+use crate::service::{Service, lock};
 
 /// How long it waits for news before it looks by itself.
 const LOOK: Duration = Duration::from_secs(1);
@@ -204,24 +204,30 @@ impl HandOver {
         }
     }
 
+    /// Offers it once more where nobody was heard of since then for long; gives from when on that
+    /// counts.
+    fn offer_in_doubt(&self, order: &Order, since: Instant) -> Instant {
+        let fleet = &self.fleet;
+        let told = lock(&fleet.handed).get(&self.id()).and_then(|h| h.heard);
+        let heard = told.map_or(since, |told| told.max(since));
+        if heard.elapsed() < fleet.config.silence() * DOUBT || !fleet.queue.is_connected() {
+            return heard;
+        }
+        if let Err(error) = fleet.queue.offer(order) {
+            tracing::debug!(job = self.id(), %error, "an order is looked for later");
+        }
+        Instant::now()
+    }
+
     /// Follows it until it is over.
     fn follow(&self, job: &Job, order: &Order, damaged: &mut u32) -> Result<Left, ServiceError> {
         let fleet = &self.fleet;
         let mut known: Option<Standing> = None;
         let mut begun = 0;
         let mut is_asked_to_stop = false;
-        let mut offered = Instant::now();
+        let mut heard = Instant::now();
         loop {
-            let heard = fleet
-                .board
-                .heard(job.id)
-                .map_or(offered, |at| at.max(offered));
-            if heard.elapsed() >= fleet.config.silence() * DOUBT && fleet.queue.is_connected() {
-                offered = Instant::now();
-                if let Err(error) = fleet.queue.offer(order) {
-                    tracing::debug!(job = job.id, %error, "an order is looked for later");
-                }
-            }
+            heard = self.offer_in_doubt(order, heard);
             let is_its = |s: &Standing| s.turn == order.turn && s.state == JobState::Running;
             let runs = known.as_ref().is_some_and(is_its);
             match self.is_left(runs) {
@@ -242,6 +248,9 @@ impl HandOver {
                     Err(_) => continue,
                 },
             };
+            if known.as_ref() != Some(&told) {
+                heard = Instant::now();
+            }
             if told.turn != order.turn {
                 // What is told is of an earlier turn; this one is on its way.
                 known = Some(told);

@@ -33,7 +33,7 @@ use std::io;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, RwLock};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use job_queue::depot::{Chunk, Depot};
 use job_queue::jetstream::JetStreamQueue;
@@ -80,6 +80,8 @@ struct Handed {
     scanner: String,
     /// Chunks of its scan's journal.
     chunks: Vec<Chunk>,
+    /// When a worker last told how far it is.
+    heard: Option<Instant>,
 }
 
 /// Jobs cannot go elsewhere.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::RecvTimeoutError;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use job_queue::jetstream::News;
 use relief_api::Event;
@@ -42,9 +42,11 @@ pub(super) fn hear(service: &Arc<Service>, fleet: &Arc<Fleet>) {
                 fraction,
                 seconds,
             }) => {
-                let handed = lock(&fleet.handed).get(&key.job).cloned();
+                let handed = lock(&fleet.handed).get_mut(&key.job).map(|handed| {
+                    handed.heard = Some(Instant::now());
+                    handed.clone()
+                });
                 if let Some(handed) = handed {
-                    fleet.board.hear(key.job);
                     service.hub.tell(Event::Progress {
                         job: key.job,
                         scan: handed.scan,

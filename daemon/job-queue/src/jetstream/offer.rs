@@ -41,7 +41,7 @@ impl Shared {
             let stores = self.stores().await?;
             self.serve(&stores, &line).await?;
             match publish(&stores, &subject, &payload).await {
-                Ok(()) if stood == Stood::Before => {
+                Ok(()) if stood == Stood::Before && !last => {
                     tracing::warn!(job = %order.key, "the servers had lost an order: it is put again");
                     break;
                 }

@@ -135,6 +135,17 @@ async fn until<T>(what: &str, mut is_so: impl AsyncFnMut() -> Option<T>) -> T {
     }
 }
 
+/// Waits until the server has one order, which nobody has taken.
+async fn an_order_waits(nats: &Nats) {
+    let watcher = queue(nats).await;
+    until("the order on the server", async || {
+        let watcher = Arc::clone(&watcher);
+        let depth = blocking(move || watcher.depth().unwrap());
+        (depth.await.waiting.values().sum::<u64>() == 1).then_some(())
+    })
+    .await;
+}
+
 async fn job(rig: &Rig, id: u64) -> Job {
     rig.client.get(&path::job(id)).await
 }

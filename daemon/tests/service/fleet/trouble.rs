@@ -47,13 +47,7 @@ async fn an_order_that_the_server_loses_is_put_again() {
     let mut events = rig.client.events().await;
     let scan = rig.start_scan("part").await;
     ended(&mut events, &scan.id).await;
-    let watcher = queue(&nats).await;
-    until("the order on the server", async || {
-        let watcher = Arc::clone(&watcher);
-        let depth = blocking(move || watcher.depth().unwrap());
-        (depth.await.waiting.values().sum::<u64>() == 1).then_some(())
-    })
-    .await;
+    an_order_waits(&nats).await;
     nats.lose_orders();
     let first = Hired::new(&nats, "hand-1");
     assert_eq!(job_over(&mut events, &rig, 1).await.state, JobState::Done);
@@ -84,13 +78,7 @@ async fn a_bench_that_lost_its_records_takes_no_other_result_for_its_own() {
     let mut events = rig.client.events().await;
     let lost = rig.start_scan("lost").await;
     ended(&mut events, &lost.id).await;
-    let watcher = queue(&nats).await;
-    until("the order on the server", async || {
-        let watcher = Arc::clone(&watcher);
-        let count = blocking(move || watcher.standings(&bench("bench-1")).unwrap().len());
-        (count.await == 1).then_some(())
-    })
-    .await;
+    an_order_waits(&nats).await;
     let Rig { daemon, folder, .. } = rig;
     daemon.shutdown().await;
     std::fs::remove_dir_all(folder.path().join("state")).unwrap();
