@@ -117,31 +117,6 @@ impl PlaneSums {
     }
 }
 
-/// The variance that the height at the node has by least squares of these samples, in variances of
-/// one of them; endless where they are collinear.
-pub(crate) fn variance_at_node<'a>(samples: impl Iterator<Item = &'a Neighbour>) -> f64 {
-    let mut sums = PlaneSums::default();
-    for n in samples {
-        sums.add(n.dx, n.dy, 0.0, 1.0);
-    }
-    let PlaneSums {
-        one,
-        x,
-        y,
-        xx,
-        xy,
-        yy,
-        ..
-    } = sums;
-    let slopes = xx * yy - xy * xy;
-    let determinant = one * slopes - x * (x * yy - xy * y) + y * (x * xy - xx * y);
-    if determinant > 0.0 {
-        slopes / determinant
-    } else {
-        f64::INFINITY
-    }
-}
-
 /// A plane and how far inliers may lie from it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Fit {
@@ -214,22 +189,4 @@ const INLIER_DEVIATIONS: f64 = 2.5;
 pub(crate) fn tolerance(median: f64, number: usize) -> f64 {
     let small = 1.0 + 5.0 / (number as f64 - 3.0).max(1.0);
     INLIER_DEVIATIONS * 1.4826 * small * median.sqrt()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_variance_at_the_node_is_that_of_textbooks() {
-        let at = |dx: f64, dy: f64| Neighbour::at(dx, dy, 7.0);
-        let square = [at(1.0, 1.0), at(-1.0, 1.0), at(1.0, -1.0), at(-1.0, -1.0)];
-        assert!((variance_at_node(square.iter()) - 0.25).abs() < 1e-15);
-        // 1 / n + d2 / sum of d2, by d from their middle.
-        let moved: Vec<_> = square.iter().map(|n| at(n.dx + 3.0, n.dy)).collect();
-        assert!((variance_at_node(moved.iter()) - (0.25 + 9.0 / 4.0)).abs() < 1e-12);
-        let line = [at(0.0, 1.0), at(1.0, 1.0), at(2.0, 1.0)];
-        assert_eq!(variance_at_node(line.iter()), f64::INFINITY);
-        assert_eq!(variance_at_node([].iter()), f64::INFINITY);
-    }
 }

@@ -6,7 +6,7 @@ use super::{At, BESIDE, GridWorker, quality};
 use crate::consensus::{Around, Conditions, Effort, Side, Surface, WIDTH};
 use crate::draws::Draws;
 use crate::neighbours::Neighbour;
-use crate::plane::{Fit, Plane, variance_at_node};
+use crate::plane::{Fit, Plane};
 use crate::settings::SupportSettings;
 use crate::support::Place;
 use crate::window::Spacing;
@@ -27,9 +27,6 @@ const CLEAN: f64 = 0.95;
 const LEAST_NOISE: f64 = 1e-3;
 /// How far strays may widen the radius in which samples support a node.
 const THINNER_LIMIT: f64 = 1.6;
-/// What is less sure at the node than one sample of the surface, as where they lie in a line beside it,
-/// is no value. In variances of a sample.
-const MOST_VARIANCE: f64 = 1.0;
 /// Distance from the node, in spacings, within which strays are counted.
 const STRAY_RADIUS: f64 = 3.0;
 
@@ -109,10 +106,8 @@ impl GridWorker {
                         is_near || is_first_inside && place(&strewn) == Place::Among
                     }
                 };
-            let held = self.samples.iter().filter(|n| surface.holds(n));
-            let is_sure = is_supported && variance_at_node(held) <= MOST_VARIANCE;
             let quality = || quality(&self.samples, &fit.plane, |n| surface.holds(n));
-            is_sure.then(|| (fit.plane.c + surface.lift_mm, quality()))
+            is_supported.then(|| (fit.plane.c + surface.lift_mm, quality()))
         })
     }
 
