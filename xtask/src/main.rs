@@ -7,6 +7,7 @@ mod fillings;
 mod fuzz;
 mod instructions;
 mod judge;
+mod nats;
 mod notify;
 mod peers;
 mod reproduce;
@@ -67,7 +68,7 @@ enum Chore {
     /// Needs Python 3; installs the judge's packages into `target/judges`.
     JudgeSolids(solids::Options),
     /// Install the NATS server that tests of jobs on other machines run with, on Debian as root.
-    Nats,
+    Nats(nats::Options),
     /// Let a broker that is not ours, mosquitto, judge what the service publishes.
     ///
     /// Needs mosquitto and its clients, which it installs on Debian as root.
@@ -140,7 +141,7 @@ fn main() -> anyhow::Result<()> {
         Chore::JudgeToolpath(options) => toolpath::run(&options),
         Chore::JudgeFill(options) => fillings::run(&options),
         Chore::JudgeSolids(options) => solids::run(&options),
-        Chore::Nats => notify::install_nats(),
+        Chore::Nats(options) => nats::install(&options),
         Chore::JudgeNotify => notify::judge(),
         Chore::JudgeWeb(options) => web::run(&options),
         Chore::Reproduce(options) => reproduce::run(&options),
@@ -192,12 +193,16 @@ fn full() -> anyhow::Result<()> {
     )?;
     rules::check()?;
     units::check()?;
-    // More of what the first tier shows with few.
+    // More of what the first tier shows with few, with Debian's NATS server.
+    nats::install(&nats::Options::default())?;
+    let needs_nats = ("RELIEF_NEEDS_NATS", "1".to_owned());
     shell::run_with(
         "cargo",
         &["test", "--workspace"],
-        &[("RELIEF_SEEDS", "10".to_owned())],
+        &[("RELIEF_SEEDS", "10".to_owned()), needs_nats.clone()],
     )?;
+    let recent = [needs_nats, nats::chosen()?];
+    shell::run_with("cargo", &["test", "--package", "job-queue"], &recent)?;
     // The first tier's random tests have one seed; here each run has another, and prints it.
     let seed = std::time::UNIX_EPOCH.elapsed()?.as_secs().to_string();
     eprintln!("PROPTEST_RNG_SEED={seed}");

@@ -5,11 +5,6 @@ use anyhow::Result;
 
 use crate::{apt, shell};
 
-/// Installs the server that tests of jobs elsewhere run with; they are skipped where it is not there.
-pub(crate) fn install_nats() -> Result<()> {
-    apt::need(&[("nats-server", "nats-server")])
-}
-
 /// The tests that `cargo test` skips where there is no broker and no server of OpenSSH: messages and
 /// states over TLS with a password, a broker that is away, a service that is killed; copies of
 /// results by SFTP.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Subcommand;
 
-use crate::{judge, notify, shell, vm};
+use crate::{judge, nats, shell, vm};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Study {
@@ -122,10 +122,10 @@ pub(crate) enum Study {
 pub(crate) fn run(study: &Study) -> Result<()> {
     match study {
         Study::Fleet { options } => {
-            notify::install_nats()?;
+            let server = nats::chosen()?;
             let programs = ["build", "--release", "--bin", "reliefd", "--bin", "relief"];
             shell::run("cargo", &programs)?;
-            program("study-fleet", options)
+            program_with("study-fleet", options, &[server])
         }
         Study::Crashes { options } => {
             service()?;
@@ -241,11 +241,15 @@ pub(crate) fn build() -> Result<()> {
 
 /// Runs a study, or another program of the workspace, built for speed.
 pub(crate) fn program(name: &str, options: &[OsString]) -> Result<()> {
+    program_with(name, options, &[])
+}
+
+fn program_with(name: &str, options: &[OsString], environment: &[(&str, String)]) -> Result<()> {
     let options: Vec<_> = options.iter().map(|o| o.to_string_lossy()).collect();
     let words = ["run", "--release", "--bin", name, "--"];
     let words: Vec<&str> = words
         .into_iter()
         .chain(options.iter().map(|o| &**o))
         .collect();
-    shell::run("cargo", &words)
+    shell::run_with("cargo", &words, environment)
 }

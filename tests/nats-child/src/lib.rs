@@ -1,5 +1,6 @@
-//! Debian's `nats-server` as a child that comes and goes, on the same port and folder.
+//! A `nats-server` as a child that comes and goes, on the same port and folder.
 
+use std::ffi::OsString;
 use std::fs;
 use std::io::{self, BufRead, BufReader, Error, ErrorKind, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
@@ -16,7 +17,33 @@ pub const KEEPS: &str = "jetstream { store_dir: \"FOLDER/kept\" }";
 /// Set where tests are to fail, not to be skipped, when there is no server.
 const NEEDED: &str = "RELIEF_NEEDS_NATS";
 
-const PROGRAM: &str = "nats-server";
+/// The server's program where it is not the one of the path: another version, say.
+const CHOSEN: &str = "RELIEF_NATS_SERVER";
+
+fn program() -> OsString {
+    std::env::var_os(CHOSEN).unwrap_or_else(|| "nats-server".into())
+}
+
+/// What the server calls itself and its version.
+///
+/// # Errors
+/// When it cannot be started.
+pub fn version() -> io::Result<String> {
+    let output = Command::new(program())
+        .arg("--version")
+        .output()
+        .map_err(|error| cannot_start(&error))?;
+    Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+fn cannot_start(error: &Error) -> Error {
+    let program = program();
+    let told = format!(
+        "cannot start {}: {error}; install it (`cargo xtask nats`), or name it in {CHOSEN}",
+        program.display()
+    );
+    Error::new(error.kind(), told)
+}
 
 /// How long one may take to listen.
 const LIMIT: Duration = Duration::from_secs(60);
@@ -25,16 +52,14 @@ const LIMIT: Duration = Duration::from_secs(60);
 /// with what is missing.
 #[must_use]
 pub fn is_wanted() -> bool {
-    let version = Command::new(PROGRAM)
-        .arg("--version")
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status();
-    let is_wanted = version.is_ok() || std::env::var_os(NEEDED).is_some();
-    if !is_wanted {
-        println!("skipped: no {PROGRAM}");
+    match version() {
+        Ok(_) => true,
+        Err(_) if std::env::var_os(NEEDED).is_some() => true,
+        Err(error) => {
+            println!("skipped: {error}");
+            false
+        }
     }
-    is_wanted
 }
 
 /// A port of this machine that nobody has now. Whoever else is given it meanwhile has the server not
@@ -93,17 +118,14 @@ impl Server {
     /// # Errors
     /// When it is not installed, ends, or does not come to listen; with what it has told.
     pub fn start(&self) -> io::Result<()> {
-        let child = Command::new(PROGRAM)
+        let child = Command::new(program())
             .arg("-c")
             .arg(self.file("server.conf"))
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
-            .map_err(|error| {
-                let told = format!("cannot start {PROGRAM}: {error}; install Debian's package");
-                Error::new(error.kind(), told)
-            })?;
+            .map_err(|error| cannot_start(&error))?;
         *self.child() = Some(child);
         let begun = Instant::now();
         while TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)).is_err() {
@@ -113,7 +135,7 @@ impl Server {
             };
             if ended || begun.elapsed() > LIMIT {
                 let log = fs::read_to_string(self.file("log")).unwrap_or_default();
-                let told = format!("{PROGRAM} does not listen: {log}");
+                let told = format!("{} does not listen: {log}", program().display());
                 return Err(Error::new(ErrorKind::TimedOut, told));
             }
             std::thread::sleep(Duration::from_millis(5));

@@ -7,7 +7,7 @@
 //! cargo xtask study fleet --cost                # what the queue costs by itself
 //! ```
 //!
-//! Needs `nats-server`. A bench takes scans, and does their jobs itself; then each scan is
+//! Needs `nats-server`, or another program of it that `RELIEF_NATS_SERVER` names. A bench takes scans, and does their jobs itself; then each scan is
 //! processed again and again by workers in processes of their own, while workers, the server that
 //! leads and the links are killed and cut at moments drawn from a seed. Each result is held
 //! against the one that the bench has made itself.
@@ -221,13 +221,14 @@ async fn run(options: &Options) -> Result<()> {
         }
     };
     println!(
-        "seed {}: {} jobs of {} scans, {} workers, {} servers, {seconds} s: {}; begun {attempts} \
+        "seed {}: {} jobs of {} scans, {} workers, {} servers ({}), {seconds} s: {}; begun {attempts} \
          times, {set_aside} set aside after three deaths in a row and retried, published once each ({} told), the same bytes as here, nothing left on the servers",
         options.seed,
         orders.len(),
         scans.len(),
         options.workers,
         options.servers,
+        nats_child::version()?,
         trouble.told(),
         published
     );

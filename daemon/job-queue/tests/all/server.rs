@@ -1,4 +1,4 @@
-//! Debian's `nats-server`, as a child.
+//! A `nats-server`, as a child.
 
 use std::future::Future;
 use std::sync::atomic::{AtomicU32, Ordering};
