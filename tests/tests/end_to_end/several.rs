@@ -101,27 +101,27 @@ async fn paused(events: &mut Events, id: &str) -> Result<Scan> {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_scanner_that_is_pulled_in_mid_scan_leaves_the_other_scan_as_if_alone() -> Result<()> {
-    // Before anything is pulled: the driver asks for a person once it has tried for a minute or so.
     let (undisturbed_left, undisturbed_right) = (alone("left").await?, alone("right").await?);
     let (rig, mut events, left, right) = amid(20).await?;
     let pulled = rig.control_of("left")?;
     pulled.unplug();
     paused(&mut events, &left.id).await?;
     rig.control_of("right")?.step_columns(None);
-    let over = events.scan_complete(&right.id).await?;
-    rig.first_job(&over, &mut events).await?;
+    let right_over = events.scan_complete(&right.id).await?;
     let summary: ScannerSummary = rig.client().get(&path::scanner("left")).await?;
     assert_eq!(summary.status.link, ScannerLink::Trouble);
     assert_eq!(summary.scan.context("a scan")?.columns, 20);
-    let disturbed = outcome(&rig, &over).await?;
-    assert!(disturbed == undisturbed_right);
 
-    // And the pulled one goes on where it was, once it is back.
+    // And the pulled one goes on where it was, once it is back: at once, before jobs that take their time,
+    // since the driver asks for a person once it has tried for a minute or so.
     pulled.step_columns(None);
     pulled.replug();
-    let over = events.scan_complete(&left.id).await?;
-    rig.first_job(&over, &mut events).await?;
-    let resumed = outcome(&rig, &over).await?;
+    let left_over = events.scan_complete(&left.id).await?;
+    rig.first_job(&right_over, &mut events).await?;
+    let disturbed = outcome(&rig, &right_over).await?;
+    assert!(disturbed == undisturbed_right);
+    rig.first_job(&left_over, &mut events).await?;
+    let resumed = outcome(&rig, &left_over).await?;
     assert!(resumed == undisturbed_left);
     assert!(
         resumed.columns != disturbed.columns,
