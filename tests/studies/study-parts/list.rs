@@ -35,9 +35,6 @@ pub(crate) fn list(parts: &[Measured]) -> String {
                 if let Some(real) = part.true_of_face.get(face.face).copied().flatten() {
                     let _ = writeln!(out, "    truly {real:.4?}");
                 }
-                for (region, _) in &face.shares {
-                    let _ = writeln!(out, "    {}", told_of(part, *region));
-                }
             }
             for number in found.iter().flat_map(|found| &found.numbers) {
                 if number.error.abs() > 3.0 * number.bound || !number.is_covered() {
@@ -86,6 +83,9 @@ pub(crate) fn list(parts: &[Measured]) -> String {
         for own in &part.outcome.tangent.refused {
             let (labels, why) = (&own.labels, own.reason);
             let _ = writeln!(out, "  regions {labels:?} seem to touch: {why:?}");
+        }
+        for kind in &part.outcome.kinds {
+            let _ = writeln!(out, "  {}", told_of(part, kind.label.get()));
         }
         for apart in crate::edges::apart(&part.outcome.reconstruction.model) {
             let _ = writeln!(out, "  {apart}");
