@@ -20,19 +20,26 @@ pub(crate) struct Deviation {
     pub(crate) nodes: usize,
     pub(crate) squares_mm2: f64,
     pub(crate) most_mm: f64,
+    /// Where that is in the x-y plane, and in the face of which region.
+    pub(crate) worst: ([f64; 2], u16),
 }
 
 impl Deviation {
-    fn take(&mut self, off_mm: f64) {
-        self.nodes += 1;
-        self.squares_mm2 += off_mm * off_mm;
-        self.most_mm = self.most_mm.max(off_mm.abs());
+    fn take(&mut self, off_mm: f64, worst: ([f64; 2], u16)) {
+        self.join(&Self {
+            nodes: 1,
+            squares_mm2: off_mm * off_mm,
+            most_mm: off_mm.abs(),
+            worst,
+        });
     }
 
     pub(crate) fn join(&mut self, other: &Self) {
         self.nodes += other.nodes;
         self.squares_mm2 += other.squares_mm2;
-        self.most_mm = self.most_mm.max(other.most_mm);
+        if other.most_mm > self.most_mm {
+            (self.most_mm, self.worst) = (other.most_mm, other.worst);
+        }
     }
 
     pub(crate) fn rms_mm(&self) -> f64 {
@@ -92,7 +99,7 @@ pub(crate) fn compare(part: &Part, truth: &TruthGrid, trims: &Trims, matched: &M
         {
             let off_mm = real.off_mm(&Vector3::new(x, y, at.z_mm));
             let deviation = told.deviations.entry(node.face.face).or_default();
-            deviation.take(off_mm);
+            deviation.take(off_mm, ([x, y], at.region));
         }
     }
     told

@@ -54,9 +54,11 @@ pub(crate) fn list(parts: &[Measured]) -> String {
         }
         for (face, deviation) in &part.on_grid.deviations {
             if deviation.rms_mm() > 0.012 || deviation.most_mm > 0.15 {
+                let ([x, y], region) = deviation.worst;
                 let _ = writeln!(
                     out,
-                    "  face {face}: {} off by {:.4} mm rms, at most {:.3} mm, at {} nodes",
+                    "  face {face}: {} off by {:.4} mm rms, at most {:.3} mm about ({x:.1}, {y:.1}) in \
+                     region {region}, at {} nodes",
                     part.kinds
                         .get(*face)
                         .map_or_else(String::new, Kind::to_string),
