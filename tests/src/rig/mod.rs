@@ -40,10 +40,21 @@ pub use wait::{Ended, GUARD};
 #[derive(Debug)]
 pub struct Rig {
     daemon: Daemon,
-    scanners: BTreeMap<String, PtyServer>,
+    scanners: Scanners,
     client: Client,
     config: Config,
     folder: TempDir,
+}
+
+/// The simulated scanners of a rig. A service that was not ended tries its ports again and again, and
+/// would take those of another rig for its own, were the same numbers given out anew: so they stay.
+#[derive(Debug)]
+struct Scanners(BTreeMap<String, PtyServer>);
+
+impl Drop for Scanners {
+    fn drop(&mut self) {
+        std::mem::forget(std::mem::take(&mut self.0));
+    }
 }
 
 /// A configuration whose files all lie in one folder, with a scanner at `port`.
@@ -138,7 +149,7 @@ impl Rig {
         Ok(Self {
             client: Client::new(daemon.socket()),
             daemon,
-            scanners,
+            scanners: Scanners(scanners),
             config,
             folder,
         })
@@ -169,7 +180,8 @@ impl Rig {
     /// When the folder cannot be removed.
     pub async fn end(self) -> Result<()> {
         self.daemon.shutdown().await;
-        drop(self.scanners);
+        let mut scanners = self.scanners;
+        drop(std::mem::take(&mut scanners.0));
         Ok(self.folder.close()?)
     }
 
@@ -192,7 +204,7 @@ impl Rig {
     /// # Errors
     /// When the rig has none.
     pub fn control_of(&self, name: &str) -> Result<Control> {
-        let scanner = self.scanners.get(name);
+        let scanner = self.scanners.0.get(name);
         Ok(scanner
             .with_context(|| format!("this rig has no scanner {name} of its own"))?
             .control())

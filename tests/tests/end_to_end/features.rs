@@ -99,5 +99,5 @@ async fn a_scan_ends_in_features_where_they_are_asked_for() -> Result<()> {
     let without = rig.rerun_to_result(&ended.scan.id, &off).await?;
     let result = rig.result(&without.result).await?;
     assert!(result.file("features.json").is_err());
-    Ok(())
+    rig.end().await
 }

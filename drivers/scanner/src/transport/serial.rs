@@ -40,10 +40,9 @@ impl SerialSettings {
 }
 
 /// A port is busy for a moment after it has been closed, where the program that had it, this one
-/// perhaps, was just starting another: until that has begun, it holds what was open. On a machine with
-/// much to do that can take a second and more. So a busy port is tried again a few times before it is
-/// told to be.
-const BUSY_ATTEMPTS: u32 = 120;
+/// perhaps, was just starting another: until that has begun, it holds what was open. So a busy port
+/// is tried again a few times before it is told to be.
+const BUSY_ATTEMPTS: u32 = 40;
 const BUSY_PAUSE: Duration = Duration::from_millis(25);
 
 /// Opens one serial port.
