@@ -19,7 +19,7 @@ const PROBES: usize = 15;
 
 /// Surfaces that differ by less than this many standard deviations of their residuals
 /// may be continuous.
-const STEP_SIGMAS: f64 = 4.0;
+pub(crate) const STEP_SIGMAS: f64 = 4.0;
 
 /// Distance inside its face at which a surface is compared, pitches.
 const INSIDE: f64 = 1.5;

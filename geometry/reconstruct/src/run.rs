@@ -13,6 +13,7 @@ use crate::border::cracks::trace;
 use crate::border::intersection::intersections;
 use crate::border::map::{BorderSettings, PlanarMap, build};
 use crate::border::settle::{Outlines, Placed};
+use crate::border::split::split;
 use crate::evidence::{Evidence, Known};
 use crate::fit::{Demand, Domain, FitError, patches_from_spline, patches_through_nodes};
 use crate::known;
@@ -244,11 +245,14 @@ impl<'a> Fitted<'a> {
             bound: settings.border_bound_pitches,
         };
         let placement = Placement::of(image);
-        let cracks = trace(&self.pieces);
+        let mut cracks = trace(&self.pieces);
         let fitted = self.surfaces.iter().zip(&self.nodes);
         let sides: Vec<(&PatchSurface, f64)> = fitted
             .map(|(surface, nodes)| (surface, residuals(image, nodes, surface).0))
             .collect();
+        if settings.method == Method::Relief {
+            split(&mut cracks, &sides, placement);
+        }
         let placed = intersections(&cracks, &sides, placement);
         monitor.progress(0.4);
         let outlines = Outlines {

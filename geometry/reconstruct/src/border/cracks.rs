@@ -284,7 +284,65 @@ fn loops(chains: &[Chain], pieces: usize) -> Vec<Vec<Vec<Use>>> {
     loops
 }
 
+/// The corner of the lattice at which two cracks that follow on each other meet.
+fn corner(before: [f64; 2], after: [f64; 2]) -> [f64; 2] {
+    let is_between = |v: f64| (v - v.floor() - 0.5).abs() < 0.25;
+    [0, 1].map(|d| match (before[d], after[d]) {
+        (a, _) if is_between(a) => a,
+        (_, b) if is_between(b) => b,
+        (a, b) => (a + b) / 2.0,
+    })
+}
+
 impl CrackMap {
+    /// Cuts each chain before the cracks of these indices, ascending: new junctions are between them
+    /// and the cracks before. A closed chain that is cut is open.
+    pub(crate) fn cut(&mut self, cuts: &[Vec<usize>]) {
+        for (k, cuts) in cuts.iter().enumerate() {
+            let chain = &mut self.chains[k];
+            let Some(&first) = cuts.first() else { continue };
+            let mut cuts = cuts.clone();
+            if chain.ends.is_none() {
+                let (last, next) = (chain.middles.len() - 1, first % chain.middles.len());
+                let before = if next == 0 { last } else { next - 1 };
+                let junction = corner(chain.middles[before], chain.middles[next]);
+                chain.middles.rotate_left(first);
+                chain.ends = Some((self.junctions.len(), self.junctions.len()));
+                self.junctions.push(junction);
+                cuts.remove(0);
+                cuts.iter_mut().for_each(|cut| *cut -= first);
+            }
+            let Some((mut start, end)) = chain.ends else {
+                continue;
+            };
+            let (left, right) = (chain.left, chain.right);
+            let middles = core::mem::take(&mut chain.middles);
+            let mut parts = Vec::new();
+            let mut from = 0;
+            for cut in cuts {
+                let junction = self.junctions.len();
+                self.junctions.push(corner(middles[cut - 1], middles[cut]));
+                parts.push((middles[from..cut].to_vec(), (start, junction)));
+                (from, start) = (cut, junction);
+            }
+            parts.push((middles[from..].to_vec(), (start, end)));
+            for (n, (middles, ends)) in parts.into_iter().enumerate() {
+                let part = Chain {
+                    left,
+                    right,
+                    middles,
+                    ends: Some(ends),
+                };
+                if n == 0 {
+                    self.chains[k] = part;
+                } else {
+                    self.chains.push(part);
+                }
+            }
+        }
+        self.loops = loops(&self.chains, self.loops.len());
+    }
+
     /// The signed area within a loop of crack middles, square pitches;
     /// counter-clockwise is positive.
     pub(crate) fn area(&self, uses: &[Use]) -> f64 {

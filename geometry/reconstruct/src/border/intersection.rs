@@ -12,7 +12,7 @@ use crate::meeting::{Gap, Line, Reach, touch};
 /// Farthest a sample moves, pitches, and least difference of the slopes of two surfaces that
 /// place their intersection. Where surfaces meet farther away, or not at all, the border is a
 /// step.
-const REACH: Reach = Reach {
+pub(super) const CREASE: Reach = Reach {
     farthest: 1.5,
     least_bend: 0.15,
 };
@@ -39,20 +39,25 @@ pub(crate) fn intersections(
         .collect()
 }
 
+/// How far two surfaces are from each other.
+pub(super) fn gap(sides: [&PatchSurface; 2], placement: Placement) -> Gap<'_> {
+    Gap {
+        sides,
+        placement,
+        line: Line::Intersection,
+    }
+}
+
 fn placed(
     chain: &Chain,
     sides: [(&PatchSurface, f64); 2],
     placement: Placement,
 ) -> Option<Vec<[f64; 2]>> {
-    let gap = Gap {
-        sides: sides.map(|side| side.0),
-        placement,
-        line: Line::Intersection,
-    };
+    let gap = gap(sides.map(|side| side.0), placement);
     let found: Vec<[f64; 2]> = chain
         .middles
         .iter()
-        .filter_map(|&middle| gap.nearest(middle, REACH))
+        .filter_map(|&middle| gap.nearest(middle, CREASE))
         .collect();
     let enough = found.len() as f64 >= LEAST_SHARE * chain.middles.len() as f64;
     if enough && found.len() >= 2 {

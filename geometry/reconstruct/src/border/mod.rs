@@ -22,5 +22,6 @@ pub(crate) mod separate;
 pub(crate) mod settle;
 pub(crate) mod smooth;
 pub(crate) mod spline;
+pub(crate) mod split;
 pub(crate) mod sums;
 pub(crate) mod sway;

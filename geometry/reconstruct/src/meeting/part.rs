@@ -66,7 +66,7 @@ fn cuts(edge: &MapEdge, gap: &Gap<'_>) -> Vec<f64> {
 }
 
 /// Stretches of one kind, each from its first place to the one after its last.
-pub(super) fn runs<T: PartialEq>(meets: &[T]) -> Vec<(usize, usize)> {
+pub(crate) fn runs<T: PartialEq>(meets: &[T]) -> Vec<(usize, usize)> {
     let mut runs: Vec<(usize, usize)> = Vec::new();
     for (k, own) in meets.iter().enumerate() {
         match runs.last_mut() {
