@@ -10,7 +10,7 @@ use nurbs::PatchSurface;
 use super::cracks::{Chain, CrackMap};
 use super::intersection::{CREASE, gap};
 use crate::assemble::{Placement, STEP_SIGMAS};
-use crate::meeting::runs;
+use crate::meeting::{runs, without_short};
 use crate::polygon::{minus, norm};
 
 /// Stretches of fewer cracks go with those beside them.
@@ -123,17 +123,7 @@ fn places(meets: &[Option<bool>], is_closed: bool) -> Vec<usize> {
         last = own.or(last);
         kinds.push(last == Some(true));
     }
-    loop {
-        let found = runs(&kinds);
-        let shortest = found.iter().min_by_key(|(from, to)| to - from);
-        match shortest {
-            Some(&(from, to)) if found.len() > 1 && to - from < LEAST_CRACKS => {
-                let other = !kinds[from];
-                kinds[from..to].fill(other);
-            }
-            _ => break,
-        }
-    }
+    without_short(&mut kinds, LEAST_CRACKS);
     let found = runs(&kinds);
     let mut cuts: Vec<usize> = found.iter().skip(1).map(|(from, _)| *from).collect();
     if is_closed && cuts.len() % 2 == 1 {

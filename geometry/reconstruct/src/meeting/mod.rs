@@ -33,7 +33,7 @@ use corner::corner;
 pub(crate) use gap::{Gap, Line, Reach};
 use line::{REACH, is_closed_up, line, places, reach, sides};
 pub(crate) use loosen::loosen;
-pub(crate) use part::{part, runs};
+pub(crate) use part::{part, runs, without_short};
 pub(crate) use touch::touch;
 use trace::trace;
 

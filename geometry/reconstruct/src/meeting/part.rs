@@ -44,11 +44,20 @@ fn cuts(edge: &MapEdge, gap: &Gap<'_>) -> Vec<f64> {
     };
     let meets = |k: usize| gap.nearest(edge.path.evaluate(at(k)), reach).is_some();
     let mut meets: Vec<bool> = (0..count).map(meets).collect();
-    let shortest = (LEAST_LENGTH / STEP) as usize;
-    // The shortest first, which the two beside it take in.
+    without_short(&mut meets, (LEAST_LENGTH / STEP) as usize);
+    let runs = runs(&meets);
+    let starts = runs.iter().skip(1).map(|(from, _)| *from);
+    starts
+        .map(|from| first + (last - first) * from as f64 / count as f64)
+        .collect()
+}
+
+/// Gives stretches shorter than this to those beside them, the shortest first, which the two beside it
+/// take in.
+pub(crate) fn without_short(meets: &mut [bool], least: usize) {
     loop {
-        let runs = runs(&meets);
-        let short = runs.iter().filter(|(from, to)| to - from < shortest);
+        let runs = runs(meets);
+        let short = runs.iter().filter(|(from, to)| to - from < least);
         let Some(&(from, to)) = short.min_by_key(|(from, to)| to - from) else {
             break;
         };
@@ -58,11 +67,6 @@ fn cuts(edge: &MapEdge, gap: &Gap<'_>) -> Vec<f64> {
         let other = !meets[from];
         meets[from..to].fill(other);
     }
-    let runs = runs(&meets);
-    let starts = runs.iter().skip(1).map(|(from, _)| *from);
-    starts
-        .map(|from| first + (last - first) * from as f64 / count as f64)
-        .collect()
 }
 
 /// Stretches of one kind, each from its first place to the one after its last.
