@@ -109,3 +109,42 @@ fn a_surface_for_each_region_is_asked_for() {
     );
     assert_eq!(error.to_string(), "1 surfaces were given for 2 regions");
 }
+
+/// A cone of radius 11 on ground that falls away before x = 21, where its foot is the rim of a step: a fifth
+/// of the border.
+#[test]
+fn a_foot_that_becomes_a_step_is_followed_all_around() {
+    const SIDE: usize = 60;
+    let radius = |x: f64, y: f64| libm::hypot(x - 30.2, y - 29.7);
+    let cone = |x: f64, y: f64| 0.9 * (11.0 - radius(x, y));
+    let ground = |x: f64, _: f64| -2.0 * (21.0 - x).max(0.0);
+    let breaks: Vec<f64> = (0..=2 * (SIDE + 10))
+        .map(|k| k as f64 / 2.0 - 5.0)
+        .collect();
+    let given = [&ground as &dyn Fn(f64, f64) -> f64, &cone].map(|z| {
+        let third = |k: usize| k as f64 / 6.0 - 5.0;
+        let at = |i: usize, j: usize| z(third(i), third(j));
+        let patches = PatchSurface::through_thirds(breaks.clone(), breaks.clone(), at);
+        (patches.unwrap(), 4)
+    });
+    let mut image = RangeImage::masked(Lattice { pitch_mm: 1.0 }, 0, 0, SIDE, SIDE);
+    let mut labels = vec![0; SIDE * SIDE];
+    for (n, label) in labels.iter_mut().enumerate() {
+        let (i, j) = (n / SIDE, n % SIDE);
+        let (x, y) = (i as f64, j as f64);
+        let is_on_cone = radius(x, y) < 11.0;
+        let z = if is_on_cone { cone(x, y) } else { ground(x, y) };
+        image.set_z_mm(i, j, Some(z));
+        *label = if is_on_cone { 2 } else { 1 };
+    }
+    let map = RegionMap::new(&image, labels);
+    let settings = ReconstructSettings::default();
+    let fitted = Fitted::given(&image, &map, &given, &settings, &Unmonitored).unwrap();
+    let made = fitted
+        .reconstruct(Evidence::default(), &Unmonitored)
+        .unwrap();
+    assert_eq!(check::model(&made.model), Ok(()));
+    let astray = astray(&map, &made);
+    // Led straight past the step, 20 of them.
+    assert!(astray <= 8, "{astray} nodes");
+}
