@@ -88,6 +88,17 @@ class Page:
         ]
         assert not told, f"{where}: {told}"
 
+    def painted(self, locator):
+        """How many pixels of the canvas in it are painted at all."""
+        return locator.locator("canvas").first.evaluate(
+            """(canvas) => {
+                const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+                let count = 0;
+                for (let k = 3; k < data.length; k += 4) if (data[k]) count += 1;
+                return count;
+            }"""
+        )
+
     def colours(self, locator):
         """How many different colours a canvas shows, or what is drawn where it is."""
         shot = locator.screenshot()
