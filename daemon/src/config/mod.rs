@@ -52,8 +52,8 @@ pub use nats::NatsConfig;
 pub use network::{NetworkChoice, NetworkContent};
 pub use overrides::OverrideError;
 pub use processing::{
-    DeliverablesConfig, Estimator, Method, PageChoice, Processing, ReconstructConfig, RegridConfig,
-    SegmentConfig, StepChoice, StepUnits,
+    DeliverablesConfig, Estimator, Kinds, Method, PageChoice, Processing, ReconstructConfig,
+    RegridConfig, SegmentConfig, StepChoice, StepUnits,
 };
 pub use receivers::Retry;
 pub use regularities::{Regularize, RegularizeUnits};

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use relief_api::{Event, Job, JobId, JobList, JobState, Scan, ScanState, StartScan, path};
-use reliefd::config::NamedScanner;
+use reliefd::config::{Kinds, NamedScanner};
 use reliefd::{Config, Daemon};
 use scanner_driver::Scanner;
 use storage::{Disk, LocalDisk};
@@ -34,6 +34,8 @@ pub(crate) fn config(folder: &Path) -> Config {
     config.service.state_dir = folder.join("state");
     config.service.spool_dir = folder.join("spool");
     config.queue.threads = 1;
+    // What a scan's shapes are takes most of a job's time, and is nothing the service decides.
+    config.reconstruct.kinds = Some(Kinds::FreeForm);
     config
 }
 
