@@ -66,7 +66,12 @@ fn a_groove_is_a_slot_as_wide_and_deep_as_it_is() {
     let widths = [8.0, 14.0];
     let steep = [25.0, 35.0, 45.0, 60.0, 75.0];
     let all = widths.iter().flat_map(|w| steep.map(|s| (*w, s)));
-    for (seed, (width_mm, steep_deg)) in (0..).zip(all.chain([(14.0, 15.0)])) {
+    let all = (0..).zip(all.chain([(14.0, 15.0)]));
+    // As `cargo xtask full` sets it: where it is not, the ends of either width and one amid them.
+    let is_second_tier = std::env::var_os("RELIEF_SEEDS").is_some();
+    for (seed, (width_mm, steep_deg)) in
+        all.filter(|(k, _)| is_second_tier || [0, 2, 9, 10].contains(k))
+    {
         let found = block(0.05, seed, &|_, v| {
             Some(-arc(width_mm, steep_deg, v - 3.0)?)
         });
@@ -105,7 +110,9 @@ fn one_with_straight_sides_is_as_deep_as_its_edge() {
 #[test]
 fn a_dimple_is_as_wide_and_deep_as_it_is_whether_ball_or_cone() {
     let far_mm = |u: f64, v: f64| ((u - 4.0) * (u - 4.0) + (v + 2.0) * (v + 2.0)).sqrt();
-    for (seed, steep_deg) in (0..).zip([20.0, 40.0, 60.0]) {
+    let is_second_tier = std::env::var_os("RELIEF_SEEDS").is_some();
+    let balls = (0..).zip([20.0, 40.0, 60.0]);
+    for (seed, steep_deg) in balls.filter(|(k, _)| is_second_tier || *k < 2) {
         let found = block(0.05, seed, &|u, v| {
             Some(-arc(16.0, steep_deg, far_mm(u, v))?)
         });
@@ -114,7 +121,8 @@ fn a_dimple_is_as_wide_and_deep_as_it_is_whether_ball_or_cone() {
         is_near(own, "diameter", 16.0);
         is_near(own, "depth", arc(16.0, steep_deg, 0.0).unwrap());
     }
-    for (seed, slope) in (0..).zip([0.2, 0.3, 0.6, 1.0]) {
+    let cones = (0..).zip([0.2, 0.3, 0.6, 1.0]);
+    for (seed, slope) in cones.filter(|(k, _)| is_second_tier || *k % 3 == 0) {
         let found = block(0.05, seed, &|u, v| {
             let far_mm = far_mm(u, v);
             (far_mm < 7.0).then(|| -(7.0 - far_mm) * slope)
