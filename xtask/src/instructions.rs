@@ -174,8 +174,6 @@ pub(crate) fn build() -> Result<String> {
             ("CARGO_TARGET_DIR", home().display().to_string()),
             (CHECKS[0], off()),
             (CHECKS[1], off()),
-            // As it is without being asked for: within each crate.
-            ("CARGO_PROFILE_RELEASE_LTO", off()),
         ],
     )?;
     Ok(home().join("release/bench").display().to_string())
