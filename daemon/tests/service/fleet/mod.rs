@@ -38,6 +38,8 @@ fn acquires(nats: &Nats) -> impl Fn(&mut Config) + use<> {
         config.nats.bench = Some(bench("bench-1"));
         config.nats.silence_ms = Some(SILENCE_MS);
         config.nats.compute_when_away = false;
+        // A worker may be done with what is taken back from it meanwhile: its result stays for so long.
+        config.nats.unneeded_s = 10;
     }
 }
 
