@@ -8,6 +8,7 @@ use jiff::Timestamp;
 use page::Page;
 use pipeline::{Observer, Outcome, Settings, Stage};
 use range_image::{Cancelled, Monitor, RangeImage};
+use rayon::prelude::*;
 use storage::{Disk, LocalDisk, remove_file_if_there};
 
 use reconstruct::RegionFit;
@@ -219,7 +220,8 @@ pub fn write(
         _ if inputs.page == PageFormats::NONE => Some(Vec::new()),
         Some(drawings) => {
             let page = scan_page(&report, drawings, &files);
-            page_on(disk, directory, &page, inputs.page)?
+            let forms = with_threads(inputs, || forms_of(&page, inputs.page))??;
+            page_on(disk, directory, &forms)?
         }
         None => None,
     };
@@ -300,27 +302,29 @@ fn unless_full<T>(written: io::Result<T>) -> io::Result<Option<T>> {
     }
 }
 
+/// The page in all forms that are wanted, with the names of their files.
+fn forms_of(page: &Page, formats: PageFormats) -> io::Result<Vec<(String, Vec<u8>)>> {
+    let wanted: Vec<PageFormat> = formats.wanted().collect();
+    let form = |format: PageFormat| {
+        let name = format!("{PAGE_STEM}.{}", format.as_str());
+        Ok((name, format.bytes(page)?))
+    };
+    wanted.into_par_iter().map(form).collect()
+}
+
 /// The page; `None` where there was no room for it. What it tells is in other files.
 fn page_on(
     disk: &dyn Disk,
     directory: &Path,
-    page: &Page,
-    formats: PageFormats,
+    forms: &[(String, Vec<u8>)],
 ) -> io::Result<Option<Vec<ManifestFile>>> {
-    let name = |format: PageFormat| format!("{PAGE_STEM}.{}", format.as_str());
-    let write = || -> io::Result<Vec<ManifestFile>> {
-        let written = formats.wanted().map(|format| {
-            let bytes = format.bytes(page)?;
-            write_synced(disk, directory, &name(format), |sink| {
-                sink.write_all(&bytes)
-            })
-        });
-        written.collect()
-    };
-    let written = unless_full(write())?;
+    let written = forms
+        .iter()
+        .map(|(name, bytes)| write_synced(disk, directory, name, |sink| sink.write_all(bytes)));
+    let written = unless_full(written.collect::<io::Result<Vec<_>>>())?;
     if written.is_none() {
-        for format in formats.wanted() {
-            remove_file_if_there(disk, &directory.join(name(format)))?;
+        for (name, _) in forms {
+            remove_file_if_there(disk, &directory.join(name))?;
         }
     }
     Ok(written)
@@ -353,28 +357,32 @@ pub fn draw_pictures(inputs: &Inputs<'_>) -> io::Result<Drawings> {
             ),
         })
         .collect();
-    let drawn = |draw: &dyn Fn(&mut Vec<u8>) -> io::Result<()>| {
-        let mut png = Vec::new();
-        draw(&mut png).map(|()| png)
-    };
-    let mut drawings = vec![
-        (
-            RANGE_PICTURE_NAME,
-            drawn(&|sink| picture::write_range(image, name, sink))?,
-        ),
-        (
-            REGIONS_PICTURE_NAME,
-            drawn(&|sink| picture::write_regions(image, outcome, &notes, name, sink))?,
-        ),
-        (
-            RESIDUALS_PICTURE_NAME,
-            drawn(&|sink| picture::write_residuals(image, outcome, name, sink))?,
-        ),
+    type Draw<'a> = &'a (dyn Fn(&mut Vec<u8>) -> io::Result<bool> + Sync);
+    // Whether there is anything to draw.
+    let draws: [(&str, Draw<'_>); 4] = [
+        (RANGE_PICTURE_NAME, &|sink| {
+            picture::write_range(image, name, sink).map(|()| true)
+        }),
+        (REGIONS_PICTURE_NAME, &|sink| {
+            picture::write_regions(image, outcome, &notes, name, sink).map(|()| true)
+        }),
+        (RESIDUALS_PICTURE_NAME, &|sink| {
+            picture::write_residuals(image, outcome, name, sink).map(|()| true)
+        }),
+        (INLIERS_PICTURE_NAME, &|sink| {
+            let inliers = picture::inliers(image, name);
+            let written = inliers.map(|inliers| inliers.write(sink));
+            Ok(written.transpose()?.is_some())
+        }),
     ];
-    if let Some(inliers) = picture::inliers(image, name) {
-        drawings.push((INLIERS_PICTURE_NAME, drawn(&|sink| inliers.write(sink))?));
-    }
-    Ok(drawings)
+    let drawn = draws.into_par_iter().filter_map(|(file, draw)| {
+        let mut png = Vec::new();
+        match draw(&mut png) {
+            Ok(is_drawn) => is_drawn.then_some(Ok((file, png))),
+            Err(error) => Some(Err(error)),
+        }
+    });
+    drawn.collect()
 }
 
 /// Writes pictures into a directory.
@@ -403,18 +411,27 @@ fn pictures_on(
     inputs: &Inputs<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Option<(Drawings, Vec<ManifestFile>)>, DeliverError> {
-    let drawings = draw_pictures(inputs)?;
+    let view = || {
+        let mut view: Vec<u8> = Vec::new();
+        write_view(inputs, monitor, &mut view).map(|()| view)
+    };
+    let draw = || rayon::join(|| draw_pictures(inputs), view);
+    let (drawings, view) = with_threads(inputs, draw)?;
+    let (drawings, view) = (drawings?, view?);
     let Some(mut written) = unless_full(keep_pictures(disk, directory, &drawings))? else {
         return Ok(None);
     };
-    let view = write_synced::<DeliverError>(disk, directory, VIEW_NAME, |sink| {
-        Ok(write_view(inputs, monitor, sink)?)
-    });
-    match view {
-        Err(error) if error.is_for_want_of_room() => return Ok(None),
-        view => written.push(view?),
-    }
+    let view = write_synced(disk, directory, VIEW_NAME, |sink| sink.write_all(&view));
+    let Some(view) = unless_full(view)? else {
+        return Ok(None);
+    };
+    written.push(view);
     Ok(Some((drawings, written)))
+}
+
+/// Lets work share the threads that the scan is processed by.
+fn with_threads<T: Send>(inputs: &Inputs<'_>, work: impl FnOnce() -> T + Send) -> io::Result<T> {
+    regrid::with_threads(inputs.settings.regrid.threads, work).map_err(io::Error::other)
 }
 
 fn write_json(
