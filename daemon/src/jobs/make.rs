@@ -118,8 +118,11 @@ impl Workpiece<'_> {
         settings.regrid.threads = self.threads;
 
         let watch = Stopwatch::new(progress);
-        let (image, mut kept) = match self.streamed(&settings.regrid) {
-            Some(image) => (image, count(&mut journal, &header, progress)?),
+        let (image, mut kept, held) = match self.streamed(&settings.regrid) {
+            Some(image) => {
+                let (kept, held) = count(&mut journal, &header, progress)?;
+                (image, kept, held)
+            }
             None => {
                 watch.stage(Stage::Regrid);
                 let mut fit = Fit::of_journal(&settings.regrid, self.journal);
@@ -135,6 +138,7 @@ impl Workpiece<'_> {
         };
         let columns = KeptColumns {
             path: self.journal,
+            held: held.columns,
             camera_mm: header.calibration.camera_mm(),
         };
         let view = &kept.view;
@@ -214,14 +218,19 @@ impl Workpiece<'_> {
     }
 }
 
-/// The columns of a journal, read anew each time.
+/// The columns of a journal: held in memory, or read anew each time.
 struct KeptColumns<'a> {
     path: &'a Path,
+    held: Option<Vec<Column>>,
     camera_mm: Option<[f64; 2]>,
 }
 
 impl Columns for KeptColumns<'_> {
     fn visit(&self, take: &mut dyn FnMut(&Column) -> bool) -> Result<(), ReadAgainError> {
+        if let Some(held) = &self.held {
+            held.iter().all(take);
+            return Ok(());
+        }
         let mut journal = JournalReader::open(self.path)?;
         let calibration = journal.header().calibration;
         while let Some(raw) = journal.next_column()? {
@@ -239,6 +248,33 @@ impl Columns for KeptColumns<'_> {
 
 /// Larger scans than this are not read again to find out why there is no surface.
 const MOST_EXPLAINED_SAMPLES: u64 = 1 << 22;
+
+/// Samples of a scan that is held in memory, at most: 25 megabytes. They are gone through five times, and
+/// to read and decode them takes longer than most of what is done with them.
+const MOST_HELD_SAMPLES: usize = 1 << 20;
+
+/// The columns of a scan that is small enough.
+struct Held {
+    columns: Option<Vec<Column>>,
+    samples: usize,
+}
+
+impl Held {
+    fn none_yet() -> Self {
+        Self {
+            columns: Some(Vec::new()),
+            samples: 0,
+        }
+    }
+
+    fn add(&mut self, column: Column) {
+        self.samples += column.samples().len();
+        match &mut self.columns {
+            Some(columns) if self.samples <= MOST_HELD_SAMPLES => columns.push(column),
+            columns => *columns = None,
+        }
+    }
+}
 
 /// What the journal held.
 #[derive(Default, Clone)]
@@ -272,14 +308,21 @@ impl Kept {
 type Journal = JournalReader<std::io::BufReader<std::fs::File>>;
 
 /// Counts what the journal holds, and whether it is whole.
-fn count(journal: &mut Journal, header: &Header, progress: &Progress<'_>) -> Result<Kept, Halt> {
-    let mut kept = Kept::default();
+fn count(
+    journal: &mut Journal,
+    header: &Header,
+    progress: &Progress<'_>,
+) -> Result<(Kept, Held), Halt> {
+    let (mut kept, mut held) = (Kept::default(), Held::none_yet());
     while let Some(column) = journal.next_column()? {
         kept.add(&column, header);
+        if held.columns.is_some() {
+            held.add(column.calibrated(&header.calibration));
+        }
         progress.check()?;
     }
     kept.end(journal.ending());
-    Ok(kept)
+    Ok((kept, held))
 }
 
 /// Ends the regridding when the journal cannot be read on.
@@ -306,14 +349,14 @@ fn regrid(
     fit: &mut Fit,
     scan: &Scan,
     watch: &Stopwatch<'_>,
-) -> Result<(RangeImage, Kept), Halt> {
-    let mut kept = Kept::default();
+) -> Result<(RangeImage, Kept, Held), Halt> {
+    let (mut kept, mut held) = (Kept::default(), Held::none_yet());
     let reading = Reading {
         watch,
         broken: AtomicBool::new(false),
     };
     let mut failure = None;
-    // Column by column, so that no second copy of the scan is ever in memory.
+    // Column by column, so that no second copy of a large scan is ever in memory.
     let columns = std::iter::from_fn(|| match journal.next_column() {
         _ if watch.is_cancelled() => None,
         Ok(column) => column.and_then(|raw| {
@@ -323,6 +366,9 @@ fn regrid(
             if fit.is_missed() {
                 reading.broken.store(true, Ordering::Relaxed);
                 return None;
+            }
+            if held.columns.is_some() {
+                held.add(column.clone());
             }
             Some(column)
         }),
@@ -348,7 +394,7 @@ fn regrid(
     })?;
     kept.end(journal.ending());
     tracing::debug!(scan = %scan.id, columns = kept.columns, "regridded");
-    Ok((image, kept))
+    Ok((image, kept, held))
 }
 
 /// The grid is too fine: how far the samples spread, those included that were not reached.
@@ -443,4 +489,31 @@ fn versions(header: &Header) -> BTreeMap<String, String> {
         .map(|firmware| ("scanner firmware".to_owned(), firmware))
         .into_iter()
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use range_image::Sample;
+
+    use super::*;
+
+    #[test]
+    fn a_scan_is_held_as_long_as_it_is_small() {
+        let column = |x_mm, samples: usize| {
+            let sample = |k| Sample {
+                y_mm: k as f64,
+                z_mm: 0.0,
+                intensity: 0,
+            };
+            Column::new(x_mm, (0..samples).map(sample).collect())
+        };
+        let mut held = Held::none_yet();
+        held.add(column(0.0, MOST_HELD_SAMPLES - 1));
+        held.add(column(1.0, 1));
+        assert_eq!(held.columns.as_ref().map(Vec::len), Some(2));
+        held.add(column(2.0, 1));
+        assert!(held.columns.is_none());
+        held.add(column(3.0, 1));
+        assert!(held.columns.is_none(), "the beginning is gone");
+    }
 }
