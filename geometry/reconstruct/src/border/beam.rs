@@ -72,21 +72,28 @@ impl Beam {
         // (Lawson & Hanson 1974, chapter 23).
         let mut active: Vec<usize> = Vec::new();
         let mut sizes: Vec<f64> = Vec::new();
+        // Long borders have thousands of pins: what each that pushes does to all is worked out once.
+        let mut influences: Vec<Vec<f64>> = Vec::new();
+        let mut is_active = vec![false; pins.len()];
+        let mut reached = vec![-0.0; pins.len()];
         for _ in 0..4 * MOST_PINS {
-            let overrun = |pin: &Pin| margin - pin.side * (pin.place - beam.at(pin.along, 0));
+            let overrun = |k: usize| margin - pins[k].side * (pins[k].place - reached[k]);
             let worst = (0..pins.len())
-                .filter(|k| !active.contains(k))
-                .map(|k| (overrun(&pins[k]), k))
+                .filter(|k| !is_active[*k])
+                .map(|k| (overrun(k), k))
                 .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
             match worst {
                 Some((by, k)) if by > EXACT => {
                     active.push(k);
                     sizes.push(0.0);
+                    is_active[k] = true;
+                    let on = |pin: &Pin| beam.influence(pin.along, pins[k].along, 0);
+                    influences.push(pins.iter().map(on).collect());
                 }
                 _ => {
-                    let farthest = pins.iter().map(|p| beam.at(p.along, 0).abs());
+                    let farthest = reached.iter().map(|deflection| deflection.abs());
                     // Pins that leave no way between them are overrun, however hard they push.
-                    let passed = pins.iter().all(|pin| overrun(pin) <= SOFT_EXACT);
+                    let passed = (0..pins.len()).all(|k| overrun(k) <= SOFT_EXACT);
                     if passed && farthest.fold(0.0, f64::max) <= most {
                         return Ok(beam);
                     }
@@ -111,12 +118,18 @@ impl Beam {
                 for (size, wanted) in sizes.iter_mut().zip(&wanted) {
                     *size += share * (wanted - *size);
                 }
-                active.remove(stops);
+                is_active[active.remove(stops)] = false;
                 sizes.remove(stops);
+                influences.remove(stops);
             }
             beam.forces.clear();
-            for (k, size) in active.iter().zip(&sizes) {
-                beam.forces.push((pins[*k].along, -pins[*k].side * size));
+            reached.fill(-0.0);
+            for ((k, size), influences) in active.iter().zip(&sizes).zip(&influences) {
+                let force = -pins[*k].side * size;
+                beam.forces.push((pins[*k].along, force));
+                for (deflection, influence) in reached.iter_mut().zip(influences) {
+                    *deflection += force * influence;
+                }
             }
         }
         Err(active.last().copied().unwrap_or(0))
