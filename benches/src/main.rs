@@ -5,6 +5,7 @@
 //! ```
 
 mod floor;
+mod large;
 mod mlms;
 mod row;
 mod scan;
@@ -59,8 +60,13 @@ struct Options {
         requires = "scattered"
     )]
     outliers: f64,
+    /// How a scan of so many columns of as many samples fares on two threads: a row with nodes, seconds of
+    /// regridding by MLMS, of segmenting, of all from the range image to the file, and the peak of memory in MB
+    #[arg(long, value_name = "SIDE", conflicts_with_all = ["work", "answers", "scattered"])]
+    #[arg(value_parser = clap::value_parser!(u32).range(64..=8192))]
+    large: Option<u32>,
     /// Write the whole table into this page, too, between its marks
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["work", "answers", "only", "short"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["work", "answers", "only", "short", "large"])]
     write: Option<PathBuf>,
     /// Rows as JSON, one in a line, instead of a table
     #[arg(long)]
@@ -94,6 +100,9 @@ fn run(options: &Options) -> Result<()> {
     }
     if let Some(folder) = &options.scattered {
         return scattered::write(folder, options.outliers);
+    }
+    if let Some(side) = options.large {
+        return large::print(side);
     }
     if !options.json {
         println!("{}", row::HEAD);

@@ -132,10 +132,10 @@ pub(crate) fn iges_file(outcome: &Outcome) -> Result<Vec<u8>> {
 
 /// When each stage began.
 #[derive(Default)]
-struct Watch(Mutex<Vec<(Stage, Instant)>>);
+pub(crate) struct Watch(Mutex<Vec<(Stage, Instant)>>);
 
 impl Watch {
-    fn begun(&self, wanted: Stage) -> Option<Instant> {
+    pub(crate) fn begun(&self, wanted: Stage) -> Option<Instant> {
         let stages = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let found = stages.iter().find(|(stage, _)| *stage == wanted);
         found.map(|(_, begun)| *begun)

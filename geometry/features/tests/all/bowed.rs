@@ -67,7 +67,8 @@ fn a_groove_is_a_slot_as_wide_and_deep_as_it_is() {
     let steep = [25.0, 35.0, 45.0, 60.0, 75.0];
     let all = widths.iter().flat_map(|w| steep.map(|s| (*w, s)));
     let all = (0..).zip(all.chain([(14.0, 15.0)]));
-    // As `cargo xtask full` sets it: where it is not, the ends of either width and one amid them.
+    // As `cargo xtask full` sets it: where it is not, two of each width, the least and the most steep
+    // among them.
     let is_second_tier = std::env::var_os("RELIEF_SEEDS").is_some();
     for (seed, (width_mm, steep_deg)) in
         all.filter(|(k, _)| is_second_tier || [0, 2, 9, 10].contains(k))
