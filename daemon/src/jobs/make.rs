@@ -8,13 +8,14 @@ use deliverables::{
     CadOptions, DeliverError, Entities, Inputs, LengthUnit, MeasuredPoints, PageFormats, Pictures,
     ScanReport, Schema, Stopwatch,
 };
-use pipeline::{Columns, Observer, PipelineError, ReadAgainError, Stage, View};
-use range_image::{Cancelled, Column, Lattice, Monitor, RangeImage};
+use pipeline::{Observer, PipelineError, Stage, View};
+use range_image::{Cancelled, Lattice, Monitor, RangeImage};
 use regrid::RegridSettings;
 use relief_api::{Job, Scan};
 use scan_record::{Ending, Header, JournalReader, ReadError};
 use storage::Disk;
 
+use super::kept_columns::{Held, KeptColumns};
 use super::kept_processing;
 use super::progress::Progress;
 use crate::acquisition::grid_file;
@@ -218,63 +219,8 @@ impl Workpiece<'_> {
     }
 }
 
-/// The columns of a journal: held in memory, or read anew each time.
-struct KeptColumns<'a> {
-    path: &'a Path,
-    held: Option<Vec<Column>>,
-    camera_mm: Option<[f64; 2]>,
-}
-
-impl Columns for KeptColumns<'_> {
-    fn visit(&self, take: &mut dyn FnMut(&Column) -> bool) -> Result<(), ReadAgainError> {
-        if let Some(held) = &self.held {
-            held.iter().all(take);
-            return Ok(());
-        }
-        let mut journal = JournalReader::open(self.path)?;
-        let calibration = journal.header().calibration;
-        while let Some(raw) = journal.next_column()? {
-            if !take(&raw.calibrated(&calibration)) {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    fn camera_mm(&self) -> Option<[f64; 2]> {
-        self.camera_mm
-    }
-}
-
 /// Larger scans than this are not read again to find out why there is no surface.
 const MOST_EXPLAINED_SAMPLES: u64 = 1 << 22;
-
-/// Samples of a scan that is held in memory, at most: 25 megabytes. They are gone through five times, and
-/// to read and decode them takes longer than most of what is done with them.
-const MOST_HELD_SAMPLES: usize = 1 << 20;
-
-/// The columns of a scan that is small enough.
-struct Held {
-    columns: Option<Vec<Column>>,
-    samples: usize,
-}
-
-impl Held {
-    fn none_yet() -> Self {
-        Self {
-            columns: Some(Vec::new()),
-            samples: 0,
-        }
-    }
-
-    fn add(&mut self, column: Column) {
-        self.samples += column.samples().len();
-        match &mut self.columns {
-            Some(columns) if self.samples <= MOST_HELD_SAMPLES => columns.push(column),
-            columns => *columns = None,
-        }
-    }
-}
 
 /// What the journal held.
 #[derive(Default, Clone)]
@@ -489,31 +435,4 @@ fn versions(header: &Header) -> BTreeMap<String, String> {
         .map(|firmware| ("scanner firmware".to_owned(), firmware))
         .into_iter()
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use range_image::Sample;
-
-    use super::*;
-
-    #[test]
-    fn a_scan_is_held_as_long_as_it_is_small() {
-        let column = |x_mm, samples: usize| {
-            let sample = |k| Sample {
-                y_mm: k as f64,
-                z_mm: 0.0,
-                intensity: 0,
-            };
-            Column::new(x_mm, (0..samples).map(sample).collect())
-        };
-        let mut held = Held::none_yet();
-        held.add(column(0.0, MOST_HELD_SAMPLES - 1));
-        held.add(column(1.0, 1));
-        assert_eq!(held.columns.as_ref().map(Vec::len), Some(2));
-        held.add(column(2.0, 1));
-        assert!(held.columns.is_none());
-        held.add(column(3.0, 1));
-        assert!(held.columns.is_none(), "the beginning is gone");
-    }
 }

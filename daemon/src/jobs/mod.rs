@@ -5,6 +5,7 @@
 
 mod acknowledge;
 mod embedded;
+mod kept_columns;
 mod local;
 mod make;
 mod progress;
