@@ -79,6 +79,8 @@ const DOUBT: f64 = 5.0;
 /// the samples have led it is not fitted to all: they make up for a few hundredths of it, and for
 /// more only where the descent has not ended.
 const HOPELESS: f64 = 3.0;
+/// The most terms of a polynomial that is alone, for want of samples: whether it lacks any is not known.
+const FEWEST_TERMS: usize = 6;
 /// What each number costs above its price, so that of a hundred planes not one gets a radius
 /// from its noise.
 pub(crate) const CAUTION: f64 = 4.0;
@@ -152,7 +154,8 @@ impl Scale {
 
     /// Whether a shape with so many free numbers could yet be the best: with more of them, it costs
     /// what it costs, and it will hardly leave less than polynomials do for all their freedom. Where
-    /// these leave more than a shape does, as they do of what turns far away, they tell nothing.
+    /// these leave more than a shape does, as they do of what turns far away, or would leave less
+    /// with more terms, they tell nothing.
     fn leaves_room(&self, freedom: usize) -> bool {
         let most = self.most();
         if self.surfaces.is_empty() {
@@ -164,7 +167,7 @@ impl Scale {
             let left = own.map(|surface| surface.left(most));
             left.reduce(f64::min)
         };
-        if least(false) > least(true) && least(true).is_some() {
+        if least(true).is_some() && (least(false) > least(true) || self.lacks_terms(most)) {
             return true;
         }
         let shapes = self.surfaces.iter().filter(|surface| surface.fit.is_some());
@@ -172,6 +175,17 @@ impl Scale {
         let spared = |freedom| 1.0 - freedom as f64 / self.independent;
         let floor = self.floor(most, spared) * spared(freedom);
         scores.fold(f64::INFINITY, f64::min) > self.score(floor, freedom)
+    }
+
+    /// Whether polynomials are worth their terms up to the last one: more would be worth theirs, too.
+    fn lacks_terms(&self, most: f64) -> bool {
+        let polynomials = self.surfaces.iter().filter(|surface| surface.fit.is_none());
+        let last = polynomials.clone().map(|p| p.freedom).max();
+        let best = polynomials.min_by(|a, b| {
+            let score = |p: &Surface| self.score(p.left(most), p.freedom);
+            score(a).total_cmp(&score(b))
+        });
+        best.is_some_and(|best| Some(best.freedom) == last && last > Some(FEWEST_TERMS))
     }
 
     /// The least that any of the surfaces leaves, were it not for its freedom, which spares a share
@@ -358,10 +372,14 @@ mod tests {
     fn polynomials_tell_how_little_a_shape_can_leave_where_they_leave_no_more() {
         let sphere = (1.05, 4, true);
         // With 15 numbers they leave no less: 6 will do no better.
-        assert!(!scale(&[(1.049, 15, false), sphere]).leaves_room(6));
-        assert!(scale(&[(1.0, 15, false), sphere]).leaves_room(6));
+        let (third, fourth) = ((1.055, 10, false), (1.049, 15, false));
+        assert!(!scale(&[third, fourth, sphere]).leaves_room(6));
+        assert!(scale(&[third, (1.0, 15, false), sphere]).leaves_room(6));
         // They leave more, for want of terms.
-        assert!(scale(&[(1.2, 15, false), sphere]).leaves_room(6));
+        assert!(scale(&[third, (1.2, 15, false), sphere]).leaves_room(6));
+        // As little, but would leave less with more terms: so it is of a slender cone beside a
+        // cylinder that leans.
+        assert!(scale(&[(1.6, 15, false), (1.049, 28, false), (1.06, 5, true)]).leaves_room(6));
         // What they spare of the noise by their own freedom is not held against others.
         assert!(scale(&[(1.0, 6, false), (1.012, 4, true)]).leaves_room(6));
         // There are too few samples for any.
