@@ -23,8 +23,10 @@ const NO_NOISE_MM2: f64 = 1e-14;
 /// Part of the tolerance at which nothing more is refined.
 const AIM: f64 = 0.1;
 
-/// Share of the nodes at which the form has to be there.
-const MET: f64 = 0.98;
+/// Share of the nodes at which the form has to be there, and of those whose neighbours are all of the
+/// region: along the border of what ends at a wall nodes are of that.
+const MET: f64 = 0.9;
+const MET_WITHIN: f64 = 0.98;
 
 /// Around the nodes the form goes on where it faces the camera so squarely at least, of the
 /// least squarely that it does at a node: what is steeper needs many patches and bounds nothing.
@@ -138,13 +140,26 @@ fn around(
     let pitch_mm = image.pitch_mm();
     // z and weight.
     let mut known: Vec<Option<(f64, f64)>> = vec![None; width * height];
-    let mut count = 0;
+    let mut is_node = vec![false; width * height];
+    let place = |node: &Node| (node.column - columns.0 + margin, node.row - rows.0 + margin);
     for node in nodes {
-        let (i, j) = (node.column - columns.0 + margin, node.row - rows.0 + margin);
+        let (i, j) = place(node);
+        is_node[i * height + j] = true;
         known[i * height + j] = met(form, (x_mm(i), y_mm(j)), node.z_mm, pitch_mm);
-        count += usize::from(known[i * height + j].is_some());
     }
-    if (count as f64) < MET * nodes.len() as f64 {
+    let is_within = |node: &&Node| {
+        let (i, j) = place(node);
+        (i - 1..=i + 1).all(|i| (j - 1..=j + 1).all(|j| is_node[i * height + j]))
+    };
+    let is_met = |share: f64, nodes: &mut dyn Iterator<Item = &Node>| {
+        let (mut all, mut met) = (0.0, 0.0);
+        for (i, j) in nodes.map(place) {
+            all += 1.0;
+            met += f64::from(u8::from(known[i * height + j].is_some()));
+        }
+        met >= share * all
+    };
+    if !is_met(MET, &mut nodes.iter()) || !is_met(MET_WITHIN, &mut nodes.iter().filter(is_within)) {
         return None;
     }
     let facings = known.iter().flatten().map(|(_, facing)| *facing);
@@ -311,9 +326,8 @@ mod tests {
         }
     }
 
-    /// A fillet around a boss, and some nodes of the wall that it has become.
-    #[test]
-    fn a_few_nodes_of_a_wall_do_not_keep_a_fillet_from_being_one() {
+    /// A fillet around a boss, and nodes of the wall that it has become, where they are of that.
+    fn fillet_and_wall(is_wall: impl Fn(f64, f64) -> bool) -> (Form, RangeImage, Vec<Node>, f64) {
         let (radius_mm, tube_mm) = (11.6, 2.6);
         let shape = Form::Shape(Shape::Torus(Torus {
             centre_mm: Vector3::zeros(),
@@ -324,13 +338,13 @@ mod tests {
         }));
         let image = RangeImage::masked(Lattice { pitch_mm: 0.42 }, -60, -60, 120, 120);
         let places = (0..120).flat_map(|column| (0..120).map(move |row| (column, row)));
-        let mut of_wall = 0;
+        let mut of_wall = 0.0;
         let node = |(column, row)| {
             let (x, y) = (image.x_mm(column), image.y_mm(row));
             let beyond = radius_mm - libm::sqrt(x * x + y * y);
             let z_mm = -libm::sqrt((tube_mm * tube_mm - beyond * beyond).max(0.0));
-            let is_wall = (2.55..2.75).contains(&beyond) && y > 7.5;
-            of_wall += usize::from(is_wall);
+            let is_wall = is_wall(beyond, y);
+            of_wall += f64::from(u8::from(is_wall));
             ((0.0..2.5).contains(&beyond) || is_wall).then_some(Node {
                 column,
                 row,
@@ -338,23 +352,33 @@ mod tests {
             })
         };
         let nodes: Vec<Node> = places.filter_map(node).collect();
-        assert!(
-            (5..nodes.len() / 50).contains(&of_wall),
-            "{of_wall} of {}",
-            nodes.len()
-        );
+        let share = of_wall / nodes.len() as f64;
+        (shape, image, nodes, share)
+    }
+
+    #[test]
+    fn a_few_nodes_of_a_wall_do_not_keep_a_fillet_from_being_one() {
         let domain = Domain {
             x_mm: (-14.0, 14.0),
             y_mm: (-14.0, 14.0),
         };
-        let surface = patches(&shape, &image, &nodes, &domain, 256).unwrap();
-        for node in nodes.iter().filter(|node| node.z_mm < -0.9) {
-            let (x, y) = (image.x_mm(node.column), image.y_mm(node.row));
-            let off_mm = shape
-                .distance_mm(&Vector3::new(x, y, surface.z(x, y)))
-                .abs();
-            assert!(off_mm < 0.02, "{x} {y}: {off_mm}");
+        // Some, and so many as lie all along its border.
+        for (from_mm, shares) in [(7.5, 0.005..0.02), (0.0, 0.03..0.06)] {
+            let is_wall = |beyond: f64, y: f64| (2.55..2.75).contains(&beyond) && y > from_mm;
+            let (shape, image, nodes, share) = fillet_and_wall(is_wall);
+            assert!(shares.contains(&share), "{share}");
+            let surface = patches(&shape, &image, &nodes, &domain, 256).unwrap();
+            for node in nodes.iter().filter(|node| node.z_mm < -0.9) {
+                let (x, y) = (image.x_mm(node.column), image.y_mm(node.row));
+                let off_mm = shape.distance_mm(&Vector3::new(x, y, surface.z(x, y)));
+                assert!(off_mm.abs() < 0.02, "{x} {y}: {off_mm}");
+            }
         }
+        // As many within it are of something else.
+        let is_other = |beyond: f64, y: f64| (2.6..4.0).contains(&beyond) && y.abs() < 1.3;
+        let (shape, image, nodes, share) = fillet_and_wall(is_other);
+        assert!((0.02..0.06).contains(&share), "{share}");
+        assert!(patches(&shape, &image, &nodes, &domain, 256).is_none());
     }
 
     #[test]
