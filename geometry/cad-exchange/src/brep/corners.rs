@@ -153,6 +153,7 @@ fn ends(model: &Model, coedge: &Coedge) -> (VertexId, VertexId) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::seam::Nearness;
     use super::*;
     use nalgebra::Vector3;
     use nurbs::{PatchSurface, PiecewiseCubic};
@@ -225,7 +226,13 @@ mod tests {
             let seam = |k: usize| {
                 let (place, other) = ((k, 0, 1), (k + 1, 0, 0));
                 let curve = |at: Place| &coedge(&model, at).unwrap().space_curve;
-                let seam = Seam::between(curve(place), curve(other), |_| 1.0, other, 0.1);
+                let seam = Seam::between(
+                    curve(place),
+                    curve(other),
+                    |_| 1.0,
+                    other,
+                    Nearness::of(0.1),
+                );
                 (place, seam.unwrap())
             };
             for k in [0, 1] {

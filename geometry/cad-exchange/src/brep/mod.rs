@@ -17,6 +17,7 @@ use reconstruct::Model;
 
 pub(crate) use analytic::Analytic;
 pub(crate) use carrier::{Carrier, Flat};
+use seam::most_off_mm;
 pub(crate) use swept::{By, Generated};
 pub(crate) use topology::{Strand, Topology, Use};
 
@@ -46,8 +47,8 @@ impl Brep {
         loop {
             let mut brep = Self::on(model, carriers.clone(), sharing);
             let off_mm = &brep.topology.off_mm;
-            let is_off =
-                |face: &usize| off_mm[*face].is_nan() || off_mm[*face] > sharing.sharing_mm / 2.0;
+            let most_mm = most_off_mm(sharing.sharing_mm);
+            let is_off = |face: &usize| off_mm[*face].is_nan() || off_mm[*face] > most_mm;
             let mut strays: Vec<usize> = (0..off_mm.len()).filter(is_off).collect();
             if strays.is_empty() {
                 strays = meridian::cut_rings(&mut brep.topology, &mut brep.carriers);

@@ -18,8 +18,42 @@ const PROBES: usize = 4;
 const LEAST_PART: f64 = 0.5;
 
 /// Where a crease is cut, what is left has at least this length, in units of the distance
-/// that is shared; edges that are hardly longer than the uncertainty trouble readers.
+/// that is shared gladly; edges that are hardly longer than the uncertainty trouble readers.
 const LEAST_REST: f64 = 20.0;
+
+/// Where faces do not meet beside a crease either, curves may be so many times as far apart: an edge
+/// that is a little off is less trouble than a gap.
+const FAR: f64 = 3.0;
+
+/// How near curves are to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Nearness {
+    most_mm: f64,
+    rest_mm: f64,
+}
+
+impl Nearness {
+    /// So near as is shared gladly.
+    pub(super) fn of(sharing_mm: f64) -> Self {
+        Self {
+            most_mm: sharing_mm,
+            rest_mm: LEAST_REST * sharing_mm,
+        }
+    }
+
+    /// So near as is better than a gap.
+    pub(super) fn at_most(sharing_mm: f64) -> Self {
+        Self {
+            most_mm: FAR * sharing_mm,
+            ..Self::of(sharing_mm)
+        }
+    }
+}
+
+/// How far an edge of two faces may lie off each at most.
+pub(super) fn most_off_mm(sharing_mm: f64) -> f64 {
+    Nearness::at_most(sharing_mm).most_mm / 2.0
+}
 
 /// How far a crease may run from where its faces meet, millimetres. Moved farther, the sides of what
 /// is narrow cross each other.
@@ -50,7 +84,7 @@ impl Seam {
         second: &PiecewiseCubic<3>,
         facing: impl Fn([f64; 3]) -> f64,
         other: Place,
-        sharing_mm: f64,
+        nearness: Nearness,
     ) -> Option<Self> {
         let second = second.reversed();
         let (from, to) = first.domain();
@@ -59,10 +93,10 @@ impl Seam {
         }
         let near = |t: f64| {
             let (a, b) = (first.evaluate(t), second.evaluate(t));
-            apart(a, b) * facing(a) <= sharing_mm
+            apart(a, b) * facing(a) <= nearness.most_mm
         };
         let (mut low, mut high) = longest_run(&places(first, &second), near)?;
-        let rest = LEAST_REST * sharing_mm;
+        let rest = nearness.rest_mm;
         if low > from {
             low = low.max(from + rest);
         }
@@ -203,7 +237,7 @@ mod tests {
     #[test]
     fn a_crease_is_shared_as_far_as_its_curves_meet() {
         let seam = |a: &PiecewiseCubic<3>, b: &PiecewiseCubic<3>| {
-            Seam::between(a, &b.reversed(), |_| 1.0, (1, 0, 0), 0.05)
+            Seam::between(a, &b.reversed(), |_| 1.0, (1, 0, 0), Nearness::of(0.05))
         };
         let whole = seam(&line(), &flared(90.0, 0.004)).unwrap();
         assert!(whole.is_whole() && whole.range == (0.0, 100.0));
@@ -220,10 +254,25 @@ mod tests {
     }
 
     #[test]
+    fn what_is_better_than_a_gap_is_three_times_as_far() {
+        let other = flared(70.0, 0.0045).reversed();
+        let seam = |near| Seam::between(&line(), &other, |_| 1.0, (1, 0, 0), near).unwrap();
+        // Apart by 0.135 at its end, and by 0.05 at 81.1.
+        assert!(!seam(Nearness::of(0.05)).is_whole());
+        assert!(seam(Nearness::at_most(0.05)).is_whole());
+        assert!((most_off_mm(0.05) - 0.075).abs() < 1e-12);
+        // Where that is cut, as little is left as elsewhere.
+        let other = flared(98.5, 0.2).reversed();
+        let near = Nearness::at_most(0.05);
+        let cut = Seam::between(&line(), &other, |_| 1.0, (1, 0, 0), near).unwrap();
+        assert!((cut.range.1 - 99.0).abs() < 1e-9, "{:?}", cut.range);
+    }
+
+    #[test]
     fn on_steep_faces_curves_are_nearer_than_they_are_high() {
         let apart = |facing: f64| {
             let other = flared(1.0, 0.0015).reversed();
-            Seam::between(&line(), &other, |_| facing, (1, 0, 0), 0.05)
+            Seam::between(&line(), &other, |_| facing, (1, 0, 0), Nearness::of(0.05))
         };
         // 0.1485 at the end, where a wall of 72 degrees is 0.046 off.
         assert!(apart(0.309).unwrap().is_whole());
@@ -234,7 +283,13 @@ mod tests {
     fn curves_with_other_parameters_do_not_meet() {
         let longer = PiecewiseCubic::line([0.0; 3], [100.0, 0.0, 0.0], 101.0).unwrap();
         assert_eq!(
-            Seam::between(&line(), &longer.reversed(), |_| 1.0, (1, 0, 0), 1.0),
+            Seam::between(
+                &line(),
+                &longer.reversed(),
+                |_| 1.0,
+                (1, 0, 0),
+                Nearness::of(1.0)
+            ),
             None
         );
     }

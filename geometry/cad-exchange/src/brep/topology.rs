@@ -13,7 +13,7 @@ use reconstruct::{Coedge, EdgeKind, Loop, Model};
 use super::bend::bent;
 use super::corners::Ends;
 use super::groups::Groups;
-use super::seam::{Seam, facing};
+use super::seam::{Nearness, Seam, facing};
 use super::support::Support;
 use super::{Sharing, onto};
 use crate::common::{ROUNDING_PART, SMOOTH_MM, largest, without_kinks};
@@ -146,7 +146,8 @@ fn seams(
             of_faces.fold(0.0, f64::max)
         };
         let (first, second) = (&first.space_curve, &second.space_curve);
-        match Seam::between(first, second, facing, other, sharing_mm) {
+        let between = |nearness| Seam::between(first, second, facing, other, nearness);
+        match between(Nearness::of(sharing_mm)) {
             Some(seam) if seam.is_whole() => {
                 ends.join(place, &seam);
                 seams.insert(place, seam);
@@ -154,7 +155,8 @@ fn seams(
             partly => {
                 let faces = [place.0, other.0].map(|face| supports[face]);
                 let whole = Seam::where_they_meet(first, second, &faces, other);
-                rest.push((place, whole, partly));
+                let farther = between(Nearness::at_most(sharing_mm));
+                rest.push((place, whole, farther.or(partly)));
             }
         }
     }

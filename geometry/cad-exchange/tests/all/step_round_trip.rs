@@ -223,17 +223,21 @@ fn faces_that_part_keep_edges_of_their_own_from_there() {
     assert_eq!((summary.shared_edges, summary.partly_shared), (1, 0));
     assert!(summary.uncertainty_mm < 0.015, "{summary:?}");
     assert_eq!((read.edges.len(), read.vertices_mm.len()), (8, 7));
-    // By 0.225 mm they do not.
+    // By 0.225 mm they do not: the edge is half way between them.
     let (_, summary) = round_trip(&raised(18.75, 0.02), &options);
-    assert_eq!((summary.shared_edges, summary.partly_shared), (1, 1));
+    assert_eq!((summary.shared_edges, summary.partly_shared), (1, 0));
+    assert!(
+        summary.uncertainty_mm > 0.015 && summary.uncertainty_mm < 0.1125,
+        "{summary:?}"
+    );
     // By 2.25 mm there. The ramp faces the camera more squarely than the barrel beside it: what
-    // counts is how far the curves are off it, and they are shared to 0.1 mm.
+    // counts is how far the curves are off it, and they are shared to 0.3 mm.
     let squarer = 1.0 / 1.29_f64.sqrt();
-    let parted_mm = 18.75 + 0.1 / squarer / 0.2;
+    let parted_mm = 18.75 + 0.3 / squarer / 0.2;
     let (read, summary) = round_trip(&raised(18.75, 0.2), &options);
     assert_eq!((summary.shared_edges, summary.partly_shared), (1, 1));
     assert!(
-        summary.uncertainty_mm > 0.02 && summary.uncertainty_mm < 0.055,
+        summary.uncertainty_mm > 0.055 && summary.uncertainty_mm < 0.155,
         "{summary:?}"
     );
     assert_eq!((read.edges.len(), read.vertices_mm.len()), (10, 9));
@@ -245,7 +249,7 @@ fn faces_that_part_keep_edges_of_their_own_from_there() {
         .filter(|y| (y - parted_mm).abs() < 0.1)
         .collect();
     assert_eq!(shared.len(), 1, "one vertex where they part");
-    // By more than 0.1 mm along most of it.
+    // By more than 0.3 mm along most of it.
     let (read, summary) = round_trip(&raised(0.0, 0.2), &options);
     assert_eq!((summary.shared_edges, summary.parted_creases), (0, 1));
     assert_eq!(summary.uncertainty_mm, 1e-4);

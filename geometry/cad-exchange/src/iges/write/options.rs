@@ -43,7 +43,8 @@ pub struct WriteOptions {
     /// of every vertex and edge. A larger gap in the model is written instead.
     pub resolution_mm: f64,
     /// A crease is one curve of both its faces as far as the curves that they make of it are as near
-    /// to the other face as this, millimetres; the mean of both is written there. Where entities
+    /// to the other face as this, millimetres; the mean of both is written there. Where the faces do
+    /// not meet beside it either, three times as far is better than a gap. Where entities
     /// have numbers, a face is written by them if its edges lie as near to that, too; else as a
     /// B-spline.
     pub sharing_mm: f64,

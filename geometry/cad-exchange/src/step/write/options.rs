@@ -71,8 +71,9 @@ pub struct WriteOptions {
     /// of every vertex and edge. A larger gap in the file is written instead.
     pub resolution_mm: f64,
     /// A crease is one edge of two faces as far as the curves that they make of it are as
-    /// near to the other face as this, millimetres; the mean of both is written there. Where
-    /// they part, each face has an edge of its own. A face is written as the cylinder, cone,
+    /// near to the other face as this, millimetres; the mean of both is written there. Where the
+    /// faces do not meet beside it either, three times as far is better than a gap. Where
+    /// they part farther, each face has an edge of its own. A face is written as the cylinder, cone,
     /// sphere or torus that it is if its edges lie as near to that, too; else as a spline.
     pub sharing_mm: f64,
     /// Colours of the faces: region `r` gets `palette[r % palette.len()]`.
