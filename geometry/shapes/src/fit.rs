@@ -109,7 +109,7 @@ const SIEVES: [(Trial, usize); 2] = [
             rounds: 3,
             steps: 4,
         },
-        10,
+        5,
     ),
 ];
 /// The trial of those that remain.
