@@ -25,7 +25,8 @@ pub(crate) use topology::{Strand, Topology, Use};
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sharing {
     /// A crease is one edge as far as the curves that its two faces make of it are as near as
-    /// this; a face is written by its numbers if its edges lie as near to that.
+    /// this, or, where the faces do not meet beside it, three times as far; a face is written by its
+    /// numbers if its edges lie no farther off than such an edge may.
     pub(crate) sharing_mm: f64,
     /// Kinks are rounded within half of this.
     pub(crate) resolution_mm: f64,
