@@ -8,7 +8,7 @@
 
 use nalgebra::SVector;
 
-use crate::fit::{ACROSS, Fit, Sample, finished, found};
+use crate::fit::{ACROSS, FEW, Fit, MANY, Sample, Sieved, finished, found};
 use crate::robust;
 use crate::shape::Family;
 use crate::start::{Frame, Middle};
@@ -88,6 +88,17 @@ pub(crate) const CAUTION: f64 = 4.0;
 /// Decides what kind of surface the samples are of. `area` is that of [`fit`].
 #[must_use]
 pub fn decide(samples: &[Sample], area: f64) -> Evidence {
+    decide_among(samples, area, FEW)
+}
+
+/// The same with a longer search for tori: for what is known to be all of a surface. In a window
+/// of one, a torus that is near enough says little.
+#[must_use]
+pub fn decide_whole(samples: &[Sample], area: f64) -> Evidence {
+    decide_among(samples, area, MANY)
+}
+
+fn decide_among(samples: &[Sample], area: f64, sieved: Sieved) -> Evidence {
     let independent = samples.len() as f64 / area.max(1.0);
     let enough = |freedom: usize| are_enough(independent, freedom);
     let mut scale = Scale {
@@ -98,7 +109,7 @@ pub fn decide(samples: &[Sample], area: f64) -> Evidence {
     for family in Family::ALL {
         if enough(family.freedom())
             && scale.leaves_room(family.freedom())
-            && let Some(found) = middle.as_ref().and_then(|m| found(family, samples, m))
+            && let Some(found) = middle.as_ref().and_then(|m| found(family, samples, m, sieved))
             && scale.leaves_hope(&found.offs(samples).collect::<Vec<_>>(), family.freedom())
             && let Some(fit) = finished(found, samples, area)
         {

@@ -92,26 +92,25 @@ impl Fit {
     }
 }
 
-/// Trials by which starts are sifted, where there are more than so many: those that it leads nearest
-/// to the samples remain. Tori have forty, and few of them lead anywhere.
-const SIEVES: [(Trial, usize); 2] = [
-    (
-        Trial {
-            samples: 100,
-            rounds: 1,
-            steps: 4,
-        },
-        20,
-    ),
-    (
-        Trial {
-            samples: 100,
-            rounds: 3,
-            steps: 4,
-        },
-        5,
-    ),
+/// Trials by which starts are sifted, where there are many: those that it leads nearest to the
+/// samples remain. Tori have forty, and few of them lead anywhere.
+const SIEVES: [Trial; 2] = [
+    Trial {
+        samples: 100,
+        rounds: 1,
+        steps: 4,
+    },
+    Trial {
+        samples: 100,
+        rounds: 3,
+        steps: 4,
+    },
 ];
+/// How many starts remain after each of the [`SIEVES`]; of tori the best is not always among the
+/// first five of the last.
+pub(crate) type Sieved = [usize; 2];
+pub(crate) const FEW: Sieved = [20, 5];
+pub(crate) const MANY: Sieved = [20, 10];
 /// The trial of those that remain.
 const LAST_TRIAL: Trial = Trial {
     samples: 300,
@@ -143,17 +142,22 @@ const TRIAL_ENDED: f64 = 1e-3;
 /// `None` where there are too few samples, or the surface is too flat to be of this family.
 #[must_use]
 pub fn fit(family: Family, samples: &[Sample], area: f64) -> Option<Fit> {
-    let found = found(family, samples, &Middle::of(samples)?)?;
+    let found = found(family, samples, &Middle::of(samples)?, FEW)?;
     finished(found, samples, area)
 }
 
 /// Where the descent from the best of the starts ends on some of the samples, with their middle.
-pub(crate) fn found(family: Family, samples: &[Sample], middle: &Middle) -> Option<Local> {
+pub(crate) fn found(
+    family: Family,
+    samples: &[Sample],
+    middle: &Middle,
+    sieved: Sieved,
+) -> Option<Local> {
     if samples.len() <= family.freedom() {
         return None;
     }
     let mut tried = middle.starts(family, samples);
-    for (trial, most) in SIEVES {
+    for (trial, most) in SIEVES.iter().zip(sieved) {
         if tried.len() > most {
             let led = trial.of(tried, samples).into_iter();
             tried = led.take(most).map(|(_, local)| local).collect();

@@ -25,7 +25,7 @@ mod start;
 mod sweep;
 mod uncertainty;
 
-pub use evidence::{Candidate, Evidence, Verdict, decide};
+pub use evidence::{Candidate, Evidence, Verdict, decide, decide_whole};
 pub use fit::{Fit, Sample, fit};
 pub use form::Form;
 pub use several::{is_part_of_free_form, is_smooth, is_smoother};

@@ -65,6 +65,8 @@ pub(crate) struct OnGrid {
     pub(crate) other: usize,
     /// Those of `other` where both faces have been found.
     pub(crate) other_of_found: usize,
+    /// The nodes of `other` by true face, the face that it was taken for, and whether they are seen.
+    pub(crate) taken: BTreeMap<(usize, Option<usize>, bool), usize>,
 }
 
 impl OnGrid {
@@ -116,6 +118,8 @@ impl OnGrid {
                 let taken_for = matched.face_of_region.get(&at.region);
                 if taken_for != Some(&node.face.face) {
                     self.other += 1;
+                    let taken = (node.face.face, taken_for.copied(), node.seen);
+                    *self.taken.entry(taken).or_default() += 1;
                     let is_found = |face| matched.found_faces.contains(face);
                     let are_found = is_found(&node.face.face) && taken_for.is_some_and(is_found);
                     self.other_of_found += usize::from(are_found);

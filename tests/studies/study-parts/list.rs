@@ -105,6 +105,19 @@ pub(crate) fn list(parts: &[Measured]) -> String {
             grid.seen - grid.covered,
             grid.seen,
         );
+        for ((face, taken_for, is_seen), nodes) in &grid.taken {
+            let name = |face: usize| {
+                let kind = part.kinds.get(face).map_or_else(String::new, Kind::to_string);
+                format!("{face} ({kind})")
+            };
+            let _ = writeln!(
+                out,
+                "    {nodes} {} of face {} in the trim of {}",
+                if *is_seen { "seen" } else { "not seen" },
+                name(*face),
+                taken_for.map_or_else(|| "no face".to_owned(), name),
+            );
+        }
     }
     out
 }

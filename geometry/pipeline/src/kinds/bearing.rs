@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector2;
 use range_image::{RangeImage, RegionMap};
-use shapes::{Evidence, Fit, Sample, Shape, SweptFit, decide, swept};
+use shapes::{Evidence, Fit, Sample, Shape, SweptFit, decide_whole, swept};
 
 use super::joins::{Joining, LEAST_JOINING};
 use super::samples::OnRegion;
@@ -46,7 +46,7 @@ pub(crate) struct Bearing {
 impl Bearing {
     /// The verdict by the samples within.
     pub(super) fn decide(&self) -> Evidence {
-        decide(&self.samples, self.area)
+        decide_whole(&self.samples, self.area)
     }
 
     /// The surface of extrusion or revolution that the samples within speak for, if they do, with a
