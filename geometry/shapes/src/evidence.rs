@@ -109,7 +109,9 @@ fn decide_among(samples: &[Sample], area: f64, sieved: Sieved) -> Evidence {
     for family in Family::ALL {
         if enough(family.freedom())
             && scale.leaves_room(family.freedom())
-            && let Some(found) = middle.as_ref().and_then(|m| found(family, samples, m, sieved))
+            && let Some(found) = middle
+                .as_ref()
+                .and_then(|m| found(family, samples, m, sieved))
             && scale.leaves_hope(&found.offs(samples).collect::<Vec<_>>(), family.freedom())
             && let Some(fit) = finished(found, samples, area)
         {

@@ -107,7 +107,10 @@ pub(crate) fn list(parts: &[Measured]) -> String {
         );
         for ((face, taken_for, is_seen), nodes) in &grid.taken {
             let name = |face: usize| {
-                let kind = part.kinds.get(face).map_or_else(String::new, Kind::to_string);
+                let kind = part
+                    .kinds
+                    .get(face)
+                    .map_or_else(String::new, Kind::to_string);
                 format!("{face} ({kind})")
             };
             let _ = writeln!(

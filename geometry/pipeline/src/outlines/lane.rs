@@ -16,10 +16,11 @@ const LATEST: usize = 4;
 const THERE: f64 = 0.6;
 const COVERED: f64 = 1.25;
 /// Samples at an end are no part of it that send back less light than this share of what those
-/// before them do, so many of them: more than half of their spot misses the surface, and so does
-/// its middle. At most so many of them one after the other.
+/// before them let expect: more than half of their spot misses the surface, and so does its middle.
+/// These are so many at most and at least. At most so many of the former, one after the other.
 const LIT: f64 = 0.5;
-const BEFORE: usize = 3;
+const BEFORE: usize = 5;
+const LEAST_BEFORE: usize = 3;
 const DIM: usize = 2;
 
 /// A column that falls apart into more runs is no part's: each place would be looked up in all.
@@ -232,25 +233,41 @@ fn lost_between(pair: &[Own], usual_mm: f64) -> usize {
 
 /// Samples without those at the ends that are not half lit.
 fn lit(mut samples: &[Own]) -> &[Own] {
-    let is_dim = |end: u8, before: &mut dyn Iterator<Item = &Own>| {
-        let mut before: Vec<u8> = before.take(BEFORE).map(|own| own.intensity).collect();
-        before.sort_unstable();
-        let usual = before
-            .get(before.len() / 2)
-            .filter(|_| before.len() == BEFORE);
-        usual.is_some_and(|usual| f64::from(end) < LIT * f64::from(*usual))
+    let is_dim = |end: &Own, before: &mut dyn Iterator<Item = &Own>| {
+        let before: Vec<&Own> = before.take(BEFORE).collect();
+        let usual = light(&before, end.y_mm).filter(|_| before.len() >= LEAST_BEFORE);
+        usual.is_some_and(|usual| f64::from(end.intensity) < LIT * usual)
     };
     for _ in 0..DIM {
         match samples {
-            [end, rest @ ..] if is_dim(end.intensity, &mut rest.iter()) => samples = rest,
+            [end, rest @ ..] if is_dim(end, &mut rest.iter()) => samples = rest,
             _ => break,
         }
     }
     for _ in 0..DIM {
         match samples {
-            [rest @ .., end] if is_dim(end.intensity, &mut rest.iter().rev()) => samples = rest,
+            [rest @ .., end] if is_dim(end, &mut rest.iter().rev()) => samples = rest,
             _ => break,
         }
     }
     samples
+}
+
+/// The light that samples let expect at a place beyond them: no more than their median, and less
+/// where it falls off towards there, as on what turns away.
+fn light(samples: &[&Own], y_mm: f64) -> Option<f64> {
+    let mut all: Vec<f64> = samples.iter().map(|own| own.intensity.into()).collect();
+    let count = all.len() as f64;
+    let mean = all.iter().sum::<f64>() / count;
+    let mean_mm = samples.iter().map(|own| own.y_mm).sum::<f64>() / count;
+    let (mut along, mut squares) = (0.0, 0.0);
+    for own in samples {
+        let off_mm = own.y_mm - mean_mm;
+        along += off_mm * (f64::from(own.intensity) - mean);
+        squares += off_mm * off_mm;
+    }
+    let slope = if squares > 0.0 { along / squares } else { 0.0 };
+    all.sort_unstable_by(f64::total_cmp);
+    let median = *all.get(all.len() / 2)?;
+    Some(median.min(mean + slope * (y_mm - mean_mm)))
 }

@@ -193,6 +193,31 @@ fn what_lies_beyond_the_region_of_interest_is_not_there() {
 
 /// A wedge of 16 degrees stands 2 mm above a plane, its tip at (-20, 1).
 #[test]
+fn a_round_part_ends_where_it_turns_away_though_its_light_falls_off_before() {
+    const RADIUS_MM: f64 = 20.0;
+    let half_mm = RADIUS_MM * libm::sin(75_f64.to_radians());
+    let z_mm = |_: f64, y: f64| (y.abs() < half_mm).then(|| (RADIUS_MM * RADIUS_MM - y * y).sqrt());
+    let dimmed = |sample: &Sample| Sample {
+        intensity: (200.0 * (sample.z_mm / RADIUS_MM).powi(2)) as u8,
+        ..*sample
+    };
+    let columns: Vec<Column> = scanned(z_mm)
+        .iter()
+        .map(|c| Column::new(c.x_mm(), c.samples().iter().map(dimmed).collect()))
+        .collect();
+    let (_, outcome) = made(&columns);
+    let edges = outcome.reconstruction.model.edges.iter();
+    let offs: Vec<f64> = edges
+        .flat_map(|edge| edge.path.sampled(2_000))
+        .filter(|[x, _]| x.abs() < 25.0)
+        .map(|[_, y]| (y.abs() - half_mm) / PITCH_MM)
+        .collect();
+    assert!(offs.len() > 2_000);
+    let rms = (offs.iter().map(|off| off * off).sum::<f64>() / offs.len() as f64).sqrt();
+    assert!(rms < 0.1, "{rms}");
+}
+
+#[test]
 fn the_tip_of_a_wedge_is_its_own() {
     let in_wedge = |x: f64, y: f64| x < 22.0 && (y - 1.0).abs() < 0.14 * (x + 20.0);
     let plane_mm = |x: f64, y: f64| 10.0 + 0.2 * x - 0.1 * y;
