@@ -8,6 +8,7 @@ exit code 0 when every face is meshed without a complaint, 1 when not, 2 on wron
 import argparse
 import json
 import os
+import signal
 import sys
 
 import gmsh
@@ -65,7 +66,14 @@ def main():
     parser.add_argument(
         "--elements", type=float, default=100, metavar="N", help="along the longest side"
     )
+    parser.add_argument(
+        "--within-s", type=int, metavar="S", help="of all files together, or end by SIGALRM"
+    )
     arguments = parser.parse_args()
+    if arguments.within_s is not None:
+        # Not asked while Gmsh meshes, so that nothing but the signal's own effect would do.
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.alarm(arguments.within_s)
     # OpenCASCADE within Gmsh talks on standard output, which is for the document.
     document = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

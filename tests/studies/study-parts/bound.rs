@@ -43,48 +43,91 @@ pub(crate) struct Bound {
 /// The bound of each of the surface's parameters; `None` where the readings leave one of them
 /// open.
 pub(crate) fn bounds(surface: &TrueSurface, readings: &[Reading]) -> Option<Vec<Bound>> {
-    let parameters = surface.parameters();
-    if readings.len() < parameters.len() {
-        return None;
-    }
+    let known = Known::of(surface, readings)?;
+    let pairs = known.covariance.diagonal();
+    let pairs = pairs.iter().zip(known.informed.iter());
+    let bounds = pairs.map(|(variance, informed)| Bound {
+        deviation: variance.sqrt(),
+        informed_error: *informed,
+    });
+    Some(bounds.collect())
+}
+
+/// A surface, as well as its readings let it be known.
+pub(crate) struct Known {
+    surface: TrueSurface,
+    /// The least covariance of its parameters.
+    covariance: DMatrix<f64>,
+    /// What the estimator that knows the readings has them off by.
+    informed: DVector<f64>,
+}
+
+/// A surface with one of its parameters a step up, and a step down.
+fn steps(surface: &TrueSurface) -> Vec<(TrueSurface, TrueSurface)> {
     let moved = |parameter: &Parameter, step| surface.moved(*parameter, step);
-    let pairs: Vec<_> = parameters
+    let parameters = surface.parameters();
+    parameters
         .iter()
         .map(|parameter| (moved(parameter, STEP), moved(parameter, -STEP)))
-        .collect();
-    let mut information = DMatrix::zeros(parameters.len(), parameters.len());
-    let mut right = DVector::zeros(parameters.len());
-    for reading in readings {
-        let point_mm = &reading.point_mm;
-        let cos = surface.normal(point_mm).dot(&reading.ray).abs();
-        let weight = 1.0 / (cos.max(LEAST_COS) * reading.deviation_mm);
-        let per = 0.5 / STEP * weight;
+        .collect()
+}
+
+impl Known {
+    /// `None` as for [`bounds`].
+    pub(crate) fn of(surface: &TrueSurface, readings: &[Reading]) -> Option<Self> {
+        let pairs = steps(surface);
+        let count = pairs.len();
+        if readings.len() < count {
+            return None;
+        }
+        let mut information = DMatrix::zeros(count, count);
+        let mut right = DVector::zeros(count);
+        for reading in readings {
+            let point_mm = &reading.point_mm;
+            let cos = surface.normal(point_mm).dot(&reading.ray).abs();
+            let weight = 1.0 / (cos.max(LEAST_COS) * reading.deviation_mm);
+            let per = 0.5 / STEP * weight;
+            let slopes = pairs
+                .iter()
+                .map(|(up, down)| (up.distance_mm(point_mm) - down.distance_mm(point_mm)) * per);
+            let slopes = DVector::from_iterator(count, slopes);
+            information.syger(1.0, &slopes, &slopes, 1.0);
+            right -= slopes * (surface.distance_mm(&reading.told_mm) * weight);
+        }
+        information.fill_upper_triangle_with_lower_triangle();
+        // Angles and lengths differ by orders of magnitude.
+        let scale = information.diagonal().map(|own: f64| 1.0 / own.sqrt());
+        if scale.iter().any(|s| !s.is_finite()) {
+            return None;
+        }
+        let by_scale = |all: &DMatrix<f64>| {
+            DMatrix::from_fn(count, count, |i, j| all[(i, j)] * scale[i] * scale[j])
+        };
+        let factors = by_scale(&information).cholesky()?;
+        let step = factors.solve(&right.component_mul(&scale));
+        let known = Self {
+            surface: *surface,
+            covariance: by_scale(&factors.inverse()),
+            informed: step.component_mul(&scale),
+        };
+        let mut all = known.covariance.iter().chain(known.informed.iter());
+        all.all(|own| own.is_finite()).then_some(known)
+    }
+
+    /// The least standard deviation of where the surface lies along its normal beside a point,
+    /// millimetres.
+    pub(crate) fn deviation_mm(&self, point_mm: &Vector3<f64>) -> f64 {
+        let pairs = steps(&self.surface);
         let slopes = pairs
             .iter()
-            .map(|(up, down)| (up.distance_mm(point_mm) - down.distance_mm(point_mm)) * per);
-        let slopes = DVector::from_iterator(parameters.len(), slopes);
-        information.syger(1.0, &slopes, &slopes, 1.0);
-        right -= slopes * (surface.distance_mm(&reading.told_mm) * weight);
+            .map(|(up, down)| (up.distance_mm(point_mm) - down.distance_mm(point_mm)) * 0.5 / STEP);
+        let slopes = DVector::from_iterator(pairs.len(), slopes);
+        slopes.dot(&(&self.covariance * &slopes)).sqrt()
     }
-    information.fill_upper_triangle_with_lower_triangle();
-    // Angles and lengths differ by orders of magnitude.
-    let scale = information.diagonal().map(|own: f64| 1.0 / own.sqrt());
-    if scale.iter().any(|s| !s.is_finite()) {
-        return None;
+
+    pub(crate) fn normal(&self, point_mm: &Vector3<f64>) -> Vector3<f64> {
+        self.surface.normal(point_mm)
     }
-    let scaled = DMatrix::from_fn(parameters.len(), parameters.len(), |i, j| {
-        information[(i, j)] * scale[i] * scale[j]
-    });
-    let factors = scaled.cholesky()?;
-    let covariance = factors.inverse();
-    let step = factors.solve(&right.component_mul(&scale));
-    let bounds = (0..parameters.len()).map(|k| Bound {
-        deviation: covariance[(k, k)].sqrt() * scale[k],
-        informed_error: step[k] * scale[k],
-    });
-    let bounds: Vec<Bound> = bounds.collect();
-    let is_known = |bound: &Bound| bound.deviation.is_finite() && bound.informed_error.is_finite();
-    bounds.iter().all(is_known).then_some(bounds)
 }
 
 #[cfg(test)]
@@ -139,6 +182,14 @@ mod tests {
             assert!((found / exact - 1.0).abs() < 1e-6, "{found} {exact}");
         }
         assert!((found[2] / (0.05 / count.sqrt()) - 1.0).abs() < 1e-6);
+
+        let known = Known::of(&surface(Family::Plane), &readings).unwrap();
+        let at = |x: f64, y: f64| known.deviation_mm(&Vector3::new(x, y, 0.0));
+        assert!((at(0.0, 0.0) / found[2] - 1.0).abs() < 1e-6);
+        // By regression, in units of the deviation of a reading.
+        let [of_x, of_y] = [of_squares(|r| r.point_mm.x), of_squares(|r| r.point_mm.y)];
+        let exact = 0.05 * (1.0 / count + 225.0 / of_x + 49.0 / of_y).sqrt();
+        assert!((at(15.0, -7.0) / exact - 1.0).abs() < 1e-6);
     }
 
     /// Noise along a beam that meets a plane at a slant says as much less of its offset.

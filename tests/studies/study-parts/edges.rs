@@ -7,6 +7,7 @@ use cad_exchange::step;
 use nalgebra::Vector3;
 use reconstruct::model::{Face, Model, Surface};
 
+use crate::bound::Known;
 use crate::grid::Matched;
 use crate::part::TrueEdge;
 use crate::truth_grid::TruthGrid;
@@ -32,6 +33,9 @@ pub(crate) struct Edges {
     pub(crate) met_mm: f64,
     /// Of these, squared distances times lengths.
     pub(crate) squares_mm3: f64,
+    /// The same of the least distances that readings of the two faces allow, were the edge where two
+    /// surfaces meet that know nothing of each other.
+    pub(crate) bound_mm3: f64,
 }
 
 impl Edges {
@@ -40,10 +44,35 @@ impl Edges {
         self.near_mm += other.near_mm;
         self.met_mm += other.met_mm;
         self.squares_mm3 += other.squares_mm3;
+        self.bound_mm3 += other.bound_mm3;
     }
 
     pub(crate) fn rms_mm(&self) -> f64 {
         (self.squares_mm3 / self.met_mm).sqrt()
+    }
+
+    pub(crate) fn bound_mm(&self) -> f64 {
+        (self.bound_mm3 / self.met_mm).sqrt()
+    }
+}
+
+/// Of true faces, those that can be told by numbers, as well as readings let them be known.
+pub(crate) type KnownFaces = BTreeMap<usize, Known>;
+
+/// The variance of where the faces meet, square millimetres: a free form is taken to be known, and
+/// no more than that of what is spread evenly as far as an edge counts.
+fn bound_mm2(known: &KnownFaces, faces: [usize; 2], at: &Vector3<f64>) -> f64 {
+    let [a, b] = faces.map(|face| known.get(&face));
+    let variance = |face: Option<&Known>| face.map_or(0.0, |face| face.deviation_mm(at).powi(2));
+    let both = variance(a) + variance(b);
+    let most = NEAR_MM * NEAR_MM / 3.0;
+    match (a, b) {
+        (Some(a), Some(b)) => {
+            let cross = a.normal(at).cross(&b.normal(at));
+            (both / cross.norm_squared()).min(most)
+        }
+        // At what angle is not known, and a right one is the best.
+        _ => both.min(most),
     }
 }
 
@@ -58,11 +87,17 @@ pub(crate) fn compare(
     model: &Model,
     truth: &TruthGrid,
     matched: &Matched,
+    known: &KnownFaces,
 ) -> Result<(Edges, Edges)> {
-    Ok(lengths(edges, &creases(model, matched)?, truth))
+    Ok(lengths(edges, &creases(model, matched)?, truth, known))
 }
 
-fn lengths(edges: &[TrueEdge], creases: &Creases, truth: &TruthGrid) -> (Edges, Edges) {
+fn lengths(
+    edges: &[TrueEdge],
+    creases: &Creases,
+    truth: &TruthGrid,
+    known: &KnownFaces,
+) -> (Edges, Edges) {
     let (mut sharp, mut smooth) = (Edges::default(), Edges::default());
     for edge in edges {
         let told = if edge.is_smooth {
@@ -86,6 +121,7 @@ fn lengths(edges: &[TrueEdge], creases: &Creases, truth: &TruthGrid) -> (Edges, 
                 if gap_mm <= MEETS_MM {
                     told.met_mm += length_mm;
                     told.squares_mm3 += length_mm * distance_mm * distance_mm;
+                    told.bound_mm3 += length_mm * bound_mm2(known, edge.faces, &middle);
                 }
             }
         }
@@ -214,9 +250,12 @@ fn off(face: &Face, at: &Vector3<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bound::Reading;
+    use crate::surface::tests::surface;
     use crate::truth_grid::tests::step;
     use nurbs::{PatchSurface, PiecewiseCubic};
     use reconstruct::model::{Coedge, Edge, EdgeId, EdgeKind, Loop, Vertex, VertexId};
+    use shapes::Family;
 
     /// Two level faces with a crease along x = `x`, one `gap` above the other.
     fn model(x: f64, gap: f64) -> Model {
@@ -297,7 +336,14 @@ mod tests {
             face_of_region: [(1, 0), (2, 1)].into(),
             found_faces: vec![0, 1],
         };
-        compare(&[edge], &model(x, gap), &truth, &matched).unwrap()
+        compare(
+            &[edge],
+            &model(x, gap),
+            &truth,
+            &matched,
+            &KnownFaces::new(),
+        )
+        .unwrap()
     }
 
     #[test]
@@ -308,6 +354,38 @@ mod tests {
         assert!((sharp.rms_mm() - 0.03).abs() < 1e-9);
         assert_eq!(smooth, Edges::default());
         assert_eq!(told(0.7, 0.0, 5.0).0.near_mm, 0.0);
+    }
+
+    #[test]
+    fn the_smaller_the_angle_the_less_is_known_of_where_planes_meet() {
+        let plane = |lean: f64| {
+            let mut plane = surface(Family::Plane);
+            plane.direction = Vector3::new(lean, 0.0, 1.0).normalize();
+            let readings: Vec<Reading> = (-10..=10)
+                .flat_map(|x| (-10..=10).map(move |y| (f64::from(x), f64::from(y))))
+                .map(|(x, y)| {
+                    let point_mm = Vector3::new(x, y, -lean * x);
+                    Reading {
+                        point_mm,
+                        told_mm: point_mm,
+                        ray: -plane.direction,
+                        deviation_mm: 0.05,
+                    }
+                })
+                .collect();
+            Known::of(&plane, &readings).unwrap()
+        };
+        let bound_mm = |lean: f64| {
+            let known = [(3, plane(0.0)), (8, plane(lean))].into();
+            bound_mm2(&known, [3, 8], &Vector3::zeros()).sqrt()
+        };
+        let each_mm = 0.05 / 21.0;
+        let sin = |lean: f64| lean / (1.0 + lean * lean).sqrt();
+        for lean in [0.03, 0.4, 2.0] {
+            let exact = each_mm * 2.0_f64.sqrt() / sin(lean);
+            assert!((bound_mm(lean) / exact - 1.0).abs() < 1e-3, "{lean}");
+        }
+        assert!((bound_mm(1e-5) - NEAR_MM / 3.0_f64.sqrt()).abs() < 1e-9);
     }
 
     #[test]

@@ -73,6 +73,12 @@ impl OnGrid {
     pub(crate) fn wrong(&self) -> usize {
         self.lost + self.invented + self.other
     }
+
+    /// The nodes of `other` that are not seen.
+    pub(crate) fn other_unseen(&self) -> usize {
+        let unseen = self.taken.iter().filter(|((.., is_seen), _)| !is_seen);
+        unseen.map(|(_, nodes)| nodes).sum()
+    }
 }
 
 /// Which true face each region stands for, and the true faces that one region stands for alone.

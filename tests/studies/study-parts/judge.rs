@@ -13,6 +13,9 @@ const MESH: &str = "tests/judges/gmsh_check.py";
 /// Edges of one face may lie so far in all where none belongs: a corner's worth.
 pub(crate) const MISPLACED_MM: f64 = 1.0;
 
+/// Gmsh meshes most files in a second or two, and some in no time that anyone would wait for.
+const MESHED_WITHIN_S: u32 = 60;
+
 /// The verdict on a file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub(crate) struct Judged {
@@ -100,9 +103,11 @@ impl Python {
                 format!("{folder}/{}.{}", file.seed, file.file),
                 "--area-mm2".to_owned(),
                 area_mm2.to_string(),
+                "--within-s".to_owned(),
+                MESHED_WITHIN_S.to_string(),
             ];
             let output = self.run(MESH, &words)?;
-            // Killed by a signal: the file was too much for Gmsh. Whatever else leaves no verdict,
+            // Killed by a signal, that of the clock among them: the file was too much for Gmsh. Whatever else leaves no verdict,
             // as a Python without Gmsh does, is no fault of the file.
             file.complaints = Some(if output.status.code().is_none() {
                 vec![format!("{MESH} ended with {}", output.status)]

@@ -72,11 +72,12 @@ pub(crate) fn list(parts: &[Measured]) -> String {
             let _ = writeln!(
                 out,
                 "  {what} edges: {:.0} mm, near a crease {:.0} mm, intersected {:.0} mm and {:.4} mm \
-                 rms off",
+                 rms off; bound {:.4} mm",
                 edges.true_mm,
                 edges.near_mm,
                 edges.met_mm,
                 edges.rms_mm(),
+                edges.bound_mm(),
             );
         }
         for own in &part.outcome.tangent.accepted {

@@ -147,7 +147,9 @@ pub(crate) fn measure(part: &Part, change: impl Fn(&mut Settings)) -> Result<Mea
     let model = &outcome.reconstruction.model;
     let on_grid_truth = TruthGrid::new(part, &scan.scanner);
     let on_grid = grid::compare(part, &on_grid_truth, &Trims::new(model), &matched);
-    let (sharp_edges, smooth_edges) = edges::compare(&part.edges, model, &on_grid_truth, &matched)?;
+    let known = scan.known_faces(&part.faces);
+    let (sharp_edges, smooth_edges) =
+        edges::compare(&part.edges, model, &on_grid_truth, &matched, &known)?;
     let noise = classes.machine.iter().filter(|(label, class)| {
         **class == MachineClass::Noise && overlaps.machine_nodes(**label) >= LEAST_NODES
     });

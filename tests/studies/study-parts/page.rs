@@ -151,8 +151,12 @@ fn trims(totals: &Totals) -> String {
         totals.on_grids(|p| p.on_grid.other),
     );
     out += &row(
-        "of these, between faces that were both found",
+        "of those within the trim of another, between faces that were both found",
         totals.on_grids(|p| p.on_grid.other_of_found),
+    );
+    out += &row(
+        "of those within the trim of another, not seen by the scanner",
+        totals.on_grids(|p| p.on_grid.other_unseen()),
     );
     out += &row(
         "seen, and farther than 0.2 mm from all trimmed faces",
@@ -168,23 +172,28 @@ fn edges(totals: &Totals) -> String {
          edge is intersected where one that the two faces' regions share lies within half a \
          millimetre, beside it and not beyond its end, and their surfaces are no more than \
          {MEETS_MM} mm off it together; smooth ones are those where the faces have one tangent \
-         plane.\n\n\
+         plane. Bound: two surfaces of which nothing is known but the readings of either meet no \
+         nearer to the true edge, by the bounds of their numbers and the angle at which they meet; a \
+         free-form face is taken to be known, and to meet others at a right angle. For smooth edges, \
+         which that angle does not tell, there is none.\n\n\
          | edges | length, mm | with a shared one near, % | intersected, % | rms distance of these, mm \
-         |\n| --- | ---: | ---: | ---: | ---: |\n"
+         | bound of that, mm |\n| --- | ---: | ---: | ---: | ---: | ---: |\n"
     );
-    for (what, edges) in [("sharp", sharp), ("smooth", smooth)] {
+    for (what, edges, has_bound) in [("sharp", sharp, true), ("smooth", smooth, false)] {
         let percent = |part_mm: f64| 100.0 * part_mm / edges.true_mm.max(f64::MIN_POSITIVE);
-        let rms = if edges.met_mm > 0.0 {
-            format!("{:.4}", edges.rms_mm())
-        } else {
-            "-".to_owned()
+        let told = |is_there: bool, mm: f64| match is_there {
+            true => format!("{mm:.4}"),
+            false => "-".to_owned(),
         };
+        let is_met = edges.met_mm > 0.0;
         let _ = writeln!(
             out,
-            "| {what} | {:.0} | {:.1} | {:.1} | {rms} |",
+            "| {what} | {:.0} | {:.1} | {:.1} | {} | {} |",
             edges.true_mm,
             percent(edges.near_mm),
             percent(edges.met_mm),
+            told(is_met, edges.rms_mm()),
+            told(is_met && has_bound, edges.bound_mm()),
         );
     }
     out

@@ -1,5 +1,7 @@
 //! A part before the simulated scanner.
 
+use std::collections::BTreeMap;
+
 use anyhow::{Context, Result};
 use nalgebra::Vector3;
 use pipeline::{InMemory, Outcome, Settings, process_scan};
@@ -12,9 +14,10 @@ use sim_scanner::optics::Optics;
 use sim_scanner::preset::{Overrides, Preset};
 use sim_scanner::scanner::{HeadKind, Scanner, Sweep};
 
-use crate::bound::Reading;
+use crate::bound::{Known, Reading};
+use crate::edges::KnownFaces;
 use crate::part::Part;
-use crate::surface::vector;
+use crate::surface::{TrueSurface, vector};
 
 /// What differs from the preset `paper`: 240 columns of 256 samples, noise of 0.05 mm and one in
 /// ten samples at a step mixed are its own.
@@ -119,6 +122,19 @@ impl Scan {
             }
         }
         (own, inner)
+    }
+
+    /// The faces that are told by numbers, each as well as all its readings let it be known.
+    pub(crate) fn known_faces(&self, faces: &[Option<TrueSurface>]) -> KnownFaces {
+        let mut own: BTreeMap<usize, Vec<Reading>> = BTreeMap::new();
+        for (face, reading) in &self.readings {
+            own.entry(*face).or_default().push(*reading);
+        }
+        let known = own.iter().filter_map(|(face, readings)| {
+            let surface = faces.get(*face)?.as_ref()?;
+            Some((*face, Known::of(surface, readings)?))
+        });
+        known.collect()
     }
 
     /// Labels of the four nodes around a point, and of those beyond; 0 for none.

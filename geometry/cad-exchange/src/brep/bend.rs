@@ -10,6 +10,20 @@ const REACH: f64 = 100.0;
 /// Breaks nearer than this part of a curve's domain are one.
 const SAME_BREAK: f64 = 1e-9;
 
+/// Chords to a piece of a curve that is measured.
+const CHORDS: usize = 4;
+
+pub(super) fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
+    squares.sum::<f64>().sqrt()
+}
+
+/// The length of a curve, by chords.
+pub(super) fn length_mm(curve: &PiecewiseCubic<3>) -> f64 {
+    let points = curve.sampled(CHORDS * curve.pieces.len());
+    points.windows(2).map(|pair| apart(pair[0], pair[1])).sum()
+}
+
 /// The curve half way between two over the same parameters.
 pub(super) fn mean(a: &PiecewiseCubic<3>, b: &PiecewiseCubic<3>) -> PiecewiseCubic<3> {
     let (first, last) = a.domain();

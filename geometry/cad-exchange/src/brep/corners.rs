@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use reconstruct::{Coedge, Model, VertexId};
 
+use super::bend::{apart, length_mm};
 use super::groups::Groups;
 use super::onto;
 use super::seam::Seam;
@@ -12,6 +13,10 @@ use super::topology::{Place, coedge, loops_of};
 
 /// Faces that meet but for this, millimetres, have a corner: their edges are led to it.
 const CORNER_MM: f64 = 0.03;
+
+/// A corner is moved by no more than this share of the shortest edge that ends there: farther, and
+/// what is short folds back across its neighbours.
+const SHARE_OF_EDGE: f64 = 0.25;
 
 /// Ends of edges. A vertex of the model is a place in the x-y plane; each face has it at
 /// a height of its own, and faces that share an edge have it at one.
@@ -27,6 +32,8 @@ pub(super) struct Ends<'a> {
     supports: &'a [Support<'a>],
     nodes: BTreeMap<(VertexId, usize), usize>,
     points: Vec<[f64; 3]>,
+    /// The length of the shortest edge that ends in each, millimetres.
+    shortest_mm: Vec<f64>,
     same: Groups,
 }
 
@@ -35,13 +42,25 @@ impl<'a> Ends<'a> {
     pub(super) fn new(model: &'a Model, supports: &'a [Support<'a>]) -> Self {
         let mut nodes: BTreeMap<(VertexId, usize), usize> = BTreeMap::new();
         let mut points: Vec<[f64; 3]> = Vec::new();
-        for (face, loops) in model.faces.iter().map(loops_of).enumerate() {
-            for coedge in loops.iter().flat_map(|border| &border.coedges) {
-                let (start, _) = ends(model, coedge);
-                nodes.entry((start, face)).or_insert_with(|| {
-                    points.push(coedge.space_curve.start());
-                    points.len() - 1
-                });
+        let coedges = || {
+            let of_faces = model.faces.iter().map(loops_of).enumerate();
+            let loops =
+                of_faces.flat_map(|(face, loops)| loops.into_iter().map(move |l| (face, l)));
+            loops.flat_map(|(face, border)| border.coedges.iter().map(move |c| (face, c)))
+        };
+        for (face, coedge) in coedges() {
+            let (start, _) = ends(model, coedge);
+            nodes.entry((start, face)).or_insert_with(|| {
+                points.push(coedge.space_curve.start());
+                points.len() - 1
+            });
+        }
+        let mut shortest_mm = vec![f64::INFINITY; points.len()];
+        for (face, coedge) in coedges() {
+            let own_mm = length_mm(&coedge.space_curve);
+            let (start, end) = ends(model, coedge);
+            for node in [start, end].iter().filter_map(|at| nodes.get(&(*at, face))) {
+                shortest_mm[*node] = shortest_mm[*node].min(own_mm);
             }
         }
         Self {
@@ -50,6 +69,7 @@ impl<'a> Ends<'a> {
             supports,
             nodes,
             points,
+            shortest_mm,
         }
     }
 
@@ -109,7 +129,11 @@ impl<'a> Ends<'a> {
             let shapes: Vec<Support<'_>> = of.iter().copied().filter(Support::is_known).collect();
             let common = onto::point(point, of).filter(|at| onto::farthest(*at, of) <= CORNER_MM);
             let common = common.or_else(|| onto::point(point, &shapes));
-            common.unwrap_or(point)
+            let shortest_mm = group.iter().map(|node| self.shortest_mm[*node]);
+            let most_mm = SHARE_OF_EDGE * shortest_mm.fold(f64::INFINITY, f64::min);
+            common
+                .filter(|at| apart(*at, point) <= most_mm)
+                .unwrap_or(point)
         });
         Corners {
             points: points.collect(),
@@ -162,9 +186,14 @@ mod tests {
 
     const TIPS: [[f64; 2]; 4] = [[9.0, 0.0], [0.0, 9.0], [-9.0, 0.0], [0.0, -9.0]];
 
-    /// Four faces around a vertex, as far as their ends go: each between one crease and the next.
-    fn roof() -> Model {
-        let line = |k: usize| PiecewiseCubic::line([0.0; 2], TIPS[k], 9.0).unwrap();
+    /// Four faces around a vertex, as far as their ends go: each between one crease and the next. The
+    /// last crease is so long, the others 9 mm.
+    fn roof(last_mm: f64) -> Model {
+        let line = |k: usize| {
+            let length_mm = if k == 3 { last_mm } else { 9.0 };
+            let tip = TIPS[k].map(|of| of * length_mm / 9.0);
+            PiecewiseCubic::line([0.0; 2], tip, length_mm).unwrap()
+        };
         let edge = |k: usize| Edge {
             start: VertexId(0),
             end: VertexId(k + 1),
@@ -211,7 +240,7 @@ mod tests {
 
     #[test]
     fn a_crease_joins_a_corner_if_its_faces_meet_there() {
-        let model = roof();
+        let model = roof(9.0);
         let would_meet = |raised_mm: f64| {
             let plane = |k: usize| {
                 let [x, y] = TIPS[k];
@@ -245,5 +274,34 @@ mod tests {
         };
         assert!(would_meet(0.0) && would_meet(0.1));
         assert!(!would_meet(0.3));
+    }
+
+    #[test]
+    fn a_corner_is_not_led_farther_than_a_quarter_of_its_shortest_edge() {
+        let moved_mm = |last_mm: f64| {
+            let model = roof(last_mm);
+            let plane = |k: usize| {
+                let [x, y] = TIPS[k];
+                Support::Shape(Shape::Plane(Plane {
+                    point_mm: Vector3::new(0.5, 0.0, 0.0),
+                    normal: Vector3::new(x, y, 9.0).normalize(),
+                }))
+            };
+            let supports: Vec<Support<'_>> = (0..4).map(plane).collect();
+            let mut ends = Ends::new(&model, &supports);
+            for k in 0..3 {
+                let (place, other) = ((k, 0, 1), (k + 1, 0, 0));
+                let curve = |at: Place| &coedge(&model, at).unwrap().space_curve;
+                let near = Nearness::of(0.1);
+                let seam = Seam::between(curve(place), curve(other), |_| 1.0, other, near);
+                ends.join(place, &seam.unwrap());
+            }
+            let corners = ends.corners();
+            let first = &model.faces[0].outer.coedges[0];
+            corners.points[corners.ends(&model, 0, first)[0]][0]
+        };
+        assert!((moved_mm(9.0) - 0.5).abs() < 1e-9);
+        assert!((moved_mm(2.1) - 0.5).abs() < 1e-9);
+        assert_eq!(moved_mm(1.9), 0.0);
     }
 }

@@ -6,7 +6,7 @@
 use nurbs::PiecewiseCubic;
 use reconstruct::{Face, Surface};
 
-use super::bend::mean;
+use super::bend::{apart, mean};
 use super::onto;
 use super::support::Support;
 use super::topology::Place;
@@ -212,11 +212,6 @@ fn same_domain(a: &PiecewiseCubic<3>, b: &PiecewiseCubic<3>) -> bool {
 pub(super) fn facing(face: &Face, [x, y, _]: [f64; 3]) -> f64 {
     let Surface::Patches(patches) = &face.surface;
     patches.normal(x, y)[2]
-}
-
-fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
-    squares.sum::<f64>().sqrt()
 }
 
 #[cfg(test)]
