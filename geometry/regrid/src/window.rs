@@ -57,6 +57,13 @@ impl<'a> Window<'a> {
             // A crowded column must not speak for all.
             let of_columns_mm = gaps.spacing_of_columns(strips)?.min(limit_mm);
             stretch = self::stretch(column_spacing_mm, of_columns_mm);
+            if stretch > 1.0 {
+                // Of columns that are hardly filled it takes several for one, and most samples
+                // are of the others.
+                let of_most_mm = sample_spacing_mm.min(of_columns_mm);
+                let of_full_mm = column_spacing_mm / filled(strips, of_most_mm);
+                stretch = self::stretch(of_full_mm, of_most_mm).max(1.0);
+            }
         }
         Some(Self {
             strips,
@@ -95,6 +102,23 @@ impl<'a> Window<'a> {
             y_mm: spacing.y_mm.max(mean_mm),
             stretch: spacing.stretch,
         }
+    }
+}
+
+/// Share of their length on which columns have samples, if these are so far apart: columns made
+/// from the points of a cloud may have all of a beam's or a few strays.
+fn filled(strips: &[Strip], sample_spacing_mm: f64) -> f64 {
+    let (mut filled_mm, mut length_mm) = (0.0, 0.0);
+    for strip in strips {
+        if let [first, .., last] = strip.samples.as_slice() {
+            filled_mm += (strip.samples.len() - 1) as f64 * sample_spacing_mm;
+            length_mm += last.0 - first.0;
+        }
+    }
+    if filled_mm < length_mm {
+        filled_mm / length_mm
+    } else {
+        1.0
     }
 }
 
@@ -260,6 +284,22 @@ mod tests {
         // Four columns from one sample to the next are the most that does not stretch.
         assert_eq!(stretch([5; 7]), 1.0);
         assert!(stretch([4; 7]) > 1.2);
+        // Two columns of strays for each full one: those are 3 mm apart.
+        let of_cloud = |spacing_mm: f64| {
+            let strips: Vec<Strip> = (0..9)
+                .map(|k| Strip {
+                    x_mm: f64::from(k),
+                    samples: match k % 3 {
+                        0 => (0..40).map(|j| (spacing_mm * f64::from(j), 0.0)).collect(),
+                        _ => [2.0, 80.0, 39.0 * spacing_mm].map(|y| (y, 0.0)).to_vec(),
+                    },
+                })
+                .collect();
+            let window = Window::new(&strips, 4.0, &settings, &mut Gaps::default());
+            window.unwrap().stretch
+        };
+        assert_eq!(of_cloud(6.0), 1.0);
+        assert!(of_cloud(16.0) > 1.2);
     }
 
     #[test]
