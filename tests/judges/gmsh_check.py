@@ -10,6 +10,7 @@ import json
 import os
 import signal
 import sys
+import tempfile
 
 import gmsh
 
@@ -74,12 +75,15 @@ def main():
         # Not asked while Gmsh meshes, so that nothing but the signal's own effect would do.
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
         signal.alarm(arguments.within_s)
+    # Gmsh leaves files of its own where it fails: not beside the caller's.
+    files = [os.path.abspath(path) for path in arguments.files]
+    os.chdir(tempfile.gettempdir())
     # OpenCASCADE within Gmsh talks on standard output, which is for the document.
     document = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     gmsh.initialize(interruptible=False)
     gmsh.option.setNumber("General.Terminal", 0)
-    reports = [judge(path, arguments) for path in arguments.files]
+    reports = [judge(path, arguments) for path in files]
     gmsh.finalize()
     json.dump(reports, document, indent=2)
     document.write("\n")

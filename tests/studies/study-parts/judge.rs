@@ -107,8 +107,8 @@ impl Python {
                 MESHED_WITHIN_S.to_string(),
             ];
             let output = self.run(MESH, &words)?;
-            // Killed by a signal, that of the clock among them: the file was too much for Gmsh. Whatever else leaves no verdict,
-            // as a Python without Gmsh does, is no fault of the file.
+            // Killed by a signal, that of the clock among them: the file was too much for Gmsh.
+            // Whatever else leaves no verdict, as a Python without Gmsh does, is no fault of it.
             file.complaints = Some(if output.status.code().is_none() {
                 vec![format!("{MESH} ended with {}", output.status)]
             } else {
