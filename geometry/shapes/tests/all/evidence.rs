@@ -3,7 +3,7 @@
 use crate::known;
 
 use nalgebra::Vector3;
-use shapes::{Evidence, Family, Sample, Shape, Torus, Verdict, decide};
+use shapes::{Evidence, Family, Sample, Shape, Torus, Verdict, decide, decide_whole};
 
 use known::{NOISE_MM, Random, cases, samples};
 
@@ -277,6 +277,27 @@ fn a_slender_cone_is_no_cylinder_that_leans() {
             );
             let straight = decide(&tapered(seen, 0.0, seed), 1.0);
             assert_eq!(family(&straight), Some(Family::Cylinder), "{seen:?} {seed}");
+        }
+    }
+}
+
+/// Of rings of which the steep flank alone is seen, some are not found without a longer search.
+#[test]
+fn a_flank_that_is_all_of_a_torus_is_one() {
+    for (sizes, share, from) in [
+        ((6.0, 3.0), 1.0, 0.55),
+        ((6.0, 3.0), 0.5, 0.5),
+        ((2.0, 7.0), 1.0, 0.55),
+    ] {
+        for seed in 0..6 {
+            let evidence = decide_whole(&fillet(sizes, (false, share, from), seed), 1.0);
+            let which = (sizes, share, from, seed);
+            assert_eq!(
+                family(&evidence),
+                Some(Family::Torus),
+                "{which:?}: {:?}",
+                evidence.candidates
+            );
         }
     }
 }
