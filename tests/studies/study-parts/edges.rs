@@ -34,7 +34,7 @@ pub(crate) struct Edges {
     /// Of these, squared distances times lengths.
     pub(crate) squares_mm3: f64,
     /// The same of the least distances that readings of the two faces allow, were the edge where two
-    /// surfaces meet that know nothing of each other.
+    /// surfaces meet that know nothing of each other. Of smooth edges it says nothing.
     pub(crate) bound_mm3: f64,
 }
 

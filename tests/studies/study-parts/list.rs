@@ -68,16 +68,20 @@ pub(crate) fn list(parts: &[Measured]) -> String {
                 );
             }
         }
-        for (what, edges) in [("sharp", part.sharp_edges), ("smooth", part.smooth_edges)] {
+        let sharp = part.sharp_edges;
+        let bound = format!("; bound {:.4} mm", sharp.bound_mm());
+        for (what, edges, bound) in [
+            ("sharp", sharp, bound.as_str()),
+            ("smooth", part.smooth_edges, ""),
+        ] {
             let _ = writeln!(
                 out,
                 "  {what} edges: {:.0} mm, near a crease {:.0} mm, intersected {:.0} mm and {:.4} mm \
-                 rms off; bound {:.4} mm",
+                 rms off{bound}",
                 edges.true_mm,
                 edges.near_mm,
                 edges.met_mm,
                 edges.rms_mm(),
-                edges.bound_mm(),
             );
         }
         for own in &part.outcome.tangent.accepted {
