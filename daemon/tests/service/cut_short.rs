@@ -161,13 +161,12 @@ async fn a_scan_paused_on_request_waits_after_the_service_died_as_well() {
     let (first, scan) = amid().await;
     let mut events = first.client.events().await;
     let _: Scan = first.client.ask(&path::scan_pause(&scan.id)).await;
-    if active(&first).await.unwrap().state != ScanState::Paused {
-        let paused = |event: &Event| match event {
-            Event::Scan(scan) => (scan.state == ScanState::Paused).then_some(()),
-            _ => None,
-        };
-        events.until(paused).await;
-    }
+    // Told once it is kept, and paused a little before.
+    let paused = |event: &Event| match event {
+        Event::Scan(scan) => (scan.state == ScanState::Paused).then_some(()),
+        _ => None,
+    };
+    events.until(paused).await;
     let rig = Rig::start(left_by(&first), |_| {}).await;
     let paused = settled(&rig.client, &scan.id).await;
     assert_eq!(
